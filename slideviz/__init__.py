@@ -1,0 +1,60 @@
+"""slideviz: deform CFD meshes with radial basis functions, see and keep their quality.
+
+The public names are loaded when first used, so that ``slideviz --version`` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.deform import Step, deform
+    from slideviz.errors import SlidevizError
+    from slideviz.mesh.files import read, write
+    from slideviz.mesh.model import Cells, Marker, Mesh
+    from slideviz.mesh.quality import Quality, quality
+
+_HOME = {
+    "Case": "case.model",
+    "Cells": "mesh.model",
+    "Marker": "mesh.model",
+    "Mesh": "mesh.model",
+    "Quality": "mesh.quality",
+    "SlidevizError": "errors",
+    "Step": "deform",
+    "deform": "deform",
+    "quality": "mesh.quality",
+    "read": "mesh.files",
+    "write": "mesh.files",
+}
+
+__all__ = [
+    "Case",
+    "Cells",
+    "Marker",
+    "Mesh",
+    "Quality",
+    "SlidevizError",
+    "Step",
+    "__version__",
+    "deform",
+    "quality",
+    "read",
+    "write",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'slideviz' has no attribute {name!r}")
+    value = getattr(import_module(f"slideviz.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

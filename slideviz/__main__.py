@@ -1,0 +1,21 @@
+"""Entry point: ``slideviz`` and ``python -m slideviz``."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> int:
+    """Run the command line and return its exit code; ``--version`` loads nothing heavy."""
+    if sys.argv[1:] in (["--version"], ["-V"]):
+        from slideviz import __version__
+
+        print(f"slideviz {__version__}")
+        return 0
+    from slideviz.cli import run
+
+    return run(sys.argv[1:])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

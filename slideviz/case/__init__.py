@@ -1,0 +1,1 @@
+"""What is asked: case files, roles, motions and displacement files."""

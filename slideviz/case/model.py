@@ -1,0 +1,115 @@
+"""What is asked: roles of the boundaries, motions, and the settings of the method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
+Sliding = Literal["none", "ps", "ds"]
+PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
+PeriodicType = Literal["auto", "translational", "rotational"]
+Point = tuple[float, ...] | Literal["centroid"]
+
+ROLES: tuple[Role, ...] = ("moving", "fixed", "sliding", "periodic", "internal")
+SLIDING: tuple[Sliding, ...] = ("none", "ps", "ds")
+PERIODIC_MODES: tuple[PeriodicMode, ...] = ("none", "periodic", "fixed", "moving")
+PERIODIC_TYPES: tuple[PeriodicType, ...] = ("auto", "translational", "rotational")
+
+
+@dataclass(frozen=True)
+class Translate:
+    """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
+
+    marker: str
+    vector: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Rotate:
+    """Turn a marker by ``angle_deg`` about ``point`` and, in 3D, ``axis`` (right-handed)."""
+
+    marker: str
+    angle_deg: float
+    point: Point = "centroid"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Enlarge a marker by ``factors`` (one for each Cartesian axis) about ``point``."""
+
+    marker: str
+    factors: tuple[float, ...]
+    point: Point = "centroid"
+
+
+@dataclass(frozen=True)
+class FromFile:
+    """Displace nodes as a file lists: node index, then the Cartesian displacement.
+
+    ``marker`` empty: the file serves all moving markers (RBF-SliDe's DEFORMATION_FILENAME).
+    """
+
+    path: Path
+    marker: str = ""
+
+
+Motion = Translate | Rotate | Scale | FromFile
+
+
+@dataclass(frozen=True)
+class Case:
+    """A deformation case, the content of a ``.cfg`` file.
+
+    Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
+    thesis. Paths are absolute, or relative to the current folder.
+    """
+
+    mesh_file: Path | None = None
+    mesh_out: Path | None = None
+    zone: int | None = None
+    roles: Mapping[str, Role] = field(default_factory=dict)
+    motions: tuple[Motion, ...] = ()
+    sliding: Sliding = "none"
+    periodic: PeriodicMode = "none"
+    periodic_type: PeriodicType = "auto"
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    feature_angle_deg: float = 40.0
+    curved: bool = False
+    steps: int = 1
+    influence_factor: float = 2.5
+    quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
+    generate_quality: bool = True
+    source: Path | None = None
+    warnings: tuple[str, ...] = ()
+
+    def change(self, **values: Any) -> Case:
+        """Return the case with other values."""
+        return replace(self, **values)
+
+    def markers_with(self, role: Role) -> tuple[str, ...]:
+        """Return the names that have this role, in order."""
+        return tuple(name for name, given in self.roles.items() if given == role)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Case:
+        """Return the case that a ``.cfg`` file describes.
+
+        Raises
+        ------
+        CaseError
+            The file cannot be read, or has mistakes: all of them, each with its line.
+        """
+        from slideviz.case.cfg import read_case
+
+        return read_case(Path(path))
+
+    def write(self, path: str | Path) -> None:
+        """Write the ``.cfg`` file, with paths relative to its folder."""
+        from slideviz.case.cfg import write_case
+
+        write_case(Path(path), self)

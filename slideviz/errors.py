@@ -1,0 +1,27 @@
+"""Every error that slideviz raises on purpose.
+
+A message has the value, the rule and the remedy, and where there is one the place
+(``file:line:``), so that the command line and the window can show it as it is.
+"""
+
+from __future__ import annotations
+
+
+class SlidevizError(Exception):
+    """Something that the user can put right: the message says what and how."""
+
+
+class MeshError(SlidevizError):
+    """The mesh file, or the mesh, cannot be used."""
+
+
+class CaseError(SlidevizError):
+    """What is asked of the mesh is wrong: case file, role, motion or displacement file."""
+
+
+class DeformError(SlidevizError):
+    """The mesh and the case are sound, but the deformation cannot be computed."""
+
+
+class Cancelled(SlidevizError):
+    """The one who pulls the work asked it to stop; nothing is wrong."""

@@ -1,0 +1,1 @@
+"""What is given: meshes, their files, topology and quality."""

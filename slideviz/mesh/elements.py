@@ -1,0 +1,102 @@
+"""The element types of SU2 (VTK numbering), one row each.
+
+Facets are listed with outward normals for a cell of positive volume; ``corners`` lists, for
+every corner Jacobian of the quality metric, the corner and its neighbours in right-handed
+order (thesis Eq. 2.39 to 2.42 and Table 2.3). A triangle and a tetrahedron need only one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ElementType:
+    """One element type.
+
+    Attributes
+    ----------
+    vtk : int
+        The identifier in VTK and SU2 files.
+    name : str
+        Singular English name.
+    n_nodes, dim : int
+        Number of nodes, dimension (0 for a vertex to 3).
+    facets : tuple of tuple of int
+        Local nodes of each side, of dimension ``dim - 1``.
+    edges : tuple of tuple of int
+        Local nodes of each edge.
+    corners : tuple of tuple of int
+        ``(k, a, b[, c])``: corner and neighbours, right-handed.
+    """
+
+    vtk: int
+    name: str
+    n_nodes: int
+    dim: int
+    facets: tuple[tuple[int, ...], ...] = ()
+    edges: tuple[tuple[int, int], ...] = ()
+    corners: tuple[tuple[int, ...], ...] = ()
+
+
+_ROWS = (
+    ElementType(1, "vertex", 1, 0),
+    ElementType(3, "line", 2, 1, ((0,), (1,)), ((0, 1),)),
+    ElementType(
+        5, "triangle", 3, 2, ((0, 1), (1, 2), (2, 0)), ((0, 1), (1, 2), (2, 0)), ((0, 1, 2),)
+    ),
+    ElementType(
+        9,
+        "quadrilateral",
+        4,
+        2,
+        ((0, 1), (1, 2), (2, 3), (3, 0)),
+        ((0, 1), (1, 2), (2, 3), (3, 0)),
+        ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
+    ),
+    ElementType(
+        10,
+        "tetrahedron",
+        4,
+        3,
+        ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+        ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+        ((0, 1, 2, 3),),
+    ),
+    ElementType(
+        12,
+        "hexahedron",
+        8,
+        3,
+        ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+        (
+            *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
+            *((0, 4), (1, 5), (2, 6), (3, 7)),
+        ),
+        (
+            *((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7)),
+            *((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
+        ),
+    ),
+    ElementType(
+        13,
+        "prism",
+        6,
+        3,
+        ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+        ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+        ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
+    ),
+    ElementType(
+        14,
+        "pyramid",
+        5,
+        3,
+        ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+        ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
+        ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
+    ),
+)
+
+ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}
+"""Element type by VTK identifier."""

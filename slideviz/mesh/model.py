@@ -1,0 +1,187 @@
+"""What is given: points, cells and named boundaries, as frozen values with read-only arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.elements import ELEMENTS
+
+if TYPE_CHECKING:
+    from slideviz.mesh.su2 import Document
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
+    """Return ``values`` as a C-contiguous, read-only array; copies what is writable."""
+    array = np.ascontiguousarray(values, dtype=dtype)
+    if array.flags.writeable:
+        array = array.copy() if array is values else array
+        array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Elements of mixed type, in file order.
+
+    Attributes
+    ----------
+    types : (m,) uint8
+        VTK identifier of each element.
+    offsets : (m + 1,) int64
+        Element ``i`` has the nodes ``connectivity[offsets[i]:offsets[i + 1]]``.
+    connectivity : (k,) int64
+        Node indices, zero-based.
+    """
+
+    types: NDArray[np.uint8]
+    offsets: IntArray
+    connectivity: IntArray
+
+    @classmethod
+    def from_types(cls, types: ArrayLike, connectivity: ArrayLike) -> Cells:
+        """Return cells from VTK identifiers (m,) and the flat connectivity (k,).
+
+        Raises
+        ------
+        MeshError
+            An identifier is not in ``ELEMENTS``, or the connectivity has another length.
+        """
+        ids = frozen_array(types, np.uint8)
+        sizes = np.zeros(256, np.int64)
+        for row in ELEMENTS.values():
+            sizes[row.vtk] = row.n_nodes
+        counts = sizes[ids]
+        if np.any(counts == 0):
+            raise MeshError(f"element type {ids[np.argmin(counts)]} is not supported")
+        offsets = np.concatenate(([0], np.cumsum(counts)))
+        flat = frozen_array(connectivity, np.int64)
+        if flat.shape != (offsets[-1],):
+            raise MeshError(f"{offsets[-1]} node indices are needed, {flat.size} are given")
+        return cls(ids, frozen_array(offsets, np.int64), flat)
+
+    @classmethod
+    def from_blocks(cls, blocks: Iterable[tuple[int, ArrayLike]]) -> Cells:
+        """Return cells from ``(vtk, connectivity (m, n))`` blocks, in that order."""
+        types, flats = [np.empty(0, np.uint8)], [np.empty(0, np.int64)]
+        for vtk, nodes in blocks:
+            table = np.asarray(nodes, np.int64).reshape(-1, ELEMENTS[vtk].n_nodes)
+            types.append(np.full(len(table), vtk, np.uint8))
+            flats.append(table.ravel())
+        return cls.from_types(np.concatenate(types), np.concatenate(flats))
+
+    def __len__(self) -> int:
+        return len(self.types)
+
+    @cached_property
+    def by_type(self) -> dict[int, tuple[IntArray, IntArray]]:
+        """For each VTK identifier present: element ids (m_t,), nodes (m_t, n_t)."""
+        found = {}
+        for vtk in np.unique(self.types):
+            ids = np.flatnonzero(self.types == vtk)
+            columns = np.arange(ELEMENTS[int(vtk)].n_nodes)
+            nodes = self.connectivity[self.offsets[ids][:, None] + columns]
+            found[int(vtk)] = (frozen_array(ids, np.int64), frozen_array(nodes, np.int64))
+        return found
+
+    @cached_property
+    def nodes(self) -> IntArray:
+        """Return the indices of all nodes used, sorted, each once: (u,)."""
+        return frozen_array(np.unique(self.connectivity), np.int64)
+
+    def same_as(self, other: Cells) -> bool:
+        """Tell whether both hold the same elements in the same order."""
+        return np.array_equal(self.types, other.types) and np.array_equal(
+            self.connectivity, other.connectivity
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """A named boundary: its elements, of one dimension less than the mesh."""
+
+    name: str
+    cells: Cells
+
+    @property
+    def nodes(self) -> IntArray:
+        """Return the indices of its nodes, sorted, each once: (u,)."""
+        return self.cells.nodes
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Points, cells and boundaries of one zone.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Cartesian coordinates, d = 2 or 3, in the file's length unit.
+    cells : Cells
+        The volume elements (3D) or faces (2D).
+    markers : tuple of Marker
+        The named boundaries, in file order.
+    document : Document or None
+        What an SU2 file held besides, kept for writing.
+    name : str
+        Where it came from, for messages.
+    zone, zones : int
+        Number of this zone in the file (from 1) and of all its zones.
+    """
+
+    points: FloatArray
+    cells: Cells
+    markers: tuple[Marker, ...] = ()
+    document: Document | None = None
+    name: str = "mesh"
+    zone: int = 1
+    zones: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen_array(self.points, np.float64))
+        if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
+            raise MeshError(f"points have shape {self.points.shape}; needed is (n, 2) or (n, 3)")
+
+    @property
+    def dim(self) -> int:
+        """Return 2 or 3."""
+        return int(self.points.shape[1])
+
+    @property
+    def extent(self) -> float:
+        """Return the largest extent over the Cartesian axes."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @property
+    def marker_names(self) -> tuple[str, ...]:
+        """Return the names of the boundaries, in file order."""
+        return tuple(marker.name for marker in self.markers)
+
+    def marker(self, name: str) -> Marker:
+        """Return the boundary of that name.
+
+        Raises
+        ------
+        MeshError
+            There is none.
+        """
+        for marker in self.markers:
+            if marker.name == name:
+                return marker
+        raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
+
+    def with_points(self, points: ArrayLike) -> Mesh:
+        """Return the same mesh at other points, (n, d)."""
+        moved = np.asarray(points, np.float64)
+        if moved.shape != self.points.shape:
+            raise MeshError(f"points have shape {moved.shape}; needed is {self.points.shape}")
+        return replace(self, points=moved)
