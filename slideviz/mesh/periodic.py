@@ -1,0 +1,240 @@
+"""Periodic pairs: two boundaries that are images of each other, matched node by node."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.errors import MeshError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+
+Kind = Literal["auto", "translational", "rotational"]
+
+TOLERANCE = 1e-5
+"""Largest mismatch of a node and its image, as a fraction of the mesh's largest extent."""
+
+_Z = (0.0, 0.0, 1.0)
+_AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two markers that are images of each other.
+
+    Attributes
+    ----------
+    first, second : str
+        Marker names; ``second`` is the image of ``first``.
+    kind : "translational" or "rotational"
+    vector : (d,) float64
+        Translation from first to second; zero when rotational.
+    angle : float
+        Rotation in radians about ``axis`` through ``origin``; zero when translational.
+    axis, origin : (3,) tuple of float
+    nodes : (k, 2) int64
+        Each node of ``first`` and its image.
+    mismatch : float
+        Largest distance between an image and its partner, in the mesh's length unit.
+    """
+
+    first: str
+    second: str
+    kind: Literal["translational", "rotational"]
+    vector: FloatArray
+    angle: float
+    axis: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    nodes: IntArray
+    mismatch: float
+
+    @property
+    def period(self) -> float:
+        """Return the length (translational) or the angle in radians (rotational), positive."""
+        if self.kind == "rotational":
+            return abs(self.angle)
+        return float(np.linalg.norm(self.vector))
+
+    def describe(self) -> str:
+        """Return the transformation in words, for people."""
+        if self.kind == "rotational":
+            return f"{np.degrees(abs(self.angle)):.6g}° about {_axis_word(self.axis)}"
+        return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in self.vector)})"
+
+
+def _axis_word(axis: Sequence[float]) -> str:
+    for word, unit in zip("xyz", np.eye(3), strict=True):
+        if np.allclose(axis, unit):
+            return word
+    return f"({', '.join(f'{v:.4g}' for v in axis)})"
+
+
+def axis_basis(axis: Sequence[float]) -> FloatArray:
+    """Return rows e1, e2, e3 (3, 3), right-handed, with e3 along ``axis``.
+
+    Raises
+    ------
+    MeshError
+        The axis has length zero.
+    """
+    direction = np.asarray(axis, float)
+    length = np.linalg.norm(direction)
+    if not length > 0:
+        raise MeshError("the axis of rotation has length zero; give a direction such as 0, 0, 1")
+    e3 = direction / length
+    # The cyclic next axis after the largest component: for z this gives e1 = x, e2 = y exactly.
+    start = np.eye(3)[(int(np.argmax(np.abs(e3))) + 1) % 3]
+    e1 = start - (start @ e3) * e3
+    e1 /= np.linalg.norm(e1)
+    return np.stack([e1, np.cross(e3, e1), e3])
+
+
+def in_axis_frame(
+    points: FloatArray, axis: Sequence[float] = _Z, origin: Sequence[float] = (0.0, 0.0, 0.0)
+) -> FloatArray:
+    """Return points (n, d) as coordinates (n, 3) along e1, e2, e3 of the axis from the origin."""
+    padded = np.zeros((len(points), 3))
+    padded[:, : points.shape[1]] = points
+    return (padded - np.asarray(origin, float)) @ axis_basis(axis).T
+
+
+def match(
+    mesh: Mesh,
+    first: str,
+    second: str,
+    kind: Kind = "auto",
+    axis: Sequence[float] = _Z,
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Pair:
+    """Return how marker ``second`` is the image of ``first``.
+
+    ``auto`` tries a translation, then a rotation about the given axis.
+
+    Raises
+    ------
+    MeshError
+        They do not match to ``TOLERANCE``; the message has the best transformation tried, the
+        largest mismatch and where it is.
+    """
+    a, b = mesh.marker(first).nodes, mesh.marker(second).nodes
+    where = f"{mesh.name}: periodic markers {first!r} and {second!r} do not match"
+    if len(a) != len(b):
+        raise MeshError(
+            f"{where}: {len(a)} and {len(b)} nodes; periodic boundaries need the same nodes, so "
+            "choose other markers or remesh one of them"
+        )
+    kinds = ("translational", "rotational") if kind == "auto" else (kind,)
+    best: tuple[float, Pair] | None = None
+    for one in kinds:
+        pair, worst = _match_kind(mesh, (first, second), one, (tuple(axis), tuple(origin)))
+        if worst <= TOLERANCE * mesh.extent:
+            return pair
+        if best is None or worst < best[0]:
+            best = worst, pair
+    assert best is not None
+    raise MeshError(
+        f"{where}: with the best {best[1].kind} transformation ({best[1].describe()}) a node is "
+        f"{best[0]:.3g} from its image, allowed is {TOLERANCE * mesh.extent:.3g}; check the "
+        "markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
+    )
+
+
+def _match_kind(
+    mesh: Mesh,
+    names: tuple[str, str],
+    kind: str,
+    frame: tuple[tuple[float, ...], tuple[float, ...]],
+) -> tuple[Pair, float]:
+    """Return the best pair of one kind and its largest mismatch (inf when not one to one)."""
+    a, b = (mesh.marker(name).nodes for name in names)
+    xa, xb = mesh.points[a], mesh.points[b]
+    axis, origin = (0.0, 0.0, 1.0) if mesh.dim == 2 else frame[0], frame[1]
+    vector, angle = np.zeros(mesh.dim), 0.0
+    if kind == "translational":
+        vector = xb.mean(axis=0) - xa.mean(axis=0)
+        image, target = xa + vector, xb
+    else:
+        ya, yb = (in_axis_frame(x, axis, origin) for x in (xa, xb))
+        za, zb = (y[:, 0] + 1j * y[:, 1] for y in (ya, yb))
+        # A rotation turns the sum of all complex positions by its own angle.
+        angle = float(np.angle(zb.sum() * np.conj(za.sum())))
+        turned = za * np.exp(1j * angle)
+        image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
+    distance, partner = cKDTree(target).query(image)
+    one_to_one = len(np.unique(partner)) == len(partner)
+    trivial = max(np.linalg.norm(vector) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
+    pair = Pair(
+        *names,
+        "translational" if kind == "translational" else "rotational",
+        frozen_array(vector, np.float64),
+        angle,
+        tuple(float(v) for v in axis),  # type: ignore[arg-type]
+        tuple(float(v) for v in origin),  # type: ignore[arg-type]
+        frozen_array(np.stack([a, b[partner]], axis=1), np.int64),
+        float(distance.max()),
+    )
+    return pair, float(distance.max()) if one_to_one and not trivial else np.inf
+
+
+def pair_up(
+    mesh: Mesh,
+    names: Sequence[str],
+    kind: Kind = "auto",
+    axis: Sequence[float] = _Z,
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+) -> tuple[Pair, ...]:
+    """Return the pairs that the named markers form, whatever their order.
+
+    Raises
+    ------
+    MeshError
+        A marker has no partner, or two pairs have different periods.
+    """
+    if len(names) % 2 or not names:
+        raise MeshError(
+            f"{mesh.name}: {len(names)} periodic markers ({', '.join(names) or 'none'}); "
+            "they come in pairs"
+        )
+    rest, pairs = list(names), []
+    while rest:
+        first = rest.pop(0)
+        for second in rest:
+            try:
+                pairs.append(match(mesh, first, second, kind, axis, origin))
+            except MeshError:
+                continue
+            rest.remove(second)
+            break
+        else:
+            match(mesh, first, rest[0], kind, axis, origin)  # raises, with the reason
+    for other in pairs[1:]:
+        same = other.kind == pairs[0].kind and np.isclose(other.period, pairs[0].period, rtol=1e-6)
+        if not same:
+            raise MeshError(
+                f"{mesh.name}: the periodic pairs {pairs[0].first!r}, {pairs[0].second!r} "
+                f"({pairs[0].describe()}) and {other.first!r}, {other.second!r} "
+                f"({other.describe()}) differ; one period is possible"
+            )
+    return tuple(pairs)
+
+
+def find_pairs(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Pair, ...]:
+    """Return all pairs of markers that match, tried by translation and about x, y and z.
+
+    A guess, to be confirmed: the opposite sides of every box match. Axes pass through 0.
+    """
+    found = []
+    for first, second in combinations(names or mesh.marker_names, 2):
+        if len(mesh.marker(first).nodes) != len(mesh.marker(second).nodes):
+            continue
+        for axis in _AXES[:1] if mesh.dim == 2 else _AXES:
+            try:
+                found.append(match(mesh, first, second, axis=axis))
+            except MeshError:
+                continue
+            break
+    return tuple(found)

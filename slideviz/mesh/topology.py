@@ -1,0 +1,301 @@
+"""Boundary topology: oriented facets, smooth neighbours, and the fans around each node.
+
+A *facet* is one element of a marker. Two neighbouring facets of one marker are joined when the
+angle between their normals is below the feature angle. Around a node the joined facets form a
+*fan*, which has one normal; a node where boundaries meet, or on a feature edge, has several.
+Deciding this node by node, not piece by piece, also finds the sharp trailing edge of a profile
+that is one marker and closed in itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from slideviz.errors import MeshError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+
+FEATURE_ANGLE_DEG = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """The facets of all markers, nodes ordered so that normals point out of the cells.
+
+    Attributes
+    ----------
+    facets : (f, k) int64
+        Node indices; k = 2 in 2D, 4 in 3D, where a triangle repeats its last node.
+    marker : (f,) int64
+        Index into ``names``.
+    names : tuple of str
+        The markers, in file order.
+    owner : (f,) int64
+        The cell each facet is a side of.
+    joints : (j, 2) int64
+        Pairs of facets of any markers that share a joint (node in 2D, edge in 3D).
+    joint_nodes : (j, dim - 1) int64
+        The nodes that each pair shares.
+    """
+
+    facets: IntArray
+    marker: IntArray
+    names: tuple[str, ...]
+    owner: IntArray
+    joints: IntArray
+    joint_nodes: IntArray
+
+    @property
+    def dim(self) -> int:
+        """Return the dimension of the mesh, 2 or 3."""
+        return 2 if self.facets.shape[1] == 2 else 3
+
+    @property
+    def nodes(self) -> IntArray:
+        """Return the boundary nodes, sorted: (b,)."""
+        return np.unique(self.facets)
+
+
+@dataclass(frozen=True, eq=False)
+class Fans:
+    """Groups of smoothly joined facets of one marker around one node.
+
+    Attributes
+    ----------
+    facet, node, fan : (i,) int64
+        One row for each facet and node of it: which fan the facet belongs to at that node.
+    fan_node, fan_marker : (m,) int64
+        The node and the marker of each fan.
+    """
+
+    facet: IntArray
+    node: IntArray
+    fan: IntArray
+    fan_node: IntArray
+    fan_marker: IntArray
+
+
+def find_boundary(mesh: Mesh) -> Boundary:
+    """Return the oriented boundary of a mesh.
+
+    Raises
+    ------
+    MeshError
+        A marker element is no side of any cell.
+    """
+    width = 2 if mesh.dim == 2 else 4
+    tables, owners = [np.empty((0, width), np.int64)], [np.empty(0, np.int64)]
+    for index, marker in enumerate(mesh.markers):
+        for _, nodes in marker.cells.by_type.values():
+            tables.append(_padded(nodes, width))
+            owners.append(np.full(len(nodes), index))
+    facets, marker_of = np.concatenate(tables), np.concatenate(owners)
+    owner = _find_owners(mesh, facets, marker_of)
+    facets = _turn_outward(mesh, facets, owner)
+    joints, joint_nodes = _find_joints(facets, mesh.dim)
+    return Boundary(
+        frozen_array(facets, np.int64),
+        frozen_array(marker_of, np.int64),
+        mesh.marker_names,
+        frozen_array(owner, np.int64),
+        frozen_array(joints, np.int64),
+        frozen_array(joint_nodes, np.int64),
+    )
+
+
+def _padded(nodes: IntArray, width: int) -> IntArray:
+    """Return the table with its last column repeated up to ``width`` columns."""
+    missing = width - nodes.shape[1]
+    return np.hstack([nodes, np.repeat(nodes[:, -1:], missing, axis=1)]) if missing else nodes
+
+
+def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
+    """Return the cell each facet is a side of, (f,).
+
+    Only cells whose side lies wholly on boundary nodes are looked at, so that the cost follows
+    the boundary, not the volume.
+    """
+    on_boundary = np.zeros(len(mesh.points), bool)
+    on_boundary[facets.ravel()] = True
+    sides, cells = [], []
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        near = on_boundary[nodes]
+        some = np.flatnonzero(near.sum(axis=1) >= mesh.dim)
+        for local in ELEMENTS[vtk].facets:
+            keep = some[near[some][:, local].all(axis=1)]
+            sides.append(_padded(nodes[keep][:, local], facets.shape[1]))
+            cells.append(ids[keep])
+    table = np.sort(np.concatenate([facets, *sides]), axis=1)
+    # A padded triangle (a, b, c, c) and a quadrilateral differ after sorting only if the
+    # repeated node is the same one on both sides: make it the largest.
+    if mesh.dim == 3:
+        table = _canonical_triangles(table)
+    _, group = np.unique(table, axis=0, return_inverse=True)
+    group = group.ravel()
+    cell_of_group = np.full(group.max(initial=-1) + 1, -1, np.int64)
+    cell_of_group[group[len(facets) :]] = np.concatenate([np.empty(0, np.int64), *cells])
+    owner = cell_of_group[group[: len(facets)]]
+    if np.any(owner < 0):
+        lost = int(np.argmin(owner))
+        raise MeshError(
+            f"{mesh.name}: marker {mesh.marker_names[marker_of[lost]]!r} has an element with the "
+            f"nodes {', '.join(map(str, np.unique(facets[lost])))} that is no side of any cell; "
+            "remove it from the marker or add the missing cell"
+        )
+    return owner
+
+
+def _canonical_triangles(table: IntArray) -> IntArray:
+    """Return sorted rows (a, b, c, d) with a repeated node moved to the end."""
+    out = table.copy()
+    for column in (0, 1):
+        twice = out[:, column] == out[:, column + 1]
+        rest = np.delete(out[twice], column, axis=1)
+        out[twice] = np.hstack([rest, rest[:, -1:]])
+    return out
+
+
+def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
+    """Return the facets with the node order that makes their normals point out of the owner."""
+    centre = mesh.points[facets].mean(axis=1)
+    size = np.diff(mesh.cells.offsets)
+    sums = np.add.reduceat(mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1], axis=0)
+    middle = sums[owner] / size[owner][:, None]
+    inward = np.einsum("fd,fd->f", facet_vectors(mesh.points, facets), centre - middle) < 0
+    turned = facets.copy()
+    if mesh.dim == 2:
+        turned[inward] = facets[inward][:, ::-1]
+    else:
+        triangle = facets[:, 2] == facets[:, 3]
+        turned[inward & ~triangle] = facets[inward & ~triangle][:, ::-1]
+        turned[inward & triangle] = facets[inward & triangle][:, [1, 0, 2, 3]]
+    return turned
+
+
+def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:
+    """Return a normal of each facet, (f, d), as long as the facet is large (2D) or twice that.
+
+    In 3D it is the cross product of the diagonals, which for a triangle with its last node
+    repeated is the cross product of two sides.
+    """
+    x = coords[facets]
+    if facets.shape[1] == 2:
+        t = x[:, 1] - x[:, 0]
+        return np.stack([t[:, 1], -t[:, 0]], axis=1)
+    return np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Return the vectors (n, d) at length 1; zero vectors stay zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1.0)
+
+
+def _find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
+    """Return pairs of facets that share a node (2D) or an edge (3D), and what they share.
+
+    Joints of more than two facets (a thin plate, a non-manifold edge) are left out: nothing is
+    smooth there.
+    """
+    count, width = facets.shape
+    if dim == 2:
+        keys = facets.reshape(-1, 1)
+        facet = np.repeat(np.arange(count), width)
+    else:
+        pairs = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+        facet = np.repeat(np.arange(count), width)
+        real = pairs[:, 0] != pairs[:, 1]
+        keys, facet = np.sort(pairs[real], axis=1), facet[real]
+    order = np.lexsort(keys.T[::-1])
+    keys, facet = keys[order], facet[order]
+    starts = np.flatnonzero(np.r_[True, np.any(keys[1:] != keys[:-1], axis=1)])
+    sizes = np.diff(np.r_[starts, len(keys)])
+    first = starts[sizes == 2] if len(keys) else np.empty(0, np.int64)
+    return np.stack([facet[first], facet[first + 1]], axis=1), keys[first]
+
+
+def smooth_joints(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> NDArray[np.bool_]:
+    """Tell for each joint whether its facets are of one marker and turn by less than the angle.
+
+    Parameters
+    ----------
+    points : (n, d)
+        Cartesian coordinates of the undeformed mesh.
+    """
+    normal = unit(facet_vectors(points, boundary.facets))
+    a, b = boundary.joints.T
+    along = np.einsum("jd,jd->j", normal[a], normal[b])
+    return (along > np.cos(np.radians(feature_angle_deg))) & (
+        boundary.marker[a] == boundary.marker[b]
+    )
+
+
+def find_fans(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> Fans:
+    """Return the fans of smoothly joined facets around every boundary node."""
+    count, width = boundary.facets.shape
+    facet = np.repeat(np.arange(count), width)
+    node = boundary.facets.ravel()
+    real = np.ones(len(node), bool)
+    if width == 4:
+        real[3::4] = boundary.facets[:, 2] != boundary.facets[:, 3]
+    facet, node = facet[real], node[real]
+    row = np.full(count * width, -1, np.int64)
+    row[np.flatnonzero(real)] = np.arange(len(node))
+    smooth = smooth_joints(boundary, points, feature_angle_deg)
+    links = []
+    for shared in boundary.joint_nodes[smooth].T:
+        ends = [
+            row[side * width + (boundary.facets[side] == shared[:, None]).argmax(axis=1)]
+            for side in boundary.joints[smooth].T
+        ]
+        links.append(np.stack(ends))
+    a, b = np.concatenate(links, axis=1) if links else np.empty((2, 0), np.int64)
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(len(node), len(node)))
+    total, fan = connected_components(graph, directed=False)
+    fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
+    fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
+    return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
+
+
+def fan_normals(boundary: Boundary, fans: Fans, coords: FloatArray) -> FloatArray:
+    """Return the unit normal of each fan, (m, d), in the frame of ``coords`` (n, d).
+
+    It is the mean of the facets' unit normals, weighted with the inverse distance from the node
+    to the facet's centre (thesis section 2.4.4).
+    """
+    normal = unit(facet_vectors(coords, boundary.facets))
+    x = coords[boundary.facets]
+    if boundary.facets.shape[1] == 4:
+        triangle = boundary.facets[:, 2] == boundary.facets[:, 3]
+        weight = np.where(triangle[:, None], [1 / 3, 1 / 3, 1 / 6, 1 / 6], 1 / 4)
+        centre = np.einsum("fk,fkd->fd", weight, x)
+    else:
+        centre = x.mean(axis=1)
+    distance = np.linalg.norm(coords[fans.node] - centre[fans.facet], axis=1)
+    share = 1.0 / np.maximum(distance, np.finfo(float).tiny)
+    total = np.zeros((len(fans.fan_node), coords.shape[1]))
+    for axis in range(coords.shape[1]):
+        total[:, axis] = np.bincount(
+            fans.fan, weights=share * normal[fans.facet, axis], minlength=len(total)
+        )
+    return unit(total)
+
+
+def find_pieces(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> IntArray:
+    """Return the piece that each facet belongs to, (f,): smooth parts of one marker."""
+    smooth = smooth_joints(boundary, points, feature_angle_deg)
+    a, b = boundary.joints[smooth].T
+    count = len(boundary.facets)
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)

@@ -1,0 +1,132 @@
+"""Compiled loops: sums and matrices of radial functions, fused so that nothing else is stored.
+
+    s(x_i) = sum_j w_j phi(|x_i - c_j| / R)
+
+The loops run over targets in parallel and over control nodes inside, with every coordinate and
+weight in a contiguous row of its own, which lets the compiler vectorise the inner loop. All of
+them release the interpreter lock, so a window stays alive meanwhile. ``LOCK`` lets one run at
+a time, because Numba's fallback thread pool must not be entered from two threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from math import factorial
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+LOCK = threading.Lock()
+
+OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "fastmath": True,
+    "cache": True,
+    "error_model": "numpy",
+}
+
+# (1 - cos g) / g^2 as a polynomial in t = g^2. The arguments of Eq. 2.15 stay below 2 (a full
+# turn), where nine terms are right to 4e-13; below 1 (half a turn) to the last bit.
+_K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = (
+    (-1.0) ** k / float(factorial(2 * k + 2)) for k in range(9)
+)
+
+
+@njit(inline="always", **OPTIONS)
+def _wendland_c2(squared: float, scale: float) -> float:
+    """Return (1 - q)^4 (4 q + 1) with q = distance * scale, and 0 from q = 1 on."""
+    q = np.sqrt(squared) * scale
+    u = max(1.0 - q, 0.0)
+    u = u * u
+    return u * u * (4.0 * q + 1.0)
+
+
+@njit(inline="always", **OPTIONS)
+def _half_chord(g: float) -> float:
+    """Return 1 - cos g without cancellation, for |g| <= 2."""
+    t = g * g
+    p = _K8 * t + _K7
+    p = ((((((p * t + _K6) * t + _K5) * t + _K4) * t + _K3) * t + _K2) * t + _K1) * t + _K0
+    return t * p
+
+
+@njit(parallel=True, **OPTIONS)
+def sum_three(x, c, w, scale, out):  # type: ignore[no-untyped-def]
+    """Write s at targets x (3, N) from controls c (3, n), weights w (3, n), to out (3, N)."""
+    c0, c1, c2 = c[0], c[1], c[2]
+    w0, w1, w2 = w[0], w[1], w[2]
+    for i in prange(x.shape[1]):
+        x0, x1, x2 = x[0, i], x[1, i], x[2, i]
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for j in range(c.shape[1]):
+            d0, d1, d2 = x0 - c0[j], x1 - c1[j], x2 - c2[j]
+            p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2, scale)
+            s0 += w0[j] * p
+            s1 += w1[j] * p
+            s2 += w2[j] * p
+        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+
+
+@njit(parallel=True, **OPTIONS)
+def sum_four(x, c, w, scale, out):  # type: ignore[no-untyped-def]
+    """Write s as ``sum_three`` does, for four features (translational period in 3D)."""
+    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
+    w0, w1, w2 = w[0], w[1], w[2]
+    for i in prange(x.shape[1]):
+        x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for j in range(c.shape[1]):
+            d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
+            p = _wendland_c2(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3, scale)
+            s0 += w0[j] * p
+            s1 += w1[j] * p
+            s2 += w2[j] * p
+        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+
+
+@njit(parallel=True, **OPTIONS)
+def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
+    """Write s for rotational features (r, sin, cos, z); ``half`` is theta_p / pi (Eq. 2.15)."""
+    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
+    w0, w1, w2 = w[0], w[1], w[2]
+    for i in prange(x.shape[1]):
+        r, sine, cosine, z = x[0, i], x[1, i], x[2, i], x[3, i]
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for j in range(c.shape[1]):
+            dr, dz = r - c0[j], z - c3[j]
+            chord = 2.0 * r * c0[j] * _half_chord(half * (sine * c2[j] - cosine * c1[j]))
+            p = _wendland_c2(dr * dr + chord + dz * dz, scale)
+            s0 += w0[j] * p
+            s1 += w1[j] * p
+            s2 += w2[j] * p
+        out[0, i], out[1, i], out[2, i] = s0, s1, s2
+
+
+@njit(parallel=True, **OPTIONS)
+def fill_matrix(c, directions, half, scale, rows, out):  # type: ignore[no-untyped-def]
+    """Write rows of G_ab = phi(|x_a - x_b|) (n_a . n_b) to out (rows, n).
+
+    ``c`` (4, n) has the features of each constraint's node, ``directions`` (d, n) its unit
+    direction; d = 0 leaves the dot product out. ``half`` is 0 for Euclidean features.
+    """
+    first, last = rows
+    d = directions.shape[0]
+    for i in prange(last - first):
+        a = first + i
+        x0, x1, x2, x3 = c[0, a], c[1, a], c[2, a], c[3, a]
+        for b in range(c.shape[1]):
+            d0, d3 = x0 - c[0, b], x3 - c[3, b]
+            if half > 0.0:
+                turn = _half_chord(half * (x1 * c[2, b] - x2 * c[1, b]))
+                squared = d0 * d0 + d3 * d3 + 2.0 * x0 * c[0, b] * turn
+            else:
+                d1, d2 = x1 - c[1, b], x2 - c[2, b]
+                squared = d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3
+            value = _wendland_c2(squared, scale)
+            if d > 0:
+                dot = 0.0
+                for k in range(d):
+                    dot += directions[k, a] * directions[k, b]
+                value *= dot
+            out[i, b] = value

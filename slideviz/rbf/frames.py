@@ -1,0 +1,184 @@
+"""Frames: the coordinates the interpolation works in, and the distances between them.
+
+Coordinates are Cartesian, or cylindrical ``(r, rho theta[, z])`` about an axis when periodicity
+is rotational, with theta scaled by a constant reference radius rho so that all components are
+lengths. Displacements are differences of coordinates.
+
+Distances are computed from *features*, a few numbers for each node:
+
+* Euclidean: the Cartesian position.
+* Translational period lambda along u (thesis Eq. 2.13): ``(lambda/pi) sin(pi D/lambda)`` is the
+  chord of a circle of circumference lambda, so the component s along u is replaced by
+  ``lambda/(2 pi) (cos, sin)(2 pi s/lambda)`` and the distance is Euclidean again.
+* Rotational period (Eq. 2.15): ``(r, sin(pi theta/theta_p), cos(pi theta/theta_p)[, z])``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray
+from slideviz.mesh.periodic import Pair, axis_basis, in_axis_frame
+
+Distance = Literal["euclidean", "rotational"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A working frame.
+
+    Attributes
+    ----------
+    dim : int
+        2 or 3.
+    direction : (d,) float64 or None
+        Unit vector of a translational period.
+    period : float
+        Translational: length. Rotational: angle in radians. 0: not periodic.
+    axis, origin : (3,) float64 or None
+        Set for a cylindrical frame.
+    theta0 : float
+        Angle from which theta is counted, opposite the largest empty sector.
+    radius : float
+        The reference radius rho, which turns angles into lengths.
+    """
+
+    dim: int
+    direction: FloatArray | None = None
+    period: float = 0.0
+    axis: FloatArray | None = None
+    origin: FloatArray | None = None
+    theta0: float = 0.0
+    radius: float = 1.0
+
+    @property
+    def cylindrical(self) -> bool:
+        """Tell whether the coordinates are (r, rho theta[, z])."""
+        return self.axis is not None
+
+    @property
+    def distance(self) -> Distance:
+        """Return the rule that the features serve."""
+        return "rotational" if self.cylindrical and self.period else "euclidean"
+
+    def coords(self, points: FloatArray) -> FloatArray:
+        """Return coordinates (n, d) of Cartesian points (n, d)."""
+        if self.axis is None or self.origin is None:
+            return np.array(points, float)
+        local = in_axis_frame(points, self.axis, self.origin)
+        angle = np.arctan2(local[:, 1], local[:, 0]) - self.theta0
+        angle = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+        r = np.hypot(local[:, 0], local[:, 1])
+        angle[r <= 1e-9 * self.radius] = 0.0  # theta means nothing on the axis: take the middle
+        columns = [r, self.radius * angle, local[:, 2]]
+        return np.stack(columns[: self.dim], axis=1)
+
+    def points(self, coords: FloatArray) -> FloatArray:
+        """Return Cartesian points (n, d) of coordinates (n, d)."""
+        if self.axis is None or self.origin is None:
+            return np.array(coords, float)
+        angle = coords[:, 1] / self.radius + self.theta0
+        local = np.zeros((len(coords), 3))
+        local[:, 0] = coords[:, 0] * np.cos(angle)
+        local[:, 1] = coords[:, 0] * np.sin(angle)
+        if self.dim == 3:
+            local[:, 2] = coords[:, 2]
+        return (local @ axis_basis(self.axis) + self.origin)[:, : self.dim]
+
+    def difference(self, points: FloatArray, vectors: FloatArray) -> FloatArray:
+        """Return Cartesian displacements (n, d) of points (n, d) as frame components (n, d)."""
+        if not self.cylindrical:
+            return np.array(vectors, float)
+        step = self.coords(points + vectors) - self.coords(points)
+        turn = 2 * np.pi * self.radius
+        step[:, 1] -= turn * np.round(step[:, 1] / turn)
+        step[np.all(vectors == 0, axis=1)] = 0.0
+        return step
+
+    def features(self, coords: FloatArray) -> FloatArray:
+        """Return the numbers that distances are computed from: (k, n), rows contiguous."""
+        if self.cylindrical and self.period:
+            half = np.pi / self.period * coords[:, 1] / self.radius
+            rows = [coords[:, 0], np.sin(half), np.cos(half)]
+            rows.append(coords[:, 2] if self.dim == 3 else np.zeros(len(coords)))
+            return np.ascontiguousarray(np.stack(rows))
+        x = self.points(coords)
+        if self.direction is None:
+            return np.ascontiguousarray(x.T)
+        along = x @ self.direction
+        turn = 2 * np.pi / self.period
+        rows = [np.cos(turn * along) / turn, np.sin(turn * along) / turn]
+        rows.extend(_across(self.direction) @ x.T)
+        return np.ascontiguousarray(np.stack(rows))
+
+    def shift(self) -> FloatArray:
+        """Return one period as a difference of coordinates, (d,); zero when not periodic."""
+        if self.direction is not None:
+            return self.period * self.direction
+        step = np.zeros(self.dim)
+        if self.cylindrical:
+            step[1] = self.period * self.radius
+        return step
+
+
+def _across(direction: FloatArray) -> FloatArray:
+    """Return unit rows (d - 1, d) that span what is perpendicular to a unit vector (d,)."""
+    if len(direction) == 2:
+        return np.array([[-direction[1], direction[0]]])
+    return axis_basis(direction)[:2]
+
+
+def make_frame(
+    points: FloatArray,
+    pairs: Sequence[Pair],
+    *,
+    periodic_distance: bool,
+    rotational_about: tuple[Sequence[float], Sequence[float]] | None = None,
+) -> Frame:
+    """Return the frame that periodic pairs ask for.
+
+    Parameters
+    ----------
+    points : (n, d)
+        The undeformed mesh.
+    pairs
+        The periodic pairs; all have one period. Empty: not periodic.
+    periodic_distance
+        False keeps the frame of the pairs but with the plain distance (PERIODIC_MODE= none).
+    rotational_about
+        Axis and origin of a cylindrical frame without pairs.
+    """
+    dim = points.shape[1]
+    if pairs and pairs[0].kind == "translational":
+        if not periodic_distance:
+            return Frame(dim)
+        length = pairs[0].period
+        return Frame(dim, direction=pairs[0].vector / length, period=length)
+    if pairs:
+        rotational_about = pairs[0].axis, pairs[0].origin
+    if rotational_about is None:
+        return Frame(dim)
+    axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(rotational_about[0], float)
+    origin = np.asarray(rotational_about[1], float)
+    local = in_axis_frame(points, axis, origin)
+    radii = np.hypot(local[:, 0], local[:, 1])
+    return Frame(
+        dim,
+        period=pairs[0].period if pairs and periodic_distance else 0.0,
+        axis=axis,
+        origin=origin,
+        theta0=_middle_angle(np.arctan2(local[:, 1], local[:, 0])[radii > 1e-9 * radii.max()]),
+        radius=float((radii.min() + radii.max()) / 2),
+    )
+
+
+def _middle_angle(angles: FloatArray) -> float:
+    """Return the angle opposite the middle of the largest empty sector."""
+    ordered = np.sort(angles)
+    gaps = np.diff(np.r_[ordered, ordered[0] + 2 * np.pi])
+    widest = int(np.argmax(gaps))
+    return float(ordered[widest] + gaps[widest] / 2 + np.pi)
