@@ -223,18 +223,24 @@ def pair_up(
 
 
 def find_pairs(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Pair, ...]:
-    """Return all pairs of markers that match, tried by translation and about x, y and z.
+    """Return pairs of markers that match, each marker in one pair at most.
 
-    A guess, to be confirmed: the opposite sides of every box match. Axes pass through 0.
+    Translations are tried first, then rotations about z, x and y through 0. A guess, to be
+    confirmed: the opposite sides of every box match.
     """
-    found = []
-    for first, second in combinations(names or mesh.marker_names, 2):
-        if len(mesh.marker(first).nodes) != len(mesh.marker(second).nodes):
-            continue
-        for axis in _AXES[:1] if mesh.dim == 2 else _AXES:
+    chosen = list(names or mesh.marker_names)
+    count = {name: len(mesh.marker(name).nodes) for name in chosen}
+    axes = _AXES[:1] if mesh.dim == 2 else _AXES
+    tries: list[tuple[Kind, tuple[float, float, float]]] = [("translational", _Z)]
+    tries += [("rotational", axis) for axis in axes]
+    found: list[Pair] = []
+    for kind, axis in tries:
+        for first, second in combinations(chosen, 2):
+            taken = {name for pair in found for name in (pair.first, pair.second)}
+            if count[first] != count[second] or taken & {first, second}:
+                continue
             try:
-                found.append(match(mesh, first, second, axis=axis))
+                found.append(match(mesh, first, second, kind, axis))
             except MeshError:
                 continue
-            break
     return tuple(found)

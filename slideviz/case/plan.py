@@ -1,0 +1,182 @@
+"""From a case and a mesh to arrays: frame, classes, tracks and prescribed displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from slideviz.case.model import Case
+from slideviz.case.motion import displacements, require_valid
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, find_fans
+from slideviz.rbf.classify import Classes, classify, directions
+from slideviz.rbf.evaluate import Basis
+from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.projection import Tracks, find_tracks
+
+COINCIDENT = 1e-12
+"""Nodes nearer than this part of the mesh's extent are one control node."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Everything that stays the same over the steps.
+
+    Attributes
+    ----------
+    frame : Frame
+    basis : Basis
+    coords : (n, d) float64
+        Undeformed positions in the frame.
+    classes : Classes
+    known : (a,) int64
+        Moving and fixed nodes.
+    target : (a, d) float64
+        Their displacement in the frame after the last step.
+    same_as : (n,) int64
+        The node that stands for all that coincide with it.
+    images : (p, 2) int64
+        Nodes of the periodic markers and their images.
+    periodic_displacement : bool
+        Whether images move alike (PERIODIC_MODE= fixed or moving).
+    boundary, fans, tracks
+        Topology, and where sliding nodes slide.
+    pairs : tuple of Pair
+    warnings : tuple of str
+    """
+
+    frame: Frame
+    basis: Basis
+    coords: FloatArray
+    classes: Classes
+    known: IntArray
+    target: FloatArray
+    same_as: IntArray
+    images: IntArray
+    periodic_displacement: bool
+    boundary: Boundary
+    fans: Fans
+    tracks: Tracks
+    pairs: tuple[Pair, ...]
+    warnings: tuple[str, ...]
+
+    def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return nodes (q,) and unit normals (q, d) of the sliding nodes at these positions.
+
+        On flat boundaries the undeformed normals are kept, so that they stay flat to the bit.
+        """
+        at = coords if self.tracks.curved else self.coords
+        partner = {int(a): int(b) for a, b in self.images if a != b}
+        partner |= {b: a for a, b in partner.items()}
+        return directions(
+            self.classes,
+            fan_normals(self.boundary, self.fans, at),
+            partner if self.periodic_displacement else None,
+        )
+
+
+def make_plan(case: Case, mesh: Mesh) -> Plan:
+    """Return the plan of a deformation.
+
+    Raises
+    ------
+    CaseError
+        The case does not fit the mesh.
+    MeshError
+        Periodic markers do not match, or a marker element is no side of a cell.
+    DeformError
+        Nothing is known: no node has a prescribed displacement.
+    """
+    require_valid(case, mesh)
+    boundary = find_boundary(mesh)
+    fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
+    pairs = _pairs(case, mesh)
+    frame = make_frame(mesh.points, pairs, periodic_distance=case.periodic != "none")
+    classes = classify(
+        boundary,
+        fans,
+        mesh.points,
+        case.roles,
+        (case.sliding, case.periodic),
+        case.feature_angle_deg,
+    )
+    coords = frame.coords(mesh.points)
+    free = case.periodic in ("fixed", "moving")
+    tracks = find_tracks(
+        boundary,
+        fans,
+        classes,
+        coords,
+        (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
+    )
+    known, target, warnings = _prescribed(case, mesh, frame, classes)
+    images = (
+        np.concatenate([pair.nodes for pair in pairs])
+        if pairs and case.periodic != "none"
+        else np.empty((0, 2), np.int64)
+    )
+    return Plan(
+        frame=frame,
+        basis=Basis(
+            case.influence_factor * mesh.extent, frame.period if frame.cylindrical else 0.0
+        ),
+        coords=coords,
+        classes=classes,
+        known=known,
+        target=target,
+        same_as=_coinciding(mesh, boundary.nodes, images),
+        images=images,
+        periodic_displacement=free,
+        boundary=boundary,
+        fans=fans,
+        tracks=tracks,
+        pairs=pairs,
+        warnings=warnings,
+    )
+
+
+def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
+    """Return the periodic pairs; none are looked for when periodicity is not asked for.
+
+    With PERIODIC_MODE= none a rotational case still works in the cylindrical frame, which its
+    pairs give; there markers that do not match are no mistake.
+    """
+    names = case.markers_with("periodic")
+    if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
+        return ()
+    return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
+
+
+def _prescribed(
+    case: Case, mesh: Mesh, frame: Frame, classes: Classes
+) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
+    """Return the known nodes, their displacement in the frame, and warnings."""
+    moved = displacements(case, mesh)
+    known = np.concatenate([classes.moving, classes.fixed])
+    if not len(known):
+        raise DeformError(
+            f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
+        )
+    target = np.zeros((len(known), mesh.dim))
+    row = np.searchsorted(classes.moving, moved.nodes)
+    target[row] = frame.difference(mesh.points[moved.nodes], moved.vectors)
+    return known, target, moved.warnings
+
+
+def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
+    """Return for each node the lowest node that coincides with it, (n,)."""
+    tree = cKDTree(mesh.points[boundary_nodes])
+    twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
+    links = np.concatenate([twins.reshape(-1, 2), images])
+    count = len(mesh.points)
+    graph = coo_array((np.ones(len(links), np.int8), tuple(links.T)), shape=(count, count))
+    label = connected_components(graph, directed=False)[1]
+    lowest = np.full(label.max() + 1, count, np.int64)
+    np.minimum.at(lowest, label, np.arange(count))
+    return lowest[label]
