@@ -29,7 +29,10 @@ class Translate:
 
 @dataclass(frozen=True)
 class Rotate:
-    """Turn a marker by ``angle_deg`` about ``point`` and, in 3D, ``axis`` (right-handed)."""
+    """Turn a marker by ``angle_deg`` about ``point`` and ``axis`` (right-handed; any length).
+
+    In 2D the axis is that of z: positive angles turn counter-clockwise.
+    """
 
     marker: str
     angle_deg: float
@@ -39,7 +42,7 @@ class Rotate:
 
 @dataclass(frozen=True)
 class Scale:
-    """Enlarge a marker by ``factors`` (one for each Cartesian axis) about ``point``."""
+    """Enlarge a marker by ``factors``, one for all or one for each axis, about ``point``."""
 
     marker: str
     factors: tuple[float, ...]
@@ -61,11 +64,42 @@ Motion = Translate | Rotate | Scale | FromFile
 
 
 @dataclass(frozen=True)
+class Reduction:
+    """Settings of the greedy selection of control nodes (thesis sections 2.5 and 5.3).
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest error of the boundary that is left to the correction, in the length unit.
+    multilevel : bool
+        Select in levels instead of all at once.
+    criterion : "size" or "tol"
+        A level ends at ``level_size`` nodes, or when its error has shrunk by the factor
+        ``level_tolerance``.
+    double_edge : bool
+        Select two nodes at a time, with errors in opposite directions.
+    gamma : float
+        The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
+    """
+
+    tolerance: float = 1e-3
+    multilevel: bool = False
+    criterion: Literal["size", "tol"] = "size"
+    level_tolerance: float = 0.5
+    level_size: int = 16
+    double_edge: bool = True
+    gamma: float = 25.0
+
+
+@dataclass(frozen=True)
 class Case:
     """A deformation case, the content of a ``.cfg`` file.
 
     Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
-    thesis. Paths are absolute, or relative to the current folder.
+    thesis. Paths are absolute, or relative to the current folder. ``direction`` is the
+    component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
+    where that is left to the matching of the periodic markers; ``reduction`` is None where all
+    control nodes are used.
     """
 
     mesh_file: Path | None = None
@@ -78,10 +112,12 @@ class Case:
     periodic_type: PeriodicType = "auto"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    direction: int | None = None
     feature_angle_deg: float = 40.0
     curved: bool = False
     steps: int = 1
     influence_factor: float = 2.5
+    reduction: Reduction | None = None
     quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
     generate_quality: bool = True
     source: Path | None = None
