@@ -132,9 +132,7 @@ def deform(
         )
 
 
-def _step(
-    plan: Plan, sliding: str, coords: FloatArray, goal: FloatArray, watch: Watch
-) -> Solution:
+def _step(plan: Plan, sliding: str, coords: FloatArray, goal: FloatArray, watch: Watch) -> Solution:
     """Return the displacement of all nodes from ``coords`` to the next step."""
     normal_nodes, normals = plan.constraints(coords)
     problem = Problem(
@@ -182,10 +180,11 @@ def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
         return []
     node = int(solution.dropped[0])
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
-    return [
+    sentence = (
         f"step {index}: {len(solution.dropped)} boundary nodes nearly coincide with others and "
         f"were left out as control nodes (first: node {node} at {where}); they are set exactly"
-    ]
+    )
+    return [sentence]
 
 
 def _require_memory(plan: Plan, sliding: str) -> None:

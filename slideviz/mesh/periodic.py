@@ -18,6 +18,8 @@ Kind = Literal["auto", "translational", "rotational"]
 TOLERANCE = 1e-5
 """Largest mismatch of a node and its image, as a fraction of the mesh's largest extent."""
 
+Vector = Sequence[float] | FloatArray
+
 _Z = (0.0, 0.0, 1.0)
 _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
@@ -66,14 +68,14 @@ class Pair:
         return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in self.vector)})"
 
 
-def _axis_word(axis: Sequence[float]) -> str:
+def _axis_word(axis: Vector) -> str:
     for word, unit in zip("xyz", np.eye(3), strict=True):
         if np.allclose(axis, unit):
             return word
     return f"({', '.join(f'{v:.4g}' for v in axis)})"
 
 
-def axis_basis(axis: Sequence[float]) -> FloatArray:
+def axis_basis(axis: Vector) -> FloatArray:
     """Return rows e1, e2, e3 (3, 3), right-handed, with e3 along ``axis``.
 
     Raises
@@ -94,7 +96,7 @@ def axis_basis(axis: Sequence[float]) -> FloatArray:
 
 
 def in_axis_frame(
-    points: FloatArray, axis: Sequence[float] = _Z, origin: Sequence[float] = (0.0, 0.0, 0.0)
+    points: FloatArray, axis: Vector = _Z, origin: Vector = (0.0, 0.0, 0.0)
 ) -> FloatArray:
     """Return points (n, d) as coordinates (n, 3) along e1, e2, e3 of the axis from the origin."""
     padded = np.zeros((len(points), 3))
@@ -164,9 +166,9 @@ def _match_kind(
         angle = float(np.angle(zb.sum() * np.conj(za.sum())))
         turned = za * np.exp(1j * angle)
         image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
-    distance, partner = cKDTree(target).query(image)
+    distance, partner = (np.asarray(found) for found in cKDTree(target).query(image))
     one_to_one = len(np.unique(partner)) == len(partner)
-    trivial = max(np.linalg.norm(vector) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
+    trivial = max(float(np.linalg.norm(vector)) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
     pair = Pair(
         *names,
         "translational" if kind == "translational" else "rotational",

@@ -7,7 +7,7 @@ A moving marker wins over a fixed one, and both over all others, at shared nodes
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,7 +154,7 @@ def _slide_rows(
     return np.stack([chosen, cluster], axis=1), np.array(full, np.int64)
 
 
-def _cluster(normals: FloatArray, roles: Sequence[str], merge: float) -> IntArray:
+def _cluster(normals: FloatArray, roles: np.ndarray, merge: float) -> IntArray:
     """Return labels (m,) that join fans of one role whose normals differ by a small angle."""
     labels = np.arange(len(normals))
     for i in range(1, len(normals)):
@@ -218,9 +218,9 @@ def directions(
     np.add.at(total, classes.row_cluster, normals[classes.row_fan])
     total = unit(total)
     node = classes.cluster_node
-    starts = np.flatnonzero(np.r_[True, node[1:] != node[:-1]]) if len(node) else []
-    stops = np.r_[starts[1:], len(node)] if len(node) else []
-    spans = {int(node[a]): (int(a), int(b)) for a, b in zip(starts, stops, strict=True)}
+    slid, starts = np.unique(node, return_index=True)
+    stops = np.append(starts, len(node))[1:]
+    spans = {int(i): (int(a), int(b)) for i, a, b in zip(slid, starts, stops, strict=True)}
     if images:
         total = _averaged(total, spans, images)
     for start, stop in spans.values():

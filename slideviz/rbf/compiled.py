@@ -34,7 +34,7 @@ _K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = (
 
 
 @njit(inline="always", **OPTIONS)
-def _wendland_c2(squared: float, scale: float) -> float:
+def _wendland_c2(squared, scale):  # type: ignore[no-untyped-def]
     """Return (1 - q)^4 (4 q + 1) with q = distance * scale, and 0 from q = 1 on."""
     q = np.sqrt(squared) * scale
     u = max(1.0 - q, 0.0)
@@ -43,7 +43,7 @@ def _wendland_c2(squared: float, scale: float) -> float:
 
 
 @njit(inline="always", **OPTIONS)
-def _half_chord(g: float) -> float:
+def _half_chord(g):  # type: ignore[no-untyped-def]
     """Return 1 - cos g without cancellation, for |g| <= 2."""
     t = g * g
     p = _K8 * t + _K7

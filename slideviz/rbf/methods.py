@@ -205,9 +205,7 @@ def _constrained(problem: Problem, watch: Watch) -> Solution:
     """Solve ``G w = b`` with G_ab = phi_ab (n_a . n_b) and evaluate it at all nodes."""
     nodes, normals, right = _constraints(problem)
     with watch.phase("solve") as tick:
-        factor = factorise(
-            matrix(problem.basis, problem.features[:, nodes], normals, tick), tick
-        )
+        factor = factorise(matrix(problem.basis, problem.features[:, nodes], normals, tick), tick)
         weights = factor.solve(right[:, None]) * normals
     controls, group = np.unique(nodes, return_inverse=True)
     total = np.zeros((len(controls), normals.shape[1]))

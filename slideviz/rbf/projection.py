@@ -52,7 +52,8 @@ class Track:
         out = np.empty_like(x)
         open_, tried = np.arange(len(x)), min(FIRST_TRY, len(self.corners))
         while len(open_):
-            distance, index = self.tree.query(x[open_], k=np.arange(1, tried + 1))
+            near = self.tree.query(x[open_], k=list(range(1, tried + 1)))
+            distance, index = (np.asarray(found) for found in near)
             points = _closest_on_simplices(x[open_][:, None, :], self.corners[index])
             gaps = np.linalg.norm(points - x[open_][:, None, :], axis=2)
             best = np.argmin(gaps, axis=1)

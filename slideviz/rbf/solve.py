@@ -43,9 +43,7 @@ class Factor:
         """Return the weights (n, m) for right-hand sides (n, m); zero in dropped rows."""
         out = np.zeros_like(right, dtype=float)
         half = solve_triangular(self.lower, right[self.kept], lower=True, check_finite=False)
-        out[self.kept] = solve_triangular(
-            self.lower, half, lower=True, trans=1, check_finite=False
-        )
+        out[self.kept] = solve_triangular(self.lower, half, lower=True, trans=1, check_finite=False)
         return out
 
 

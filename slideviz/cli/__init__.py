@@ -1,0 +1,51 @@
+"""The command line: the only room that prints or chooses an exit code.
+
+0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted; 130 cancelled.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+from slideviz.errors import Cancelled, SlidevizError
+
+DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run one command and return its exit code; errors become one clear message."""
+    from slideviz.cli.parser import parse
+
+    try:
+        arguments = parse(argv)
+        return int(arguments.command(arguments))
+    except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
+        return int(stop.code or 0)
+    except (KeyboardInterrupt, Cancelled):
+        return _fail("cancelled; nothing half-written is left", CANCELLED)
+    except SlidevizError as problem:
+        return _fail(str(problem), WRONG_INPUT)
+    except MemoryError:
+        return _fail("out of memory; use a coarser mesh or close other programs", WRONG_INPUT)
+    except BrokenPipeError:
+        # The reader of our output is gone (`slideviz info MESH | head`): nothing to tell it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except OSError as problem:
+        return _fail(str(problem), WRONG_INPUT)
+    except Exception as problem:
+        if os.environ.get("SLIDEVIZ_DEBUG"):
+            traceback.print_exc()
+        return _fail(
+            f"internal error ({type(problem).__name__}: {problem}); please report it with the "
+            "output of the same command under SLIDEVIZ_DEBUG=1",
+            WRONG_INPUT,
+        )
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"slideviz: {message}", file=sys.stderr)
+    return code

@@ -1,0 +1,285 @@
+"""What each command does."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.deform import Step
+    from slideviz.mesh.model import Mesh
+    from slideviz.mesh.quality import Quality
+
+
+def window(arguments: argparse.Namespace) -> int:
+    """Open the window, with a file if one is given."""
+    from slideviz.errors import CaseError
+
+    if arguments.file is not None and not arguments.file.exists():
+        from slideviz.cli.parser import COMMANDS
+
+        raise CaseError(
+            f"{arguments.file}: there is no such file, and no such command "
+            f"(commands: {', '.join(COMMANDS)})"
+        )
+    from slideviz.gui.app import launch
+
+    return launch(arguments.file)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Deform a mesh as a case says, and write mesh, report, steps and picture."""
+    from slideviz import quality, read, write
+    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.report import run_report, save_json
+    from slideviz.errors import CaseError
+
+    begin = time.perf_counter()
+    case = _case(arguments)
+    if case.mesh_file is None:
+        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
+    output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
+    if not arguments.force:
+        _refuse_input(output, case.mesh_file)
+    seconds = {"read": -time.perf_counter()}
+    mesh = read(case.mesh_file, zone=case.zone)
+    seconds["read"] += time.perf_counter()
+    steps = _pull(arguments, case, mesh)
+    last = steps[-1]
+    seconds["quality"] = -time.perf_counter()
+    found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
+    seconds["quality"] += time.perf_counter()
+    seconds["write"] = -time.perf_counter()
+    data = {"size-skew": found.values, "size": found.size, "skew": found.skew}
+    write(output, last.mesh, overwrite=arguments.force, cell_data=data)
+    if case.generate_quality:
+        _write_qualities(output.with_name(output.stem + "_qual.txt"), found)
+    seconds["write"] += time.perf_counter()
+    if arguments.picture:
+        from slideviz.view.picture import picture
+
+        picture(last.mesh, arguments.picture, reference=mesh, quality=found)
+    seconds["total"] = time.perf_counter() - begin
+    report = run_report(case, steps, found, seconds)
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    elif not arguments.quiet:
+        _print_run(arguments, report, found, output)
+    for warning in last.warnings:
+        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    if found.inverted:
+        print(f"slideviz: {_inverted_sentence(last.mesh, found)}", file=sys.stderr)
+        return INVERTED
+    return DONE
+
+
+def _case(arguments: argparse.Namespace) -> Case:
+    """Return the case of the file with the changes of ``--set`` and ``--zone``."""
+    from slideviz import Case
+    from slideviz.case.cfg import set_key
+    from slideviz.errors import CaseError
+
+    case = Case.read(arguments.case)
+    for text in arguments.set:
+        key, sign, value = text.partition("=")
+        if not sign:
+            raise CaseError(f"--set {text!r} is not of the form KEY=VALUE")
+        case = set_key(case, key.strip(), value.strip())
+    return case.change(zone=arguments.zone) if arguments.zone else case
+
+
+def _default_output(mesh_file: Path) -> Path:
+    """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
+    return Path(f"{mesh_file.stem}_def{mesh_file.suffix}")
+
+
+def _refuse_input(output: Path, mesh_file: Path) -> None:
+    from slideviz.errors import CaseError
+
+    if output.exists() and mesh_file.exists() and output.samefile(mesh_file):
+        raise CaseError(
+            f"{output} is the input mesh; choose another name with -o or MESH_OUT_FILENAME, "
+            "or say --force to write over it"
+        )
+
+
+def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
+    """Return all steps; only the last keeps its mesh, unless each is written."""
+    from dataclasses import replace
+
+    from slideviz import deform, write
+    from slideviz.cli.progress import Bar
+    from slideviz.errors import CaseError
+
+    steps: list[Step] = []
+    folder = arguments.steps_dir
+    if folder:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+    with Bar(not arguments.quiet) as bar:
+        for step in deform(case, mesh, bar):
+            if folder:
+                assert case.mesh_file is not None
+                width = len(str(step.total))
+                name = f"{case.mesh_file.stem}_{step.index:0{width}d}.su2"
+                write(folder / name, step.mesh)
+            if steps:
+                steps[-1] = replace(steps[-1], mesh=mesh)
+            steps.append(step)
+    return steps
+
+
+def _write_qualities(path: Path, found: Quality) -> None:
+    """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
+    from slideviz.errors import CaseError
+    from slideviz.mesh.atomic import atomic_write
+
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
+
+
+def _print_run(arguments: argparse.Namespace, report: dict, found: Quality, output: Path) -> None:
+    from slideviz.cli.report import quality_lines, table
+
+    counts, spent = report["node_counts"], report["seconds"]
+    print(f"{report['case']}: {report['steps']} steps, sliding {report['sliding']}, ", end="")
+    print(f"periodic {report['periodic']}")
+    print(quality_lines(found))
+    rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
+    rows.append(("control nodes", report["control_nodes"][-1]))
+    print(table(rows))
+    phases = ", ".join(f"{k} {v:.2f}" for k, v in spent.items() if k != "total" and v >= 0.005)
+    print(f"  {spent['total']:.2f} s ({phases or 'all phases below 0.01'})")
+    print(f"mesh: {output}")
+    for name, path in (("report", arguments.json), ("picture", arguments.picture)):
+        if path:
+            print(f"{name}: {path}")
+
+
+def _inverted_sentence(mesh: Mesh, found: Quality) -> str:
+    """Return which cells are inverted, and what helps."""
+    from slideviz.cli.report import inverted_cells, type_name
+
+    cells = inverted_cells(found)
+    named = ", ".join(f"{i} ({type_name(mesh, i)})" for i in cells[:5])
+    more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
+    return (
+        f"{found.inverted} of {len(found)} cells are inverted: {named}{more}; more STEPS, "
+        "SLIDING_MODE= ps or ds, or PERIODIC_MODE= moving may help"
+    )
+
+
+def info(arguments: argparse.Namespace) -> int:
+    """Tell what is in a mesh file."""
+    from slideviz import quality, read
+    from slideviz.cli import DONE
+    from slideviz.cli.report import info_report, save_json, table
+    from slideviz.mesh.files import unused_nodes
+    from slideviz.mesh.periodic import find_pairs
+
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    found = quality(mesh)
+    report = info_report(mesh, find_pairs(mesh), len(unused_nodes(mesh)), found)
+    if arguments.json:
+        text = save_json(arguments.json, report)
+        if text is not None:
+            print(text, end="")
+            return DONE
+    zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
+    print(f"{arguments.mesh}: {mesh.dim}D{zone}, {len(mesh.points)} points")
+    print(table([(count, name) for name, count in report["cells_by_type"].items()]))
+    extents = zip("xyz", report["extents"], strict=False)
+    print("  " + ", ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, (low, high) in extents))
+    if report["unused_points"]:
+        print(f"  {report['unused_points']} points belong to no cell")
+    print("markers:" if mesh.markers else "no markers")
+    if mesh.markers:
+        print(table([(m["name"], m["elements"], "elements") for m in report["markers"]]))
+    for pair in report["periodic_pairs"]:
+        print(f"  {' and '.join(pair['markers'])} match: {pair['type']}, {pair['description']}")
+    print(f"quality: min {found.min:.6g}, mean {found.mean:.6g}, {found.inverted} inverted")
+    return DONE
+
+
+def quality(arguments: argparse.Namespace) -> int:
+    """Tell the quality of a mesh, compared with the undeformed one if it is given."""
+    from slideviz import quality as rate
+    from slideviz import read, write
+    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.report import (
+        histogram_lines,
+        quality_lines,
+        quality_report,
+        save_json,
+        table,
+    )
+
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    base = read(arguments.reference, zone=arguments.zone) if arguments.reference else None
+    found = rate(mesh, reference=base, metric=arguments.metric)
+    report = quality_report(mesh, found)
+    if arguments.output and arguments.output.suffix.lower() == ".csv":
+        _write_csv(arguments.output, found)
+    elif arguments.output:
+        data = {"size-skew": found.values, "size": found.size, "skew": found.skew}
+        write(arguments.output, mesh, cell_data=data)
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    else:
+        against = f" against {arguments.reference}" if base else ""
+        print(f"{arguments.mesh}{against}: size-skew, metric {found.metric}")
+        print(quality_lines(found))
+        print("worst cells:")
+        print(table([(w["cell"], w["type"], w["quality"]) for w in report["worst"]]))
+        print("cells by quality:")
+        print(histogram_lines(found))
+    return INVERTED if found.inverted else DONE
+
+
+def _write_csv(path: Path, found: Quality) -> None:
+    """Write id, size-skew, size, skew and status of each cell."""
+    from slideviz.errors import CaseError
+    from slideviz.mesh.atomic import atomic_write
+    from slideviz.mesh.quality import INVERTED, UNPROVEN
+
+    words = {INVERTED: "inverted", UNPROVEN: "unproven"}
+    columns = zip(found.values, found.size, found.skew, found.status, strict=True)
+    lines = ["cell,size_skew,size,skew,status"]
+    for cell, (value, size, skew, status) in enumerate(columns):
+        word = words.get(int(status), "valid")
+        lines.append(f"{cell},{float(value)!r},{float(size)!r},{float(skew)!r},{word}")
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(lines) + "\n").encode())
+
+
+def sample(arguments: argparse.Namespace) -> int:
+    """Write a sample case, or list the samples."""
+    from slideviz.case.samples import SAMPLES, write_sample
+    from slideviz.cli import DONE
+    from slideviz.cli.report import table
+
+    if arguments.name is None:
+        print("samples (slideviz sample NAME -o DIR):")
+        print(table([(name, about) for name, about in SAMPLES.items()]))
+        return DONE
+    folder = arguments.output or Path(arguments.name)
+    for path in write_sample(arguments.name, folder, arguments.size):
+        print(path)
+    return DONE
+
+
+def keys(_: argparse.Namespace) -> int:
+    """Print the reference of all case keys."""
+    from slideviz.case.cfg import describe_keys
+    from slideviz.cli import DONE
+
+    print(describe_keys())
+    return DONE

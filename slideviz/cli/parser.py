@@ -1,0 +1,131 @@
+"""What the command line accepts."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from slideviz import __version__
+from slideviz.cli import commands
+
+COMMANDS = ("run", "info", "quality", "sample", "keys")
+
+_DESCRIPTION = """\
+Deform CFD meshes with radial basis functions.
+
+  slideviz                    open the window
+  slideviz FILE               open the window with a mesh or a case (.cfg)
+  slideviz COMMAND ...        without a window; see `slideviz COMMAND --help`
+"""
+
+_EPILOG = """\
+exit codes: 0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted;
+130 cancelled.
+
+a first try:  slideviz sample passage -o try && slideviz run try/passage.cfg
+"""
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Return the arguments, with ``command`` set to the function to call.
+
+    Raises
+    ------
+    SystemExit
+        Wrong usage (code 2), or help was asked for (code 0).
+    """
+    if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
+        return _window_parser().parse_args(argv)
+    return _parser().parse_args(argv)
+
+
+def _asks_help(argv: Sequence[str]) -> bool:
+    return bool(argv) and argv[0] in ("-h", "--help", "help")
+
+
+def _base(**options: object) -> argparse.ArgumentParser:
+    return argparse.ArgumentParser(
+        prog="slideviz",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def _window_parser() -> argparse.ArgumentParser:
+    parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
+    parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
+    parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
+    parser.set_defaults(command=commands.window)
+    return parser
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _base()
+    parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
+    calls = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_run(calls)
+    _add_info(calls)
+    _add_quality(calls)
+    _add_sample(calls)
+    keys = calls.add_parser("keys", help="reference of all case keys")
+    keys.set_defaults(command=commands.keys)
+    return parser
+
+
+def _add_run(calls: argparse._SubParsersAction) -> None:
+    run = calls.add_parser("run", help="deform a mesh as a case file says")
+    run.add_argument("case", type=Path, help="the case file (.cfg)")
+    run.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
+    run.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a key of the case for this run; may be repeated",
+    )
+    run.add_argument("--json", type=Path, metavar="FILE", help="report as JSON; - is the terminal")
+    run.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
+    run.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
+    run.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    run.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    run.add_argument("--force", action="store_true", help="allow writing over the input mesh")
+    run.set_defaults(command=commands.run)
+
+
+def _add_info(calls: argparse._SubParsersAction) -> None:
+    info = calls.add_parser("info", help="what is in a mesh file")
+    info.add_argument("mesh", type=Path)
+    info.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    info.add_argument("--json", type=Path, metavar="FILE", help="as JSON; - is the terminal")
+    info.set_defaults(command=commands.info)
+
+
+def _add_quality(calls: argparse._SubParsersAction) -> None:
+    quality = calls.add_parser("quality", help="size-skew quality of a mesh")
+    quality.add_argument("mesh", type=Path)
+    quality.add_argument(
+        "--reference", type=Path, metavar="UNDEFORMED", help="mesh to compare cell sizes with"
+    )
+    quality.add_argument(
+        "--metric",
+        choices=("knupp", "rbf-slide"),
+        default="knupp",
+        help="rbf-slide: hexahedra as that program rates them (default: knupp)",
+    )
+    quality.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    quality.add_argument("--json", type=Path, metavar="FILE", help="as JSON; - is the terminal")
+    quality.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="mesh with quality (.vtu), or .csv"
+    )
+    quality.set_defaults(command=commands.quality)
+
+
+def _add_sample(calls: argparse._SubParsersAction) -> None:
+    sample = calls.add_parser("sample", help="write a sample case")
+    sample.add_argument("name", nargs="?", help="which one; none: list them")
+    sample.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
+    sample.add_argument("--size", type=int, metavar="N", help="cells along a side, or about in all")
+    sample.set_defaults(command=commands.sample)

@@ -1,0 +1,161 @@
+"""Reports: the JSON objects, and the tables printed on the terminal."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.deform import Step
+from slideviz.errors import CaseError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import INVERTED, Quality
+
+LISTED = 100
+"""Inverted cells named in a report."""
+
+PHASES = ("read", "classify", "select", "solve", "evaluate", "project", "quality", "write")
+
+
+def run_report(
+    case: Case, steps: Sequence[Step], quality: Quality, seconds: Mapping[str, float]
+) -> dict[str, Any]:
+    """Return the JSON object of ``run --json``."""
+    last = steps[-1]
+    spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
+    for step in steps:
+        for phase, value in step.seconds.items():
+            spent[phase] = spent.get(phase, 0.0) + value
+    return {
+        "case": str(case.source or ""),
+        "mesh": str(case.mesh_file or ""),
+        "sliding": case.sliding,
+        "periodic": case.periodic,
+        "steps": last.total,
+        "quality": {
+            **quality.summary(),
+            "metric": quality.metric,
+            "inverted_cells": inverted_cells(quality),
+        },
+        "control_nodes": [step.control_nodes for step in steps],
+        "max_error": max(step.max_error for step in steps),
+        "seconds": {name: round(value, 6) for name, value in spent.items()},
+        "node_counts": dict(last.node_counts),
+        "warnings": list(last.warnings),
+    }
+
+
+def inverted_cells(quality: Quality) -> list[int]:
+    """Return the ids of the first ``LISTED`` inverted cells."""
+    return [int(i) for i in np.flatnonzero(quality.status == INVERTED)[:LISTED]]
+
+
+def quality_report(mesh: Mesh, quality: Quality) -> dict[str, Any]:
+    """Return the JSON object of ``quality --json``."""
+    counts, edges = quality.histogram()
+    return {
+        "mesh": mesh.name,
+        **quality.summary(),
+        "metric": quality.metric,
+        "inverted_cells": inverted_cells(quality),
+        "worst": [
+            {"cell": int(i), "type": type_name(mesh, int(i)), "quality": float(quality.values[i])}
+            for i in quality.worst(10)
+        ],
+        "histogram": {"counts": counts.tolist(), "edges": edges.tolist()},
+    }
+
+
+def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality) -> dict[str, Any]:
+    """Return the JSON object of ``info --json``."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    return {
+        "mesh": mesh.name,
+        "dimension": mesh.dim,
+        "zone": mesh.zone,
+        "zones": mesh.zones,
+        "points": len(mesh.points),
+        "unused_points": unused,
+        "cells": len(mesh.cells),
+        "cells_by_type": {
+            ELEMENTS[vtk].name: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()
+        },
+        "extents": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
+        "markers": [
+            {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)} for m in mesh.markers
+        ],
+        "periodic_pairs": [
+            {
+                "markers": [pair.first, pair.second],
+                "type": pair.kind,
+                "period": pair.period,
+                "description": pair.describe(),
+            }
+            for pair in pairs
+        ],
+        "quality": quality.summary(),
+    }
+
+
+def type_name(mesh: Mesh, cell: int) -> str:
+    """Return the name of a cell's type."""
+    return ELEMENTS[int(mesh.cells.types[cell])].name
+
+
+def save_json(path: Path, report: Mapping[str, Any]) -> str | None:
+    """Write a report; returns the text instead when the path is ``-``."""
+    text = json.dumps(report, indent=2) + "\n"
+    if str(path) == "-":
+        return text
+    with atomic_write(path, CaseError) as file:
+        file.write(text.encode())
+    return None
+
+
+def table(rows: Sequence[Sequence[object]], indent: int = 2) -> str:
+    """Return rows as aligned columns; numbers to the right."""
+    cells = [[_cell(value) for value in row] for row in rows]
+    widths = [max(len(row[i]) for row in cells if i < len(row)) for i in range(len(cells[0]))]
+    lines = []
+    for row, given in zip(cells, rows, strict=True):
+        parts = [
+            text.rjust(width) if isinstance(value, (int, float)) else text.ljust(width)
+            for text, value, width in zip(row, given, widths, strict=False)
+        ]
+        lines.append(" " * indent + "  ".join(parts).rstrip())
+    return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:
+    """Return the histogram of qualities as text, worst first."""
+    counts, edges = quality.histogram(bins)
+    top = max(1, int(counts.max()))
+    rows = []
+    for count, low, high in zip(counts, edges[:-1], edges[1:], strict=True):
+        bar = "█" * round(width * int(count) / top) or ("▏" if count else "")
+        rows.append((f"{low:.1f} to {high:.1f}", int(count), bar))
+    return table(rows)
+
+
+def quality_lines(quality: Quality) -> str:
+    """Return minimum, mean and the counts of cells as a table."""
+    rows: list[tuple[str, object]] = [
+        ("minimum quality", quality.min),
+        ("mean quality", quality.mean),
+        ("cells", len(quality)),
+        ("valid", quality.valid),
+        ("inverted", quality.inverted),
+    ]
+    if quality.unproven:
+        rows.append(("unproven", quality.unproven))
+    return table(rows)
