@@ -1,0 +1,204 @@
+"""Size-skew quality of cells, and how many are inverted (thesis section 2.7; Knupp 2003).
+
+``f_ss = √f_size · f_skew`` (De Boer, Van der Schoot, Bijl 2007), all in 0 to 1, 1 is best.
+``f_size`` compares with the undeformed cell: ``min(τ, 1/τ)``, τ the ratio of the sums of corner
+Jacobians. ``f_skew`` is that of `slideviz.mesh.skew`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.jacobians import (
+    check_cells,
+    chunks,
+    coordinates,
+    corner_edges,
+    determinant,
+    total,
+)
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.orientation import corner_sums, orientation
+from slideviz.mesh.skew import METRICS
+from slideviz.mesh.validity import INVERTED, UNPROVEN, VALID, prove
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["INVERTED", "UNPROVEN", "VALID", "Quality", "corner_jacobians", "quality"]
+
+Metric = Literal["knupp", "rbf-slide"]
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """Quality of every cell of a mesh, in the order of the cells.
+
+    Attributes
+    ----------
+    values : (m,) float64
+        Size-skew, 0 to 1; 0 for an inverted cell, as are its ``size`` and ``skew``.
+    size, skew : (m,) float64
+        The two factors: ``values = √size · skew``.
+    status : (m,) uint8
+        ``VALID`` (positive Jacobian in the whole cell, proved), ``INVERTED`` (a point was found
+        where it is not positive) or ``UNPROVEN`` (a hexahedron that is neither).
+    signs : (m,) int8
+        1, or -1 for a cell that is numbered the other way round.
+    metric : str
+        ``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as
+        the program of the thesis has it, for comparison with its figures.
+    """
+
+    values: FloatArray
+    size: FloatArray
+    skew: FloatArray
+    status: NDArray[np.uint8]
+    signs: NDArray[np.int8]
+    metric: Metric
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def min(self) -> float:
+        """Return the lowest value."""
+        return float(self.values.min())
+
+    @property
+    def mean(self) -> float:
+        """Return the arithmetic mean of the values."""
+        return float(self.values.mean())
+
+    @property
+    def inverted(self) -> int:
+        """Return the number of inverted cells."""
+        return int(np.count_nonzero(self.status == INVERTED))
+
+    @property
+    def unproven(self) -> int:
+        """Return the number of cells that are neither proved valid nor found inverted."""
+        return int(np.count_nonzero(self.status == UNPROVEN))
+
+    @property
+    def valid(self) -> int:
+        """Return the number of cells that are proved valid."""
+        return int(np.count_nonzero(self.status == VALID))
+
+    def worst(self, n: int) -> IntArray:
+        """Return the ids of the ``n`` cells of lowest value, worst first, ties by id."""
+        return np.argsort(self.values, kind="stable")[: max(n, 0)]
+
+    def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
+        """Return the counts (bins,) and the edges (bins + 1,) of equal bins over 0 to 1."""
+        counts, edges = np.histogram(self.values, bins, range=(0.0, 1.0))
+        return counts.astype(np.int64), edges
+
+    def summary(self) -> dict[str, float | int]:
+        """Return the numbers for a report, as plain Python values."""
+        return {
+            "min": self.min,
+            "mean": self.mean,
+            "inverted": self.inverted,
+            "unproven": self.unproven,
+            "valid": self.valid,
+            "cells": len(self),
+        }
+
+
+def quality(mesh: Mesh, reference: Mesh | None = None, metric: Metric = "knupp") -> Quality:
+    """Return the quality of each cell, compared with the undeformed mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The deformed mesh.
+    reference : Mesh, optional
+        The undeformed mesh, with the same cells; without it ``size`` is 1. It also tells which
+        way round each cell is numbered.
+    metric : {"knupp", "rbf-slide"}
+        See `Quality`.
+
+    Raises
+    ------
+    MeshError
+        The mesh has no cells or unusable ones, or the reference is another mesh.
+    CaseError
+        The metric is unknown.
+    """
+    if metric not in METRICS:
+        raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")
+    check_cells(mesh)
+    base = mesh if reference is None else _checked(reference, mesh)
+    sums = corner_sums(base)
+    signs = orientation(mesh.cells, sums)
+    sums *= signs
+    columns = np.ascontiguousarray(mesh.points.T)
+    size, skew = np.empty(len(mesh.cells)), np.empty(len(mesh.cells))
+    status = np.empty(len(mesh.cells), np.uint8)
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        skew_of = METRICS[metric][vtk]
+        for part in chunks(nodes):
+            at, here = coordinates(columns, nodes[part]), ids[part]
+            edges, turn = corner_edges(vtk, at), signs[here].astype(np.float64)
+            alpha = determinant(edges) * turn
+            status[here] = prove(vtk, at, turn, alpha)
+            good = status[here] != INVERTED
+            with np.errstate(all="ignore"):
+                size[here] = np.where(good, _ratio(total(alpha), sums[here]), 0.0)
+                # 1 is the bound of every formula; rounding must not leave the histogram.
+                skew[here] = np.where(good, np.minimum(skew_of(edges, alpha), 1.0), 0.0)
+    return Quality(
+        frozen_array(np.sqrt(size) * skew, np.float64),
+        frozen_array(size, np.float64),
+        frozen_array(skew, np.float64),
+        frozen_array(status, np.uint8),
+        frozen_array(signs, np.int8),
+        metric,
+    )
+
+
+def _checked(reference: Mesh, mesh: Mesh) -> Mesh:
+    """Return ``reference`` if it has the cells of ``mesh``, and raise MeshError otherwise."""
+    same_points = reference.points.shape == mesh.points.shape
+    if not (same_points and reference.cells.same_as(mesh.cells)):
+        raise MeshError(
+            f"{reference.name} ({len(reference.cells)} cells, {len(reference.points)} points) "
+            f"cannot be the reference of {mesh.name} ({len(mesh.cells)} cells, "
+            f"{len(mesh.points)} points): it must have the same cells; give the undeformed mesh"
+        )
+    return reference
+
+
+def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
+    """Return the corner Jacobians (k,) of one cell, in the order of its corners.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    cell : int
+        Index of the cell, from 0.
+    sign : int
+        ``Quality.signs[cell]``, so that a valid cell has positive Jacobians.
+
+    Raises
+    ------
+    MeshError
+        There is no such cell.
+    """
+    if not 0 <= cell < len(mesh.cells):
+        raise MeshError(f"no cell {cell}; {mesh.name} has the cells 0 to {len(mesh.cells) - 1}")
+    begin, end = mesh.cells.offsets[cell : cell + 2]
+    at = mesh.points[mesh.cells.connectivity[begin:end]].T[:, :, None]
+    return sign * determinant(corner_edges(int(mesh.cells.types[cell]), at))[:, 0]
+
+
+def _ratio(now: FloatArray, before: FloatArray) -> FloatArray:
+    """Return ``min(τ, 1/τ)`` with τ = now / before, and 0 unless both are positive, (m,)."""
+    sound = (now > 0) & (before > 0)
+    return np.where(sound, np.minimum(now, before) / np.maximum(now, before), 0.0)
