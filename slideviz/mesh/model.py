@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ IntArray = NDArray[np.int64]
 
 def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     """Return ``values`` as a C-contiguous, read-only array; copies what is writable."""
-    array = np.ascontiguousarray(values, dtype=dtype)
+    array: NDArray = np.ascontiguousarray(values, dtype=dtype)
     if array.flags.writeable:
         array = array.copy() if array is values else array
         array.flags.writeable = False
@@ -136,6 +137,8 @@ class Mesh:
         Where it came from, for messages.
     zone, zones : int
         Number of this zone in the file (from 1) and of all its zones.
+    source : Path or None
+        The file it was read from, which is not overwritten without being asked to.
     """
 
     points: FloatArray
@@ -145,6 +148,7 @@ class Mesh:
     name: str = "mesh"
     zone: int = 1
     zones: int = 1
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

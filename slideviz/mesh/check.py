@@ -1,0 +1,105 @@
+"""What makes a mesh unusable, whatever file it comes from."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, IntArray, Mesh
+
+
+def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
+    """Return the number of a wrong element and what is wrong, or None.
+
+    Wrong are node indices that are negative or not below ``n_points``, and a node that stands
+    twice in one element.
+    """
+    outside = (cells.connectivity < 0) | (cells.connectivity >= n_points)
+    if outside.any():
+        at = int(np.argmax(outside))
+        element = int(np.searchsorted(cells.offsets, at, "right")) - 1
+        return element, (
+            f"node {cells.connectivity[at]} does not exist: the {n_points} points are numbered "
+            f"from 0 to {n_points - 1}; correct the element or the points"
+        )
+    repeated = _first_repeated(cells)
+    if repeated is None:
+        return None
+    element, node = repeated
+    name = ELEMENTS[int(cells.types[element])].name
+    return element, (
+        f"node {node} stands twice in one {name}; replace the collapsed element by one with "
+        "fewer nodes"
+    )
+
+
+def _first_repeated(cells: Cells) -> tuple[int, int] | None:
+    """Return the first element that has a node twice, and that node."""
+    found = []
+    for ids, nodes in cells.by_type.values():
+        ordered = np.sort(nodes, axis=1)
+        same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
+        bad = same.any(axis=1)
+        if bad.any():
+            k = int(np.argmax(bad))
+            found.append((int(ids[k]), int(ordered[k, int(np.argmax(same[k]))])))
+    return min(found, default=None)
+
+
+def unused_nodes(mesh: Mesh) -> IntArray:
+    """Return the points that no cell uses, sorted: (u,).
+
+    They do no harm here, but SU2 gives them a cell of no volume.
+    """
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.cells.connectivity] = True
+    return np.flatnonzero(~used)
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Do nothing for a sound mesh.
+
+    Raises
+    ------
+    MeshError
+        A coordinate is not finite, an element has the wrong dimension or wrong nodes, or two
+        markers have one name.
+    """
+    check_points(mesh)
+    if len(mesh.cells) == 0:
+        raise MeshError(f"{mesh.name}: there are no cells; mesh the volume, not only its surface")
+    groups = [("cell", mesh.dim, mesh.cells)]
+    groups += [(f"marker {m.name!r}: element", mesh.dim - 1, m.cells) for m in mesh.markers]
+    for what, dim, cells in groups:
+        for vtk, (ids, _) in cells.by_type.items():
+            if ELEMENTS[vtk].dim != dim:
+                raise MeshError(
+                    f"{mesh.name}: {what} {ids[0]} is a {ELEMENTS[vtk].name}, but dimension {dim} "
+                    "is needed; remove it"
+                )
+        fault = first_fault(cells, len(mesh.points))
+        if fault:
+            raise MeshError(f"{mesh.name}: {what} {fault[0]}: {fault[1]}")
+    names = mesh.marker_names
+    for name in names:
+        if names.count(name) > 1:
+            raise MeshError(f"{mesh.name}: two markers are named {name!r}; rename one of them")
+
+
+def check_points(mesh: Mesh) -> None:
+    """Do nothing when all coordinates are finite.
+
+    Raises
+    ------
+    MeshError
+        One is NaN or infinite.
+    """
+    bad = ~np.isfinite(mesh.points).all(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise MeshError(
+            f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}, which is not finite; "
+            "correct the file or the displacement that put it there"
+        )

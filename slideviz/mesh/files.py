@@ -1,0 +1,159 @@
+"""Mesh files: SU2 by our own reader and writer, all others through meshio."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.su2 import read_su2
+from slideviz.mesh.su2_scan import Progress
+from slideviz.mesh.su2_write import su2_blocks
+
+_READ_BYTES = 1 << 24
+_READING = 0.1
+"""Fraction of the time for reading that getting the bytes takes."""
+_SNIFFED_BYTES = 1 << 16
+
+
+def read(path: str | Path, zone: int | None = None, progress: Progress | None = None) -> Mesh:
+    """Return the mesh of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        An SU2 file, or one of a format that meshio reads (by its ending).
+    zone : int, optional
+        The zone of an SU2 file, from 1; the first when left out.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1; what it raises stops the reading and passes on.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or has a mistake: the place and the remedy.
+    """
+    path = Path(path)
+    tick = progress or (lambda _: None)
+    try:
+        if _is_su2(path):
+            data = _read_bytes(path, tick)
+            return read_su2(path, data, zone, lambda f: tick(_READING + (1 - _READING) * f))
+        if zone not in (None, 1):
+            raise MeshError(
+                f"{path}: there is no zone {zone}, for only SU2 files have zones; leave it out"
+            )
+        from slideviz.mesh.foreign import read_foreign
+
+        return read_foreign(path, tick)
+    except OSError as problem:
+        raise MeshError(f"{path}: cannot be read: {_reason(problem)}") from problem
+    except MemoryError as problem:
+        raise MeshError(
+            f"{path}: there is not enough memory to read it; use a machine with more"
+        ) from problem
+
+
+def _is_su2(path: Path) -> bool:
+    """Tell whether it is an SU2 file, by ending or, where that says nothing, by content."""
+    if not path.exists():
+        raise MeshError(f"{path}: there is no such file; check the name and the folder")
+    if path.is_dir():
+        raise MeshError(f"{path}: this is a folder; choose a mesh file in it")
+    if not path.is_file():
+        raise MeshError(f"{path}: this is a device or pipe; choose an ordinary file")
+    if path.suffix.lower() == ".su2":
+        return True
+    if path.suffix.lower() not in ("", ".txt", ".dat", ".mesh", ".grid"):
+        return False
+    with path.open("rb") as file:
+        return re.search(rb"^\s*NDIME\s*=", file.read(_SNIFFED_BYTES), re.I | re.M) is not None
+
+
+def _read_bytes(path: Path, progress: Progress) -> bytes:
+    """Return the content, block by block so that it can be stopped."""
+    size = max(path.stat().st_size, 1)
+    blocks = []
+    with path.open("rb") as file:
+        while block := file.read(_READ_BYTES):
+            blocks.append(block)
+            progress(_READING * min(file.tell() / size, 1.0))
+    return b"".join(blocks)
+
+
+def write(
+    path: str | Path,
+    mesh: Mesh,
+    overwrite: bool = False,
+    cell_data: Mapping[str, ArrayLike] | None = None,
+) -> None:
+    """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; one that exists is replaced.
+    mesh : Mesh
+        What to write. From SU2 to SU2 everything else in the file is kept.
+    overwrite : bool
+        Whether ``path`` may be the file that the mesh was read from.
+    cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
+        Values on the cells by name; not for SU2, which has no place for them.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be written, or the mesh does not fit the format.
+    """
+    path = Path(path)
+    if not overwrite and _is_source(path, mesh):
+        raise MeshError(
+            f"{path}: this is the file that the mesh was read from; choose another name, or ask "
+            "for overwriting"
+        )
+    values = _checked(mesh, cell_data or {})
+    if path.suffix.lower() != ".su2":
+        from slideviz.mesh.foreign_write import write_foreign
+
+        write_foreign(path, mesh, values)
+        return
+    if values:
+        raise MeshError(
+            f"{path}: an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu "
+            "file"
+        )
+    with atomic_write(path) as file:
+        for block in su2_blocks(mesh):
+            file.write(block)
+
+
+def _is_source(path: Path, mesh: Mesh) -> bool:
+    try:
+        return mesh.source is not None and path.samefile(mesh.source)
+    except OSError:
+        # One of the two does not exist (any more), so there is nothing to protect.
+        return False
+
+
+def _checked(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
+    """Return the cell data as arrays of the right length."""
+    values = {name: np.asarray(given) for name, given in cell_data.items()}
+    for name, array in values.items():
+        if array.ndim not in (1, 2) or len(array) != len(mesh.cells):
+            raise MeshError(
+                f"cell data {name!r} has shape {array.shape}, but the mesh has {len(mesh.cells)} "
+                "cells; give one value or one row for each cell"
+            )
+    return values
+
+
+def _reason(problem: OSError) -> str:
+    if isinstance(problem, PermissionError):
+        return "no permission; change its permissions or copy it to another folder"
+    return f"{problem.strerror or problem}; check the disk or copy the file to another folder"

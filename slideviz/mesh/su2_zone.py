@@ -1,0 +1,239 @@
+"""The parts of one zone of an SU2 file, by their lines, counted and checked.
+
+Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers of
+partitioned files are only located, so that writing can keep them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.mesh.model import IntArray
+from slideviz.mesh.su2_scan import Lines, show
+from slideviz.mesh.su2_sections import KNOWN, Bounds, Section, count_of
+
+SEND_RECEIVE = "SEND_RECEIVE"
+Ranges = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerRows:
+    """A boundary: its name, the line of the name, and the lines of its elements (r,)."""
+
+    name: str
+    line: int
+    rows: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """Where the parts of one zone stand.
+
+    Attributes
+    ----------
+    bounds : Bounds
+        Which zone, and its lines.
+    dim : int
+        2 or 3.
+    elements, points : (r,) int64
+        The lines of the elements and of the points.
+    markers : tuple of MarkerRows
+        The boundaries.
+    sends, kept : tuple of (int, int)
+        First line and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
+    """
+
+    bounds: Bounds
+    dim: int
+    elements: IntArray
+    points: IntArray
+    markers: tuple[MarkerRows, ...]
+    sends: Ranges
+    kept: Ranges
+
+
+def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
+    """Return where the parts of a zone stand.
+
+    Raises
+    ------
+    MeshError
+        A section is missing or stands twice, a count is wrong, or a marker has no good name.
+    """
+    inside = [
+        section
+        for section in sections
+        if bounds.begin <= section.line < bounds.end and section.key not in ("NZONE", "IZONE")
+    ]
+    return _Walk(lines, inside, bounds).zone()
+
+
+class _Walk:
+    """Walks through the sections of one zone."""
+
+    def __init__(self, lines: Lines, sections: list[Section], bounds: Bounds) -> None:
+        self.lines = lines
+        self.sections = sections
+        self.bounds = bounds
+        self.data_lines = np.flatnonzero(lines.numeric)
+        self.text_lines = np.flatnonzero(~lines.numeric & (lines.words > 0))
+
+    def zone(self) -> Zone:
+        """Return where the parts stand."""
+        heads = {key: self._only(key) for key in ("NDIME", "NELEM", "NPOIN", "NMARK")}
+        dim = count_of(self.lines, heads["NDIME"])
+        if dim not in (2, 3):
+            raise self.lines.error(
+                heads["NDIME"].line, f"NDIME= {dim} is not possible; write 2 or 3"
+            )
+        self._no_data(heads["NDIME"])
+        elements = self._rows(heads["NELEM"], "elements")
+        points = self._rows(heads["NPOIN"], "points")
+        for key, rows in (("NELEM", elements), ("NPOIN", points)):
+            if not len(rows):
+                raise self.lines.error(
+                    heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
+                )
+        self._no_data(heads["NMARK"])
+        markers, sends, kept = self._walk()
+        self._check_markers(heads["NMARK"], markers, len(sends))
+        return Zone(self.bounds, dim, elements, points, markers, sends, kept)
+
+    def _only(self, key: str) -> Section:
+        """Return the section of that key, which must stand once."""
+        found = [section for section in self.sections if section.key == key]
+        if not found:
+            remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
+            raise self.lines.error(
+                self.bounds.end - 1,
+                f"the mesh ends here, but has no line {key}=; perhaps the file is cut off, so "
+                f"write it again{remedy}",
+            )
+        if len(found) > 1:
+            raise self.lines.error(
+                found[1].line,
+                f"{key}= stands a second time (first on line {found[0].line + 1}); remove one, "
+                "or number the zones with NZONE= and IZONE=",
+            )
+        return found[0]
+
+    def _numbers(self, section: Section) -> IntArray:
+        """Return the numeric lines of a section."""
+        i, j = np.searchsorted(self.data_lines, [section.line, section.stop])
+        return self.data_lines[i:j]
+
+    def _no_data(self, section: Section) -> None:
+        rows = self._numbers(section)
+        if len(rows):
+            raise self.lines.error(
+                int(rows[0]),
+                f"numbers stand here after {section.key}= {show(section.value)}, where none "
+                "belong; remove the line or restore the keyword before it",
+            )
+
+    def _rows(self, section: Section, what: str) -> IntArray:
+        """Return the lines of a counted section, which must be as many as it says."""
+        count = count_of(self.lines, section)
+        rows = self._numbers(section)
+        texts = self.text_lines[
+            np.searchsorted(self.text_lines, section.line, "right") : np.searchsorted(
+                self.text_lines, section.stop
+            )
+        ]
+        last = rows[count - 1] if 0 < count <= len(rows) else section.line
+        if len(texts) and (len(rows) < count or texts[0] < last):
+            word = self.lines.line(int(texts[0])).split()[0]
+            raise self.lines.error(
+                int(texts[0]),
+                f"{show(word)!r} stands where one of the {count} {what} should be ({section.key} "
+                f"on line {section.line + 1}); correct it",
+            )
+        if len(rows) < count:
+            raise self.lines.error(
+                min(section.stop, len(self.lines) - 1),
+                f"only {len(rows)} {what} precede this line, but {section.key}= {count} (line "
+                f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
+            )
+        if len(rows) > count:
+            raise self.lines.error(
+                int(rows[count]),
+                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
+                f"says: {len(rows)}; correct the count",
+            )
+        return rows
+
+    def _walk(self) -> tuple[tuple[MarkerRows, ...], Ranges, Ranges]:
+        """Return the boundaries, and the bounds of SEND_RECEIVE and of unknown sections."""
+        markers, sends, kept = [], [], []
+        at = 0
+        while at < len(self.sections):
+            section = self.sections[at]
+            at += 1
+            if section.key == "MARKER_TAG":
+                name = self._name(section)
+                head, at = self._marker_head(section, at, name == SEND_RECEIVE)
+                rows = self._rows(head, f"elements of marker {name}")
+                if name == SEND_RECEIVE:
+                    sends.append((section.line, head.stop))
+                else:
+                    markers.append(MarkerRows(name, section.line, rows))
+            elif section.key == "MARKER_ELEMS":
+                raise self.lines.error(
+                    section.line, "MARKER_ELEMS= has no MARKER_TAG= before it; name the marker"
+                )
+            elif section.key not in KNOWN:
+                kept.append((section.line, section.stop))
+        return tuple(markers), tuple(sends), tuple(kept)
+
+    def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, int]:
+        """Return the MARKER_ELEMS section of a marker, and the place after it."""
+        self._no_data(tag)
+        following = self.sections[at] if at < len(self.sections) else None
+        if following is None or following.key != "MARKER_ELEMS":
+            raise self.lines.error(
+                tag.line,
+                f"marker {show(tag.value)} is not followed by MARKER_ELEMS=; add it with the "
+                "number of elements",
+            )
+        at += 1
+        if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
+            # The elements stand after this line, which belongs to the marker.
+            self._no_data(following)
+            stop = self.sections[at].stop
+            following = Section(following.key, following.value, self.sections[at].line, stop)
+            at += 1
+        return following, at
+
+    def _name(self, section: Section) -> str:
+        try:
+            name = section.value.decode()
+        except UnicodeDecodeError:
+            name = ""
+        if not name or not name.isprintable():
+            raise self.lines.error(
+                section.line,
+                f"the marker name '{show(section.value)}' is empty or not UTF-8 text; rename the "
+                "marker, or save the file as UTF-8",
+            )
+        return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
+
+    def _check_markers(self, head: Section, markers: tuple[MarkerRows, ...], sends: int) -> None:
+        """Raise when names repeat or the count is wrong."""
+        seen: dict[str, int] = {}
+        for marker in markers:
+            if marker.name in seen:
+                raise self.lines.error(
+                    marker.line,
+                    f"marker {marker.name} stands a second time (first on line "
+                    f"{seen[marker.name] + 1}); rename or merge them",
+                )
+            seen[marker.name] = marker.line
+        count = count_of(self.lines, head)
+        if count != len(markers) + sends:
+            raise self.lines.error(
+                head.line,
+                f"NMARK= {count} says {count} markers, but {len(markers) + sends} follow; correct "
+                "the count or restore the missing markers",
+            )
