@@ -1,0 +1,204 @@
+"""The case file: ``KEY= value`` in the manner of SU2, a superset of RBF-SliDe's.
+
+Everything that a file has wrong is reported at once. Paths in it are relative to its folder.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.case.check import contradictions
+from slideviz.case.key import GROUPS, REDUCTION, ROLE_KEYS, Key
+from slideviz.case.keys import KEYS
+from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
+from slideviz.case.model import Case, FromFile
+from slideviz.case.reference import describe_keys
+from slideviz.case.words import nearest, shown
+from slideviz.errors import CaseError
+from slideviz.mesh.atomic import atomic_write
+
+__all__ = ["describe_keys", "read_case", "set_key", "write_case"]
+
+REDUCTION_WARNING = (
+    "DATA_REDUCTION= YES: this version solves with all control nodes, exactly; "
+    "the tolerance is met with error 0"
+)
+_ROLE_OF = {key: role for role, key in ROLE_KEYS.items()}
+
+
+def read_case(path: Path) -> Case:
+    """Return the case that a file describes.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    """
+    text, warnings = read_text(path, "case file")
+    case, problems, remarks = _parsed(path, text)
+    if problems:
+        raise CaseError(listed(path, problems))
+    case = _with_paths(case, lambda file: _from_folder(file, path.parent))
+    if case.mesh_file is not None and case.mesh_file == case.mesh_out:
+        remarks += (
+            f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
+        )
+    return _with_warning(case.change(source=path, warnings=warnings + remarks))
+
+
+def write_case(path: Path, case: Case) -> None:
+    """Write a case file that ``read_case`` reads back without loss.
+
+    Files below, or near, its folder are named relative to it, so that folders can be moved.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be written, or the case has something that no case file can hold.
+    """
+    folder = Path(os.path.realpath(path.parent))
+    named = _with_paths(case, lambda file: _to_folder(file, folder))
+    text = _text(named, path)
+    # Whatever is saved can be opened again: better no file than one that has to be mended.
+    again, problems, _ = _parsed(path, text)
+    if not problems and again.change(source=case.source, warnings=case.warnings) != named:
+        problems = [(0, "a case file cannot hold some of its values; check roles and motions")]
+    if problems:
+        raise CaseError("\n".join(f"{path}: cannot be written: {text}" for _, text in problems))
+    with atomic_write(path, CaseError) as file:
+        file.write(text.encode("utf-8"))
+
+
+def set_key(case: Case, key: str, value: str) -> Case:
+    """Return the case with another value of a key, as ``--set KEY=VALUE`` asks for.
+
+    A list of markers replaces the list, and its markers lose the role they had. A path is
+    relative to the current folder. Contradictions between keys are found by ``check_case``, so
+    that several keys can be set one after the other.
+
+    Raises
+    ------
+    CaseError
+        There is no such key, or the value is wrong.
+    """
+    place = f"--set {key}={value}"
+    row = KEYS.get(key.strip().upper())
+    if row is None:
+        raise CaseError(f"{place}: {_unknown(key)}")
+    if row.group == REDUCTION and row.name != "DATA_REDUCTION" and case.reduction is None:
+        raise CaseError(f"{place}: it needs DATA_REDUCTION= YES; set that first")
+    try:
+        wanted = row.kind.read(value.strip())
+        if row.name in _ROLE_OF:
+            case = _without_role(case, _ROLE_OF[row.name], wanted)
+        changed = row.put(case, wanted)
+    except CaseError as problem:
+        lines = str(problem).splitlines()
+        raise CaseError("\n".join(f"{place}: {line}" for line in lines)) from problem
+    remark = row.kind.remark(value.strip())
+    if remark:
+        changed = changed.change(warnings=(*changed.warnings, f"{place}: {remark}"))
+    return _with_warning(changed)
+
+
+def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
+    """Return the case with paths as written, the problems, and warnings."""
+    entries, problems = entries_of(text)
+    rows: dict[str, Entry] = {}
+    for entry in entries:
+        if entry.key in ("NDIME", "NZONE"):
+            raise CaseError(f"{path}: is an SU2 mesh, not a case file; name it in MESH_FILENAME=")
+        first = rows.setdefault(entry.key, entry)
+        if entry.key not in KEYS:
+            problems.append((entry.line, _unknown(entry.key)))
+        elif first is not entry:
+            sentence = f"{entry.key} is given in line {first.line} already; keep one of the two"
+            problems.append((entry.line, sentence))
+    if not entries and not problems:
+        raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
+    case, wrong, remarks = Case(), set[str](), []
+    for name, key in KEYS.items():
+        if name not in rows:
+            continue
+        entry = rows[name]
+        try:
+            case = _put(case, key, entry)
+        except CaseError as problem:
+            wrong.add(name)
+            problems += [(entry.line, f"{name}: {line}") for line in str(problem).splitlines()]
+        else:
+            remark = key.kind.remark(entry.value)
+            remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
+    for keys, sentence in contradictions(case):
+        if wrong.isdisjoint(keys):
+            problems.append((next(rows[key].line for key in keys if key in rows), sentence))
+    return case, problems, tuple(remarks)
+
+
+def _put(case: Case, key: Key, entry: Entry) -> Case:
+    if not entry.value:
+        raise CaseError(f"it has no value; needed is {key.kind.allowed}")
+    return key.put(case, key.kind.read(entry.value))
+
+
+def _text(case: Case, path: Path) -> str:
+    lines = ["% A case of slideviz; `slideviz keys` explains the keys"]
+    for group in GROUPS:
+        values = []
+        for key in KEYS.values():
+            value = key.get(case) if key.group == group else None
+            if value is not None:
+                try:
+                    values.append(f"{key.name}= {key.kind.write(value)}")
+                except CaseError as problem:
+                    raise CaseError(
+                        f"{path}: cannot be written: {key.name}: {problem}"
+                    ) from problem
+        lines += ["", f"% ----- {group} -----", *values] if values else []
+    return "\n".join(lines) + "\n"
+
+
+def _unknown(key: str) -> str:
+    return f"unknown key {shown(key)}{nearest(key, KEYS) or '; `slideviz keys` lists all'}"
+
+
+def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
+    kept = {name: r for name, r in case.roles.items() if r != role and name not in names}
+    return case.change(roles=kept)
+
+
+def _with_warning(case: Case) -> Case:
+    """Return the case with the warning about data reduction if, and only if, it asks for it."""
+    others = tuple(text for text in case.warnings if text != REDUCTION_WARNING)
+    return case.change(warnings=(*others, REDUCTION_WARNING) if case.reduction else others)
+
+
+def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:
+    """Return the case with all its paths changed."""
+    return case.change(
+        mesh_file=change(case.mesh_file) if case.mesh_file else None,
+        mesh_out=change(case.mesh_out) if case.mesh_out else None,
+        motions=tuple(
+            replace(motion, path=change(motion.path)) if isinstance(motion, FromFile) else motion
+            for motion in case.motions
+        ),
+    )
+
+
+def _from_folder(file: Path, folder: Path) -> Path:
+    """Return the path of a file named in a case file in that folder."""
+    path = folder / file
+    short = Path(os.path.normpath(path))
+    # `link/..` is not where the link stands, so shorten only what stays the same file.
+    return short if os.path.realpath(short) == os.path.realpath(path) else path
+
+
+def _to_folder(file: Path, folder: Path) -> Path:
+    """Return the path as a case file in that (real) folder names it."""
+    real = Path(os.path.realpath(file.parent)) / file.name
+    if len(os.path.commonpath([real, folder])) > 1:
+        return Path(os.path.relpath(real, folder))
+    return real

@@ -1,0 +1,175 @@
+"""What a case contradicts: itself, or the mesh it is meant for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from slideviz.case.key import BOUNDARIES, FILES, MOTION, ROLE_KEYS
+from slideviz.case.keys import KEYS
+from slideviz.case.model import FromFile, Motion, Rotate, Translate
+from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.words import nearest
+from slideviz.errors import CaseError
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+
+_LISTED = 12
+
+
+def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return what stands in the way of deforming this mesh, a sentence each; empty if nothing.
+
+    Displacement files are not read here.
+    """
+    return (
+        *_value_problems(case),
+        *(sentence for _, sentence in contradictions(case)),
+        *marker_problems(case, mesh),
+        *motion_problems(case, mesh),
+        *_zone_problems(case, mesh),
+        *_periodic_problems(case, mesh),
+    )
+
+
+def require_valid(case: Case, mesh: Mesh) -> None:
+    """Check that the case fits the mesh.
+
+    Raises
+    ------
+    CaseError
+        It does not; the text has a line for each problem.
+    """
+    raise_all(check_case(case, mesh))
+
+
+def raise_all(problems: tuple[str, ...]) -> None:
+    """Raise the problems, one in each line, if there are any.
+
+    Raises
+    ------
+    CaseError
+        There are.
+    """
+    if problems:
+        raise CaseError("\n".join(dict.fromkeys(problems)))
+
+
+def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
+    """Return what the case contradicts in itself: the keys involved, and a sentence.
+
+    What only matters when the case is run is not here, so that ``--set`` can put it right.
+    """
+    found: list[tuple[tuple[str, ...], str]] = []
+    moving = case.markers_with("moving")
+    for place, motion in enumerate(case.motions, start=1):
+        if motion.marker and motion.marker not in moving:
+            sentence = (
+                f"motion {place} names {motion.marker!r}, which does not move; list it in "
+                f"MARKER_MOVING{nearest(motion.marker, moving)}"
+            )
+            found.append((("MOTION", "MARKER_MOVING"), sentence))
+    if case.periodic_type == "rotational" and case.direction in (0, 2):
+        name = "r" if case.direction == 0 else "z"
+        sentence = (
+            f"rotational periodicity repeats in theta, not in {name} (PERIODIC_DIRECTION= "
+            f"{case.direction}); write theta, or PERIODIC_TYPE= translational"
+        )
+        found.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
+    return found
+
+
+def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return which markers of the case the mesh lacks, and whether any marker moves."""
+    known = mesh.marker_names
+    names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
+    has = f"it has {names}" if known else "it has none"
+    found = [
+        f"{ROLE_KEYS[role]}: {mesh.name} has no marker {marker!r}"
+        f"{nearest(marker, known) or f'; {has}'}"
+        for marker, role in case.roles.items()
+        if marker not in known
+    ]
+    if not case.markers_with("moving"):
+        found.append("no marker moves; name one in MARKER_MOVING")
+    return tuple(found)
+
+
+def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return which moving markers lack a motion, and which motions the mesh cannot have."""
+    given = {motion.marker for motion in case.motions}
+    found = [
+        f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
+        "DEFORMATION_FILENAME"
+        for marker in case.markers_with("moving")
+        if marker not in given and "" not in given
+    ]
+    for place, motion in enumerate(case.motions, start=1):
+        found += [f"motion {place}: {text}" for text in _motion_problems(motion, mesh.dim)]
+    return tuple(found)
+
+
+def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
+    if isinstance(motion, FromFile):
+        return
+    try:
+        read_motions(write_motions((motion,)))
+    except CaseError as problem:
+        yield str(problem).removeprefix("motion 1: ")
+        return
+    needed = f"the mesh has {dim} dimensions"
+    if isinstance(motion, Translate):
+        if len(motion.vector) != dim:
+            yield f"the shift has {len(motion.vector)} components, and {needed}; give {dim}"
+        return
+    if motion.point != "centroid" and len(motion.point) != dim:
+        yield f"the point has {len(motion.point)} coordinates, and {needed}; give {dim}"
+    if isinstance(motion, Rotate):
+        if dim == 2 and any(motion.axis[:2]):
+            yield f"the axis {motion.axis} leaves the plane; in 2D leave the axis out"
+    elif len(motion.factors) not in (1, dim):
+        yield f"{len(motion.factors)} factors are given, and {needed}; give 1 or {dim}"
+
+
+def _value_problems(case: Case) -> Iterator[str]:
+    """Yield the settings out of range, as a case made by a program may have them."""
+    for key in KEYS.values():
+        value = key.get(case)
+        if key.group in (FILES, BOUNDARIES, MOTION) or value is None:
+            continue
+        try:
+            key.kind.read(key.kind.write(value))
+        except (CaseError, TypeError, ValueError) as problem:
+            yield f"{key.name}: {problem}"
+
+
+def _zone_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+    if case.zone is not None and case.zone != mesh.zone:
+        is_zone = f"{mesh.name} is zone {mesh.zone} of {mesh.zones}"
+        yield f"ZONE= {case.zone}, but {is_zone}; read the other zone or change ZONE"
+
+
+def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
+    markers = case.markers_with("periodic")
+    if case.periodic != "none" and not markers:
+        yield (
+            f"PERIODIC_MODE= {case.periodic} needs MARKER_PERIODIC: name the boundaries that "
+            "repeat, or choose none"
+        )
+    if len(markers) % 2:
+        yield (
+            f"MARKER_PERIODIC has {len(markers)} markers ({', '.join(markers)}); they come in "
+            "pairs: name the partner too"
+        )
+    if case.periodic == "moving" and case.sliding == "none":
+        yield (
+            "PERIODIC_MODE= moving needs a sliding method: set SLIDING_MODE= ps or ds, or "
+            "choose PERIODIC_MODE= fixed"
+        )
+    if mesh.dim == 2 and case.periodic != "none":
+        if case.direction == 2:
+            yield "PERIODIC_DIRECTION= 2 is z, and the mesh has 2 dimensions; choose x or y"
+        if case.periodic_type != "translational" and any(case.axis[:2]):
+            yield f"PERIODIC_AXIS= {case.axis} leaves the plane; in 2D it is z"

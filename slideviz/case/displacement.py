@@ -1,0 +1,167 @@
+"""Displacement files: a node and its displacement in each line, as RBF-SliDe writes them.
+
+``322  -0.13  -0.37`` moves node 322 (counted from 0) by (-0.13, -0.37). Columns are separated
+by spaces, tabs, commas or semicolons; ``%``, ``#`` and ``$`` start comments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.case.lines import Problem, listed, read_text
+from slideviz.case.words import COMMENT_SIGNS, number, shown
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+
+_COMMENT = re.compile(f"[{COMMENT_SIGNS}][^\n]*")
+_SEPARATORS = str.maketrans(",;", "  ")
+_ENOUGH = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Displacements:
+    """Prescribed displacements.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        Node indices, sorted, each once.
+    vectors : (k, d) float64
+        Cartesian displacements, in the mesh's length unit.
+    warnings : tuple of str
+        What the user should know about them.
+    """
+
+    nodes: IntArray
+    vectors: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", frozen_array(self.nodes, np.int64))
+        object.__setattr__(self, "vectors", frozen_array(self.vectors, np.float64))
+
+    def at(self, nodes: IntArray) -> FloatArray:
+        """Return the displacements (m, d) of nodes (m,), which must be among these."""
+        return self.vectors[np.searchsorted(self.nodes, nodes)]
+
+
+def read_displacements(
+    path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
+) -> Displacements:
+    """Return the displacement of each of ``nodes``; those the file does not list get zero.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    nodes : (k,) int64
+        The nodes that the file may list, sorted, each once.
+    shape : (n, d)
+        Shape of the points of the mesh: number of nodes and dimension.
+    of : str
+        What the nodes lie on, for messages: ``a moving marker``, ``marker 'BLADE'``.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    """
+    text, warnings = read_text(path, "displacement file")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if any(sign in text for sign in COMMENT_SIGNS):
+        text = _COMMENT.sub("", text)
+    lines = text.translate(_SEPARATORS).split("\n")
+    table = _table(path, lines, shape[1])
+    problems = _table_problems(table, lines, nodes, (shape[0], of))
+    if problems:
+        raise CaseError(listed(path, problems))
+    given, first = np.unique(table[:, 0].astype(np.int64), return_index=True)
+    vectors = np.zeros((len(nodes), shape[1]))
+    vectors[np.searchsorted(nodes, given)] = table[first, 1:]
+    if len(given) < len(nodes):
+        missing = len(nodes) - len(given)
+        warning = f"{path}: {missing} of {len(nodes)} nodes on {of} are not listed; they stay"
+        warnings = (*warnings, warning)
+    return Displacements(nodes, vectors, warnings)
+
+
+def _table(path: Path, lines: list[str], dim: int) -> FloatArray:
+    """Return the numbers of the file, (m, 1 + d).
+
+    Raises
+    ------
+    CaseError
+        It has none, or lines with something else.
+    """
+    if not any(line.strip() for line in lines):
+        raise CaseError(f"{path}: the file lists no node; needed are lines {_columns(dim)}")
+    try:
+        table = np.loadtxt(lines, dtype=np.float64, comments=None, ndmin=2)
+    except ValueError:
+        table = np.empty((0, 0))
+    if table.shape[1] == 1 + dim and np.isfinite(table).all():
+        return table
+    # Slower, but it tells every line that is wrong.
+    rows: list[list[float]] = []
+    problems: list[Problem] = []
+    for line, content in enumerate(lines, start=1):
+        try:
+            rows += _row(content, dim)
+        except CaseError as problem:
+            problems.append((line, str(problem)))
+    if problems:
+        raise CaseError(listed(path, problems))
+    return np.array(rows, np.float64)
+
+
+def _row(content: str, dim: int) -> list[list[float]]:
+    """Return the numbers of a line, as one row or, of an empty line, none."""
+    words = content.split()
+    if words and len(words) != 1 + dim:
+        sentence = f"{shown(content.strip())} has {len(words)} columns; needed are {1 + dim}"
+        raise CaseError(f"{sentence}: {_columns(dim)} (put % before a heading)")
+    return [[number(word) for word in words]] if words else []
+
+
+def _columns(dim: int) -> str:
+    return "node dx dy" if dim == 2 else "node dx dy dz"
+
+
+def _table_problems(
+    table: FloatArray, lines: list[str], nodes: IntArray, mesh: tuple[int, str]
+) -> list[Problem]:
+    """Return the lines whose node is none of ``nodes``, or was displaced differently before."""
+    count, of = mesh
+    index = table[:, 0]
+    broken = index != np.floor(index)
+    outside = ~broken & ((index < 0) | (index >= count))
+    strange = ~broken & ~outside & ~np.isin(index, nodes)
+    order = np.argsort(index, kind="stable")
+    same = index[order[1:]] == index[order[:-1]]
+    differ = same & (table[order[1:]] != table[order[:-1]]).any(axis=1)
+    if not (broken.any() or outside.any() or strange.any() or differ.any()):
+        return []
+    row_line = [line for line, content in enumerate(lines, start=1) if content.strip()]
+    last = f"its nodes are 0 to {count - 1}"
+    problems = [(row_line[i], f"{index[i]!s} is not a node number") for i in _first(broken)]
+    problems += [
+        (row_line[i], f"node {int(index[i])} is not in the mesh; {last}") for i in _first(outside)
+    ]
+    problems += [
+        (row_line[i], f"node {int(index[i])} is not on {of}; take the line out or change the roles")
+        for i in _first(strange)
+    ]
+    for k in _first(differ):
+        before, after = row_line[order[k]], row_line[order[k + 1]]
+        sentence = f"node {int(index[order[k]])} has another displacement in line {before}"
+        problems.append((after, f"{sentence}; keep one of the two"))
+    return problems
+
+
+def _first(mask: Sequence[bool] | np.ndarray) -> list[int]:
+    return [int(i) for i in np.flatnonzero(mask)[:_ENOUGH]]

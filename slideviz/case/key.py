@@ -1,0 +1,164 @@
+"""A row of the table of keys: what it is, and the ways to put a value into a case and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from slideviz.case.model import Case, FromFile, Motion, PeriodicType, Reduction, Role
+from slideviz.case.values import Kind
+from slideviz.errors import CaseError
+
+Put = Callable[[Case, Any], Case]
+Get = Callable[[Case], Any]
+_NO_DEFAULT = "not set"
+FILES, BOUNDARIES, MOTION = "Files", "Boundaries", "Motion"
+PERIODICITY, METHOD, REDUCTION, QUALITY = "Periodicity", "Method", "Data reduction", "Quality"
+GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY)
+
+ROLE_KEYS: dict[Role, str] = {
+    "moving": "MARKER_MOVING",
+    "fixed": "MARKER_FIXED",
+    "sliding": "MARKER_SLIDING",
+    "periodic": "MARKER_PERIODIC",
+    "internal": "MARKER_INTERNAL",
+}
+
+DIRECTIONS: dict[str, tuple[int, PeriodicType | None]] = {
+    "0": (0, None),
+    "1": (1, None),
+    "2": (2, None),
+    "x": (0, "translational"),
+    "y": (1, "translational"),
+    "z": (2, None),
+    "r": (0, "rotational"),
+    "theta": (1, "rotational"),
+}
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of the case file.
+
+    Attributes
+    ----------
+    name, group : str
+        The key in upper case, and the heading it stands under.
+    kind : Kind
+        How its value is read and written.
+    meaning : str
+        What it does, in a sentence.
+    put, get : callable
+        Put a value into a case (``CaseError`` where it contradicts what is there), and take it
+        out: None where the file need not say anything.
+    default : str
+        The text of the value that holds when the file does not have the key.
+    rbf_slide : bool
+        Whether RBF-SliDe has the key too.
+    """
+
+    name: str
+    group: str
+    kind: Kind
+    meaning: str
+    put: Put
+    get: Get
+    default: str = _NO_DEFAULT
+    rbf_slide: bool = True
+
+
+def _field(field: str) -> tuple[Put, Get]:
+    return lambda case, value: case.change(**{field: value}), lambda case: getattr(case, field)
+
+
+def setting(name: str, group: str, kind: Kind, field: str, meaning: str) -> Key:
+    """Return the row of a plain field of ``Case``."""
+    value = getattr(Case(), field)
+    default = _NO_DEFAULT if value is None else kind.write(value)
+    return Key(name, group, kind, meaning, *_field(field), default)
+
+
+def greedy(name: str, kind: Kind, field: str, meaning: str) -> Key:
+    """Return the row of a field of ``Reduction``; without data reduction it is checked only."""
+
+    def put(case: Case, value: Any) -> Case:
+        if case.reduction is None:
+            return case
+        return case.change(reduction=replace(case.reduction, **{field: value}))
+
+    def get(case: Case) -> Any:
+        return None if case.reduction is None else getattr(case.reduction, field)
+
+    return Key(name, REDUCTION, kind, meaning, put, get, kind.write(getattr(Reduction(), field)))
+
+
+def put_reduction(case: Case, wanted: bool) -> Case:
+    """Return the case with data reduction (its settings kept) or without."""
+    return case.change(reduction=(case.reduction or Reduction()) if wanted else None)
+
+
+def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
+    """Return the row of the list of the markers that have a role."""
+
+    def put(case: Case, names: tuple[str, ...]) -> Case:
+        taken = [
+            f"marker {marker!r} is in {ROLE_KEYS[case.roles[marker]]} too; a marker has one "
+            "role: take it out of one of the lists"
+            for marker in names
+            if marker in case.roles
+        ]
+        if taken:
+            raise CaseError("\n".join(taken))
+        return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})
+
+    return Key(name, BOUNDARIES, kind, meaning, put, lambda case: case.markers_with(wanted) or None)
+
+
+def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
+    """Let markers slide that no other list has: RBF-SliDe's meaning of MARKER_BDRY."""
+    return case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles})
+
+
+def _leading_file(case: Case) -> tuple[Motion, ...]:
+    """Return the displacement file of all moving markers, if the motions begin with one."""
+    return tuple(m for m in case.motions[:1] if isinstance(m, FromFile) and not m.marker)
+
+
+def put_file(case: Case, path: Path | None) -> Case:
+    """Return the case whose motions begin with this displacement file, or with none."""
+    rest = case.motions[len(_leading_file(case)) :]
+    return case.change(motions=rest if path is None else (FromFile(path), *rest))
+
+
+def get_file(case: Case) -> Path | None:
+    """Return the displacement file of all moving markers that the motions begin with."""
+    files = [motion.path for motion in _leading_file(case) if isinstance(motion, FromFile)]
+    return files[0] if files else None
+
+
+def put_motions(case: Case, motions: tuple[Motion, ...]) -> Case:
+    """Return the case with these motions after its displacement file."""
+    return case.change(motions=(*_leading_file(case), *motions))
+
+
+def get_motions(case: Case) -> tuple[Motion, ...] | None:
+    """Return the motions after the displacement file, None if there are none."""
+    return case.motions[len(_leading_file(case)) :] or None
+
+
+def put_direction(case: Case, word: str) -> Case:
+    """Return the case with that direction, and the type of periodicity that it implies."""
+    direction, implied = DIRECTIONS[word]
+    if implied is not None and case.periodic_type not in ("auto", implied):
+        raise CaseError(
+            f"{word} is a direction of {implied} periodicity, and PERIODIC_TYPE= "
+            f"{case.periodic_type}; change one of the two"
+        )
+    return case.change(direction=direction, periodic_type=implied or case.periodic_type)
+
+
+def get_direction(case: Case) -> str | None:
+    """Return the number of the direction as text, None if it is left to the matching."""
+    return None if case.direction is None else str(case.direction)

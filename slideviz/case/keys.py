@@ -1,0 +1,187 @@
+"""All keys of a case file, one row each: the table reads, checks, writes and explains them.
+
+The rows are applied in the order of the table, whatever their order in the file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from slideviz.case.key import (
+    BOUNDARIES,
+    DIRECTIONS,
+    FILES,
+    METHOD,
+    MOTION,
+    PERIODICITY,
+    QUALITY,
+    REDUCTION,
+    Key,
+    get_direction,
+    get_file,
+    get_motions,
+    greedy,
+    put_boundaries,
+    put_direction,
+    put_file,
+    put_motions,
+    put_reduction,
+    role,
+    setting,
+)
+from slideviz.case.model import PERIODIC_MODES, SLIDING
+from slideviz.case.motion_text import MOTIONS
+from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, real, whole
+
+_ROWS = (
+    setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
+    setting("MESH_OUT_FILENAME", FILES, PATH, "mesh_out", "Where the deformed mesh is written."),
+    setting("ZONE", FILES, whole(1), "zone", "The zone to deform, from 1, of a mesh with several."),
+    role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
+    role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay; so do those in no list."),
+    role("MARKER_SLIDING", NAMES, "sliding", "Boundaries along which their nodes may slide."),
+    role("MARKER_PERIODIC", PAIRS, "periodic", "Boundaries that repeat, in pairs of any order."),
+    role(
+        "MARKER_INTERNAL",
+        NAMES,
+        "internal",
+        "Boundaries treated as inner nodes: they move freely, only their rim is kept in place.",
+    ),
+    Key(
+        "MARKER_BDRY",
+        BOUNDARIES,
+        NAMES,
+        "All boundaries; those in no other list slide (with SLIDING_MODE= none they stay).",
+        put_boundaries,
+        lambda _: None,
+    ),
+    Key(
+        "DEFORMATION_FILENAME",
+        MOTION,
+        PATH,
+        "Displacements of the moving nodes: node, dx, dy[, dz] in each line; the others stay.",
+        put_file,
+        get_file,
+    ),
+    Key(
+        "MOTION",
+        MOTION,
+        MOTIONS,
+        "What the moving boundaries do, one after the other, after DEFORMATION_FILENAME.",
+        put_motions,
+        get_motions,
+    ),
+    setting(
+        "PERIODIC_MODE",
+        PERIODICITY,
+        choice({word: word for word in PERIODIC_MODES}),
+        "periodic",
+        "How boundaries repeat: not, in the distance only, or also in the displacement with "
+        "fixed or moving vertices.",
+    ),
+    setting(
+        "PERIODIC_TYPE",
+        PERIODICITY,
+        choice(
+            {
+                "auto": "auto",
+                "translational": "translational",
+                "rotational": "rotational",
+                "0": "translational",
+                "1": "rotational",
+            }
+        ),
+        "periodic_type",
+        "Shift (0) or rotation (1); auto finds out by matching the markers.",
+    ),
+    Key(
+        "PERIODIC_DIRECTION",
+        PERIODICITY,
+        choice({word: word for word in DIRECTIONS}),
+        "Direction of the repetition, found by matching the markers if not given: 0, 1, 2 are "
+        "x, y, z or r, theta, z.",
+        put_direction,
+        get_direction,
+    ),
+    setting("PERIODIC_AXIS", PERIODICITY, AXIS, "axis", "Axis of rotational periodicity."),
+    setting("PERIODIC_ORIGIN", PERIODICITY, POINT, "origin", "A point on that axis."),
+    setting(
+        "SLIDING_MODE",
+        METHOD,
+        choice({word: word for word in SLIDING}),
+        "sliding",
+        "How nodes slide: not, pseudo sliding (ps) or direct sliding (ds).",
+    ),
+    setting("STEPS", METHOD, whole(1), "steps", "Steps in which the deformation is applied."),
+    setting(
+        "INFLUENCE_FACTOR",
+        METHOD,
+        real(0.0),
+        "influence_factor",
+        "Support radius of the radial function over the largest extent of the mesh.",
+    ),
+    setting("CURVED", METHOD, YES_NO, "curved", "Bring slid nodes back onto curved boundaries."),
+    setting(
+        "FEATURE_ANGLE",
+        METHOD,
+        real(0.0, 180.0, closed=True),
+        "feature_angle_deg",
+        "Angle in degrees from which a bend within a boundary is an edge.",
+    ),
+    Key(
+        "DATA_REDUCTION",
+        REDUCTION,
+        YES_NO,
+        "Interpolate with some of the boundary nodes only; without it the keys below do nothing.",
+        put_reduction,
+        lambda case: case.reduction is not None,
+        "NO",
+    ),
+    greedy(
+        "DATA_RED_TOLERANCE",
+        real(0.0),
+        "tolerance",
+        "Largest error left before the boundary is corrected, in the mesh's length unit.",
+    ),
+    greedy("MULTILEVEL", YES_NO, "multilevel", "Select the control nodes in levels."),
+    greedy(
+        "MULTI_CRIT",
+        choice({"size": "size", "tol": "tol"}),
+        "criterion",
+        "What ends a level: its number of nodes, or the fall of its error.",
+    ),
+    greedy(
+        "LVL_TOL_CRIT", real(0.0, 1.0), "level_tolerance", "Fall of the error that ends a level."
+    ),
+    greedy("LVL_SIZE", whole(1), "level_size", "Number of control nodes of a level."),
+    greedy(
+        "DOUBLE_EDGE", YES_NO, "double_edge", "Select two nodes at a time, with opposite errors."
+    ),
+    greedy("GAMMA", real(0.0), "gamma", "Radius of the correction over the largest error."),
+    setting(
+        "GENERATE_QUALITY",
+        QUALITY,
+        YES_NO,
+        "generate_quality",
+        "Write the quality of the deformed mesh too.",
+    ),
+    setting(
+        "QUALITY_METRIC",
+        QUALITY,
+        choice({"knupp": "knupp", "rbf-slide": "rbf-slide"}),
+        "quality_metric",
+        "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
+    ),
+)
+_OURS = {
+    "ZONE",
+    "MARKER_FIXED",
+    "MARKER_SLIDING",
+    "MOTION",
+    "PERIODIC_AXIS",
+    "PERIODIC_ORIGIN",
+    "FEATURE_ANGLE",
+    "QUALITY_METRIC",
+}
+
+KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name not in _OURS) for row in _ROWS}

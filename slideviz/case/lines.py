@@ -1,0 +1,111 @@
+"""The lines of a case file: ``KEY= value``, comments, and lines that go on in the next."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.case.words import shown, without_comment
+from slideviz.errors import CaseError
+
+Problem = tuple[int, str]
+_END_OF_LINE = re.compile(r"\r\n|\n|\r")
+_KEY_LINE = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*=(.*)\Z", re.DOTALL)
+_LISTED = 30
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A key in upper case, its value without comments, and its line (from 1)."""
+
+    key: str
+    value: str
+    line: int
+
+
+def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
+    """Return the text of a file, and warnings.
+
+    UTF-8 with or without a byte order mark, UTF-16 with one; anything else is read as Latin-1,
+    with a warning.
+
+    Raises
+    ------
+    CaseError
+        It cannot be read, is empty or is not text. ``what`` names the kind of file.
+    """
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as problem:
+        raise CaseError(f"{path}: there is no such {what}; check name and folder") from problem
+    except IsADirectoryError as problem:
+        raise CaseError(f"{path}: is a folder; needed is a {what}") from problem
+    except OSError as problem:
+        raise CaseError(f"{path}: cannot be read: {problem.strerror}") from problem
+    if not data.strip():
+        raise CaseError(f"{path}: the file is empty; needed is a {what}")
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = data.decode("utf-16", errors="replace")
+    elif b"\0" in data:
+        raise CaseError(f"{path}: is a binary file; needed is a {what}, which is text")
+    else:
+        try:
+            return data.decode("utf-8-sig"), ()
+        except UnicodeDecodeError:
+            warning = f"{path}: the file is not UTF-8; it was read as Latin-1"
+            return data.decode("latin-1"), (warning,)
+    return text, ()
+
+
+def entries_of(text: str) -> tuple[list[Entry], list[Problem]]:
+    """Return the entries of a case file in order, and what is wrong with its lines."""
+    entries: list[Entry] = []
+    problems: list[Problem] = []
+    for line, content in _joined(text, problems):
+        match = _KEY_LINE.match(content)
+        if match is None:
+            problems.append((line, f"{shown(content.strip())} is not `KEY= value`"))
+        else:
+            entries.append(Entry(match[1].upper(), match[2].strip(), line))
+    return entries, problems
+
+
+def _joined(text: str, problems: list[Problem]) -> Iterator[tuple[int, str]]:
+    """Return the lines that hold something, each with what goes on in the lines after it."""
+    start = 0
+    parts: list[str] = []
+    for line, raw in enumerate(_END_OF_LINE.split(text), start=1):
+        content = without_comment(raw).rstrip()
+        # A comment between the lines of a long list does not end it; an empty line does.
+        if parts and not content.strip() and raw.strip():
+            continue
+        match = _KEY_LINE.match(content)
+        if parts and match is not None:
+            sentence = f"the backslash at the end of the line before joins {match[1]} to it"
+            problems.append((line, f"{sentence}; take the backslash away"))
+            yield start, " ".join(parts)
+            parts = []
+        if not parts:
+            start = line
+        goes_on = content.endswith("\\")
+        parts.append(content[:-1] if goes_on else content)
+        if not goes_on:
+            if any(part.strip() for part in parts):
+                yield start, " ".join(parts)
+            parts = []
+    if any(part.strip() for part in parts):
+        yield start, " ".join(parts)
+
+
+def listed(path: Path, problems: list[Problem]) -> str:
+    """Return the problems in the order of their lines, one ``file:line: sentence`` each.
+
+    Of a file with very many (it may be no case file at all) the first are listed.
+    """
+    lines = [f"{path}:{line}: {sentence}" for line, sentence in sorted(problems)]
+    if len(lines) > _LISTED:
+        lines[_LISTED:] = [f"{path}: and {len(lines) - _LISTED} more problems"]
+    return "\n".join(lines)

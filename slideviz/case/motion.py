@@ -1,0 +1,198 @@
+"""Motions of markers: from what the case asks for to the displacement of every moving node.
+
+All is computed in one order with plain sums, so that the same case gives the same bits
+everywhere. Displacements are added up rather than positions, since the difference of two large
+positions has lost the digits of a small displacement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.case.check import (
+    check_case,
+    marker_problems,
+    motion_problems,
+    raise_all,
+    require_valid,
+)
+from slideviz.case.displacement import Displacements, read_displacements
+from slideviz.case.model import Case, FromFile, Motion, Point, Rotate, Scale, Translate
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+__all__ = [
+    "Displacements",
+    "check_case",
+    "displacement_of",
+    "displacements",
+    "moved_points",
+    "read_files",
+    "require_valid",
+]
+
+AGREE = 1e-9
+"""Largest difference, as a part of the mesh's extent, of two displacements of one node."""
+
+Files = Mapping[tuple[Path, str], Displacements]
+
+
+def displacements(case: Case, mesh: Mesh) -> Displacements:
+    """Return the displacement of every node of the moving markers, sorted by node.
+
+    A node of two moving markers has the displacement that the first of them gives it.
+
+    Raises
+    ------
+    CaseError
+        A marker is unknown or has no motion, a motion does not fit the dimension of the mesh, a
+        displacement file has mistakes, or two markers displace one node differently.
+    """
+    # The motions of markers that do not move are no obstacle here; `check_case` tells them.
+    raise_all((*marker_problems(case, mesh), *motion_problems(case, mesh)))
+    names = case.markers_with("moving")
+    on = {name: mesh.marker(name).nodes for name in names}
+    files = read_files(case, mesh)
+    vectors = [
+        displacement_of(_motions_of(case, name), mesh.points[on[name]], on[name], files)
+        for name in names
+    ]
+    nodes = np.concatenate(list(on.values()))
+    order = np.argsort(nodes, kind="stable")
+    stacked = np.concatenate(vectors)[order]
+    owner = np.repeat(np.arange(len(names)), [len(on[name]) for name in names])[order]
+    nodes = nodes[order]
+    first = np.searchsorted(nodes, nodes)
+    apart = np.abs(stacked - stacked[first]).max(axis=1, initial=0.0) > AGREE * mesh.extent
+    if apart.any():
+        rows = np.flatnonzero(apart)
+        pairs = np.stack([owner[first[rows]], owner[rows]], axis=1)
+        raise CaseError("\n".join(_disagreements(names, nodes[rows], pairs)))
+    keep = np.flatnonzero(first == np.arange(len(nodes)))
+    warnings = [text for file in files.values() for text in file.warnings]
+    return Displacements(nodes[keep], stacked[keep], tuple(dict.fromkeys(warnings)))
+
+
+def moved_points(
+    motions: Iterable[Motion],
+    points: FloatArray,
+    nodes: IntArray | None = None,
+    files: Files | None = None,
+) -> FloatArray:
+    """Return where the points of one marker go: (k, d). Parameters as of `displacement_of`."""
+    return points + displacement_of(motions, points, nodes, files)
+
+
+def displacement_of(
+    motions: Iterable[Motion],
+    points: FloatArray,
+    nodes: IntArray | None = None,
+    files: Files | None = None,
+) -> FloatArray:
+    """Return the displacement of the points of one marker, (k, d), by motions in sequence.
+
+    Parameters
+    ----------
+    motions : iterable of Motion
+        The motions of this marker, and files of all markers.
+    points : (k, d) float64
+        Undeformed positions of its nodes.
+    nodes : (k,) int64
+        Their indices; needed for displacement files only.
+    files : mapping of (path, marker) to Displacements
+        The displacement files, read; a file that is not among them displaces nothing.
+    """
+    total = np.zeros_like(points)
+    for motion in motions:
+        if not isinstance(motion, FromFile):
+            total += _increment(motion, points + total)
+        elif files and nodes is not None and (motion.path, motion.marker) in files:
+            total += files[motion.path, motion.marker].at(nodes)
+    return total
+
+
+def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, str], Displacements]:
+    """Return the displacement files of the case by path and marker, for `displacement_of`.
+
+    Raises
+    ------
+    CaseError
+        Some cannot be read or have mistakes: those of all files at once.
+    """
+    on = {
+        name: mesh.marker(name).nodes
+        for name in case.markers_with("moving")
+        if name in mesh.marker_names
+    }
+    every = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
+    files: dict[tuple[Path, str], Displacements] = {}
+    problems: list[str] = []
+    for motion in case.motions:
+        if isinstance(motion, FromFile) and motion.marker in ("", *on):
+            nodes = on[motion.marker] if motion.marker else every
+            of = f"marker {motion.marker!r}" if motion.marker else "a moving marker"
+            try:
+                read = read_displacements(motion.path, nodes, mesh.points.shape, of)
+            except CaseError as problem:
+                problems.append(str(problem))
+            else:
+                files[motion.path, motion.marker] = read
+    raise_all(tuple(problems))
+    return files
+
+
+def _increment(motion: Translate | Rotate | Scale, points: FloatArray) -> FloatArray:
+    """Return by how much a motion displaces the points from where they are, (k, d)."""
+    if isinstance(motion, Translate):
+        return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
+    arm = points - _centre(motion.point, points)
+    if isinstance(motion, Scale):
+        return arm * (np.array(motion.factors, np.float64) - 1.0)
+    return _turned(arm, math.radians(motion.angle_deg), motion.axis)
+
+
+def _centre(point: Point, points: FloatArray) -> FloatArray:
+    if point == "centroid":
+        return points.mean(axis=0) if len(points) else np.zeros(points.shape[1])
+    return np.array(point, np.float64)
+
+
+def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> FloatArray:
+    """Return the change of vectors (k, d) by a rotation (Rodrigues), zero for a zero angle.
+
+    ``sin(a) k x v + (1 - cos(a)) k x (k x v)``, with ``1 - cos(a) = 2 sin(a/2)^2``, which keeps
+    all digits of a small angle.
+    """
+    sine, versine = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
+    length = math.hypot(*axis)
+    a, b, c = (value / length for value in axis)
+    if arm.shape[1] == 2:
+        x, y = arm.T
+        return np.stack([-sine * c * y - versine * x, sine * c * x - versine * y], axis=1)
+    x, y, z = arm.T
+    across = (b * z - c * y, c * x - a * z, a * y - b * x)
+    u, v, w = across
+    twice = (b * w - c * v, c * u - a * w, a * v - b * u)
+    return np.stack([sine * p + versine * q for p, q in zip(across, twice, strict=True)], axis=1)
+
+
+def _motions_of(case: Case, marker: str) -> tuple[Motion, ...]:
+    return tuple(motion for motion in case.motions if motion.marker in ("", marker))
+
+
+def _disagreements(names: tuple[str, ...], nodes: IntArray, pairs: IntArray) -> list[str]:
+    """Return a sentence for each pair of markers (m, 2) that displace nodes (m,) differently."""
+    found, where = np.unique(pairs, axis=0, return_inverse=True)
+    lines = []
+    for place, (one, other) in enumerate(found):
+        shared = nodes[where.ravel() == place]
+        more = f" (and {len(shared) - 1} more)" if len(shared) > 1 else ""
+        lines.append(
+            f"node {shared[0]}{more} is on the moving markers {names[one]!r} and "
+            f"{names[other]!r}, which displace it differently; give both the same motion"
+        )
+    return lines

@@ -1,0 +1,196 @@
+"""The grammar of ``MOTION``: which marker moves how, one pair of brackets for each motion.
+
+``MOTION= (BLADE, translate, 0.1, 0.0) ; (BLADE, rotate, 5.0, centroid)``; ``GRAMMAR`` has all.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from slideviz.case.model import FromFile, Motion, Point, Rotate, Scale, Translate
+from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
+from slideviz.case.words import Word, is_none, name_text, nearest, number, shown, words_of
+from slideviz.errors import CaseError
+
+VERBS = ("translate", "rotate", "scale", "file")
+ALL_MOVING = "*"
+
+
+def read_motions(text: str) -> tuple[Motion, ...]:
+    """Return the motions that the value of ``MOTION`` describes.
+
+    Raises
+    ------
+    CaseError
+        Some are wrong: a sentence for each, with the number of the motion.
+    """
+    groups = _groups(words_of(text), text)
+    if not [group for group in groups if group]:
+        return ()
+    motions: list[Motion] = []
+    problems = []
+    for place, group in enumerate(groups, start=1):
+        try:
+            motions.append(_read_motion(group))
+        except CaseError as problem:
+            problems.append(f"motion {place}: {problem}")
+    if problems:
+        raise CaseError("\n".join(problems))
+    return tuple(motions)
+
+
+def write_motions(motions: tuple[Motion, ...]) -> str:
+    """Return the value of ``MOTION`` that ``read_motions`` reads back, without loss.
+
+    Each motion after the first stands in a line of its own.
+    """
+    return " ; \\\n    ".join(_motion_text(motion) for motion in motions) or "( )"
+
+
+def _groups(words: list[Word], text: str) -> list[list[Word]]:
+    """Return the words in each outer pair of brackets, inner brackets among them."""
+    groups: list[list[Word]] = []
+    depth = 0
+    if is_none(words):
+        return []
+    for word in words:
+        depth -= word.is_sign(")")
+        if depth > 0:
+            groups[-1].append(word)
+        elif depth < 0 or not any(word.is_sign(sign) for sign in "();,"):
+            raise CaseError(
+                f"{shown(text)}: each motion needs a pair of brackets, as in "
+                "(BLADE, translate, 0.1, 0.0) ; (TIP, rotate, 5, centroid)"
+            )
+        if word.is_sign("("):
+            groups += [[]] if depth == 0 else []
+            depth += 1
+    if depth:
+        raise CaseError(
+            f"{shown(text)}: a bracket is not closed; a list that goes on in the next line "
+            "needs a backslash at the end of its line"
+        )
+    return groups
+
+
+def _read_motion(group: list[Word]) -> Motion:
+    items = [word for word in group if not word.is_sign(",")]
+    if len(items) < 2:
+        raise CaseError(f"needed are a marker and one of {', '.join(VERBS)}")
+    head, verb, rest = items[0], items[1].text.lower(), items[2:]
+    if not head.text or head.is_sign("(") or head.is_sign(")"):
+        raise CaseError("it does not begin with the name of a marker")
+    if verb not in VERBS:
+        hint = nearest(verb, VERBS)
+        raise CaseError(f"{shown(items[1].text)} is not one of {', '.join(VERBS)}{hint}")
+    marker = head.text
+    every = marker == ALL_MOVING and not head.quoted
+    if verb == "file":
+        return _read_file("" if every else marker, rest)
+    if every:
+        raise CaseError("* (all moving markers) goes with `file` only; name the marker")
+    if verb == "translate":
+        return Translate(marker, read_vector(_flat(rest), "the shift"))
+    return _read_rotate(marker, rest) if verb == "rotate" else _read_scale(marker, rest)
+
+
+def _read_file(marker: str, rest: list[Word]) -> FromFile:
+    if len(rest) != 1 or not rest[0].text:
+        raise CaseError(
+            "needed is (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
+        )
+    return FromFile(Path(rest[0].text.replace("\\", "/")), marker)
+
+
+def _flat(words: list[Word]) -> list[Word]:
+    return [word for word in words if not (word.is_sign("(") or word.is_sign(")"))]
+
+
+def _is_centroid(word: Word) -> bool:
+    return not word.quoted and word.text.lower() == "centroid"
+
+
+def _read_rotate(marker: str, rest: list[Word]) -> Rotate:
+    items = _flat(rest)
+    if not items:
+        raise CaseError("the angle is missing; write rotate, angle in degrees, centroid")
+    angle, items = number(items[0].text), items[1:]
+    at_centroid = bool(items) and _is_centroid(items[-1])
+    # The axis: a letter or three numbers, if more follows than a point in the plane.
+    letter = bool(items) and items[0].text.lower() in ("x", "y", "z")
+    n_axis = 1 if letter else 3 if len(items) > 3 else 0
+    place = items[n_axis:]
+    if not (at_centroid and len(place) == 1) and len(place) not in (2, 3 if n_axis else 2):
+        raise CaseError(
+            "after the angle needed are the axis (x, y, z or three numbers; not in 2D) and then "
+            "centroid or the point"
+        )
+    axis = read_axis(items[:n_axis]) if n_axis else (0.0, 0.0, 1.0)
+    point: Point = "centroid" if at_centroid else read_vector(place, "the point")
+    return Rotate(marker, angle, point, axis)
+
+
+def _read_scale(marker: str, rest: list[Word]) -> Scale:
+    items = _flat(rest)
+    if items and _is_centroid(items[-1]):
+        factors, place = items[:-1], []
+    else:
+        opened = [i for i, word in enumerate(rest) if word.is_sign("(")]
+        if opened and rest[-1].is_sign(")"):
+            n_factors = len(_flat(rest[: opened[-1]]))
+        else:
+            n_factors = {3: 1, 6: 3}.get(len(items), 0)
+        factors, place = items[:n_factors], items[n_factors:]
+        if len(place) not in (2, 3):
+            raise CaseError(
+                "needed are one factor or one for each axis, then centroid or the point; put the "
+                "point in brackets: scale, 1.1, (0, 0, 0)"
+            )
+    if len(factors) not in (1, 2, 3):
+        raise CaseError(f"{len(factors)} factors are given; needed is one, or one for each axis")
+    values = tuple(number(word.text) for word in factors)
+    if min(values) <= 0.0:
+        raise CaseError(f"the factor {min(values):g} is not above 0: it would fold the marker")
+    return Scale(marker, values, read_vector(place, "the point") if place else "centroid")
+
+
+def _motion_text(motion: Motion) -> str:
+    if isinstance(motion, FromFile):
+        marker = name_text(motion.marker) if motion.marker else ALL_MOVING
+        path = path_text(motion.path)
+        # Commas and spaces separate here, unlike in a value that is a path only.
+        path = f'"{path}"' if any(sign in path for sign in " ,") and path[0] != '"' else path
+        return f"({marker}, file, {path})"
+    head = name_text(motion.marker)
+    if isinstance(motion, Translate):
+        return f"({head}, translate, {_numbers(motion.vector)})"
+    place = "centroid" if motion.point == "centroid" else vector_text(motion.point)
+    if isinstance(motion, Scale):
+        return f"({head}, scale, {_numbers(motion.factors)}, {place})"
+    axis = axis_text(motion.axis)
+    in_plane = motion.point == "centroid" or len(motion.point) == 2
+    turn = f"rotate, {float(motion.angle_deg)!r}"
+    if axis == "z" and in_plane:
+        return f"({head}, {turn}, {place})"
+    return f"({head}, {turn}, {axis}, {place})"
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return ", ".join(repr(float(value)) for value in values)
+
+
+GRAMMAR = (
+    "(BLADE, translate, dx, dy[, dz])",
+    "(BLADE, rotate, degrees, centroid)            counter-clockwise; in 3D about z",
+    "(BLADE, rotate, degrees, px, py)              about a point, in 2D",
+    "(BLADE, rotate, degrees, AXIS, centroid)      AXIS: x, y, z or three numbers",
+    "(BLADE, rotate, degrees, AXIS, px, py, pz)",
+    "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
+    "(BLADE, scale, FACTORS, (px, py[, pz]))",
+    "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
+    "(*, file, path)                               the same for all moving boundaries",
+    "centroid: mean of the nodes of the boundary, where it is at that moment",
+)
+MOTIONS = Kind(
+    "(MARKER, VERB, ...) ; (MARKER, VERB, ...)", read_motions, write_motions, details=GRAMMAR
+)

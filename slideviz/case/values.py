@@ -1,0 +1,242 @@
+"""The kinds of values that a key can have: how each is read, checked and written.
+
+A kind reads a text to a Python value and writes it back: ``read(write(value)) == value`` for
+every value that ``read`` can return. Numbers are written with ``repr``, which loses no bit.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from slideviz.case.words import (
+    Word,
+    check_writable,
+    is_none,
+    list_of,
+    name_text,
+    nearest,
+    number,
+    shown,
+    words_of,
+)
+from slideviz.errors import CaseError
+
+_PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
+_WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+# What SU2 writes after each pair of periodic markers: centre, angles, translation.
+_SU2_PAIR, _SU2_GROUP = 2, 11
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of value.
+
+    Attributes
+    ----------
+    allowed : str
+        What may be written, for the reference and for messages.
+    read : callable
+        Text to value; raises ``CaseError`` with one sentence.
+    write : callable
+        Value to text; raises ``CaseError`` if no text stands for it.
+    remark : callable
+        Text to a warning about it, empty if there is none.
+    details : tuple of str
+        More lines for the reference.
+    """
+
+    allowed: str
+    read: Callable[[str], Any]
+    write: Callable[[Any], str]
+    remark: Callable[[str], str] = lambda _: ""
+    details: tuple[str, ...] = ()
+
+
+def choice(words: Mapping[str, Any]) -> Kind:
+    """Return the kind of the words in the table, in any case; the first of a value is written."""
+    written: dict[Any, str] = {}
+    for word, value in words.items():
+        written.setdefault(value, word)
+    allowed = " | ".join(written.values())
+
+    def read(text: str) -> Any:
+        for word, value in words.items():
+            if word.lower() == text.lower():
+                return value
+        raise CaseError(f"{shown(text)} is not one of {allowed}{nearest(text, written.values())}")
+
+    def write(value: Any) -> str:
+        if value not in written:
+            raise CaseError(f"{value!r} is not one of {allowed}")
+        return written[value]
+
+    return Kind(allowed, read, write)
+
+
+def whole(low: int) -> Kind:
+    """Return the kind of whole numbers from ``low``."""
+    allowed = f"a whole number from {low}"
+
+    def read(text: str) -> int:
+        if not _WHOLE.match(text):
+            raise CaseError(f"{shown(text)} is not {allowed}")
+        if int(text) < low:
+            raise CaseError(f"{text} is too small; needed is {allowed}")
+        return int(text)
+
+    return Kind(allowed, read, str)
+
+
+def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
+    """Return the kind of numbers above ``low`` and below ``high`` (up to it, if closed)."""
+    allowed = f"a number above {low:g}"
+    if high is not None:
+        allowed += f" {'up to' if closed else 'and below'} {high:g}"
+
+    def read(text: str) -> float:
+        value = number(text)
+        too_large = high is not None and (value > high or (value == high and not closed))
+        if value <= low or too_large:
+            raise CaseError(f"{text} is out of range; needed is {allowed}")
+        return value
+
+    return Kind(allowed, read, lambda value: repr(float(value)))
+
+
+def _read_path(text: str) -> Path | None:
+    if '"' in text:
+        words = words_of(text)
+        if len(words) != 1:
+            raise CaseError(f'{shown(text)} is not one file name; write it as "name"')
+        text = words[0].text
+    elif is_none([Word(text)]):
+        return None
+    if not text:
+        raise CaseError("the file name is empty; give one, or NONE")
+    return Path(text.replace("\\", "/"))
+
+
+def path_text(path: Path, plain: re.Pattern[str] = _PLAIN_PATH) -> str:
+    """Return a path as it is written in a case file, with slashes and where needed in quotes.
+
+    Raises
+    ------
+    CaseError
+        A case file cannot hold it.
+    """
+    text = path.as_posix()
+    check_writable(text)
+    if "\\" in text:
+        raise CaseError(f"{text!r} cannot be written to a case file: it has a backslash; rename it")
+    if plain.match(text) and text.upper() != "NONE":
+        return text
+    return '"' + text.replace('"', '""') + '"'
+
+
+def _read_names(text: str) -> tuple[str, ...]:
+    return _checked_names([item.text for item in list_of(text)])
+
+
+def _checked_names(names: list[str]) -> tuple[str, ...]:
+    if "" in names:
+        raise CaseError("a marker has an empty name; give one")
+    for name in names:
+        if names.count(name) > 1:
+            raise CaseError(f"marker {name!r} is listed twice; list it once")
+    return tuple(names)
+
+
+def _write_names(names: tuple[str, ...]) -> str:
+    return f"( {', '.join(name_text(name) for name in names)} )"
+
+
+def _is_su2_form(items: list[Word]) -> bool:
+    if not items or len(items) % _SU2_GROUP:
+        return False
+    groups = [items[i : i + _SU2_GROUP] for i in range(0, len(items), _SU2_GROUP)]
+    return all(word.is_number for group in groups for word in group[_SU2_PAIR:])
+
+
+def _read_pairs(text: str) -> tuple[str, ...]:
+    items = list_of(text)
+    if _is_su2_form(items):
+        items = [item for i, item in enumerate(items) if i % _SU2_GROUP < _SU2_PAIR]
+    elif any(item.is_number for item in items) and not all(item.is_number for item in items):
+        raise CaseError(
+            "numbers stand among the names; write ( A, B ), or as SU2 does nine numbers after "
+            "each pair; a name that looks like a number needs quotes"
+        )
+    return _checked_names([item.text for item in items])
+
+
+def _remark_pairs(text: str) -> str:
+    if not _is_su2_form(list_of(text)):
+        return ""
+    return (
+        "the numbers after the names are not used; the shift or angle is found by matching "
+        "the markers node by node"
+    )
+
+
+def read_vector(items: list[Word], what: str) -> tuple[float, ...]:
+    """Return the numbers of a list of two or three.
+
+    Raises
+    ------
+    CaseError
+        They are not two or three, or not numbers.
+    """
+    if len(items) not in (2, 3):
+        raise CaseError(f"{what} has {len(items)} values; needed are 2 or 3 numbers")
+    return tuple(number(item.text) for item in items)
+
+
+def read_axis(items: list[Word]) -> tuple[float, float, float]:
+    """Return the direction that ``x``, ``y``, ``z`` or three numbers stand for.
+
+    Raises
+    ------
+    CaseError
+        It is none of these, or has no length.
+    """
+    if len(items) == 1 and items[0].text.lower() in _AXES:
+        return _AXES[items[0].text.lower()]
+    if len(items) != 3:
+        text = " ".join(item.text for item in items)
+        raise CaseError(f"{shown(text)} is not an axis; write x, y, z or three numbers")
+    x, y, z = (number(item.text) for item in items)
+    if x == y == z == 0.0:
+        raise CaseError("the axis (0, 0, 0) has no direction; write x, y, z or another vector")
+    return x, y, z
+
+
+def vector_text(values: tuple[float, ...]) -> str:
+    """Return the numbers in brackets, without loss."""
+    return f"({', '.join(repr(float(value)) for value in values)})"
+
+
+def axis_text(axis: tuple[float, float, float]) -> str:
+    """Return ``x``, ``y`` or ``z``, or the three numbers."""
+    for name, unit in _AXES.items():
+        # By text, since -0.0 == 0.0 and the two do not give the same bits.
+        if repr(tuple(map(float, axis))) == repr(unit):
+            return name
+    return vector_text(axis)
+
+
+def _read_origin(text: str) -> tuple[float, float, float]:
+    values = read_vector(list_of(text), "the point")
+    return (*values, 0.0)[:3] if len(values) == 2 else values  # type: ignore[return-value]
+
+
+YES_NO = choice({"YES": True, "NO": False, "TRUE": True, "FALSE": False})
+PATH = Kind("a file name", _read_path, path_text)
+NAMES = Kind("( A, B, ... )", _read_names, _write_names)
+PAIRS = Kind("( A, B, ... ), also with SU2's numbers", _read_pairs, _write_names, _remark_pairs)
+AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text)
+POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text)

@@ -1,0 +1,166 @@
+"""The words of a value: names, numbers, brackets and quoted text.
+
+``MARKER_MOVING= (BLADE, "tip #2")`` has the words ``(``, ``BLADE``, ``,``, ``tip #2``, ``)``.
+What stands between double quotes is taken as it is, and a doubled quotation mark inside is one
+of them. So a name may hold any character but the end of a line.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from slideviz.errors import CaseError
+
+COMMENT_SIGNS = "%#$"
+_WORD = re.compile(r'"(?P<quoted>(?:[^"]|"")*)"|(?P<sign>[(),;])|(?P<plain>[^\s(),;"]+)|(?P<bad>")')
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?\Z")
+_PLAIN_NAME = re.compile(r"[A-Za-z0-9_.:/@+-]+\Z")
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word of a value; a quoted one is never a sign, a number or ``NONE``."""
+
+    text: str
+    quoted: bool = False
+
+    def is_sign(self, sign: str) -> bool:
+        """Tell whether it is this bracket, comma or semicolon."""
+        return not self.quoted and self.text == sign
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it reads as a number."""
+        return not self.quoted and is_number(self.text)
+
+
+def words_of(text: str) -> list[Word]:
+    """Return the words of a value, brackets, commas and semicolons among them.
+
+    Raises
+    ------
+    CaseError
+        A quotation mark is not closed.
+    """
+    found = []
+    for match in _WORD.finditer(text):
+        if match["bad"]:
+            raise CaseError(f"the quotation mark in {shown(text)} is not closed; close it")
+        if match["quoted"] is not None:
+            found.append(Word(match["quoted"].replace('""', '"'), quoted=True))
+        else:
+            found.append(Word(match[0]))
+    return found
+
+
+def without_comment(line: str) -> str:
+    """Return the line up to its comment sign; one between quotes is no comment."""
+    inside = False
+    for place, sign in enumerate(line):
+        if sign == '"':
+            inside = not inside
+        elif sign in COMMENT_SIGNS and not inside:
+            return line[:place]
+    return line
+
+
+def list_of(text: str) -> list[Word]:
+    """Return the items of a list: ``(A, B)``, ``A, B``, ``A B``, or none in ``( )``, ``(NONE)``.
+
+    Raises
+    ------
+    CaseError
+        A bracket is missing or misplaced, or a quotation mark is not closed.
+    """
+    words = words_of(text)
+    opened = bool(words) and words[0].is_sign("(")
+    closed = bool(words) and words[-1].is_sign(")")
+    if opened != closed:
+        raise CaseError(
+            f"a bracket of {shown(text)} is missing; a list that goes on in the next line "
+            "needs a backslash at the end of its line"
+        )
+    items = [word for word in words[opened : len(words) - closed] if not word.is_sign(",")]
+    for item in items:
+        if any(item.is_sign(sign) for sign in "();"):
+            raise CaseError(f"{shown(text)} is not one list of names; write ( A, B )")
+    return [] if is_none(items) else items
+
+
+def is_none(words: Sequence[Word]) -> bool:
+    """Tell whether the words are SU2's ``NONE``, which stands for nothing."""
+    return len(words) == 1 and not words[0].quoted and words[0].text.upper() == "NONE"
+
+
+def is_number(text: str) -> bool:
+    """Tell whether the text is a decimal number; ``nan``, ``inf`` and ``1_000`` are not."""
+    return _NUMBER.match(text) is not None
+
+
+def number(text: str) -> float:
+    """Return the finite number that the text stands for.
+
+    Raises
+    ------
+    CaseError
+        It is none.
+    """
+    if not is_number(text):
+        hint = "; write decimals with a point" if is_number(text.replace(",", ".")) else ""
+        raise CaseError(f"{shown(text)} is not a number{hint}")
+    value = float(text)
+    if not math.isfinite(value):
+        raise CaseError(f"{shown(text)} is too large for a number; needed is a finite one")
+    return value
+
+
+def name_text(name: str) -> str:
+    """Return a name as it is written in a case file, between quotes if it needs them.
+
+    Raises
+    ------
+    CaseError
+        No case file can hold it.
+    """
+    check_writable(name)
+    if _PLAIN_NAME.match(name) and not is_number(name) and name.upper() != "NONE":
+        return name
+    return '"' + name.replace('"', '""') + '"'
+
+
+def check_writable(text: str) -> None:
+    """Check that a line of a case file can hold the text.
+
+    Raises
+    ------
+    CaseError
+        It is empty, has the end of a line in it, or is no text.
+    """
+    if not text:
+        raise CaseError("an empty name cannot be written to a case file; give it a name")
+    if any(sign in text for sign in "\n\r\0"):
+        raise CaseError(
+            f"{text!r} cannot be written to a case file: it has a line break; rename it"
+        )
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError as problem:
+        raise CaseError(
+            f"{text!r} cannot be written to a case file: it is not UTF-8; rename it"
+        ) from problem
+
+
+def shown(text: str) -> str:
+    """Return the text between quotes, cut to a length that a message can hold."""
+    return repr(text if len(text) <= 60 else f"{text[:57]}...")
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean X?`` with the known name that is most like this, or nothing."""
+    by_lower = {other.lower(): other for other in known}
+    close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
+    return f"; did you mean {by_lower[close[0]]}?" if close else ""
