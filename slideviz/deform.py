@@ -15,7 +15,8 @@ from slideviz.case.model import Case
 from slideviz.case.plan import Plan, make_plan
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.methods import METHODS, Problem, Solution, Watch
+from slideviz.rbf.methods import METHODS
+from slideviz.rbf.problem import Problem, Solution, Watch
 
 ON_AXIS = 1e-9
 """Nodes nearer to the axis than this part of the reference radius stay on it."""
@@ -147,6 +148,10 @@ def _step(plan: Plan, sliding: str, coords: FloatArray, goal: FloatArray, watch:
         same_as=plan.same_as,
         project=lambda nodes, free: plan.tracks.project(coords, nodes, free),
         curved=plan.tracks.curved,
+        cartesian=plan.frame.points,
+        coords=coords,
+        shift=plan.frame.shift(),
+        reduction=plan.reduction,
     )
     return METHODS[sliding](problem, watch)
 

@@ -18,6 +18,7 @@ from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, f
 from slideviz.rbf.classify import Classes, classify, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.problem import Reduction
 from slideviz.rbf.projection import Tracks, find_tracks
 
 COINCIDENT = 1e-12
@@ -45,6 +46,8 @@ class Plan:
         Nodes of the periodic markers and their images.
     periodic_displacement : bool
         Whether images move alike (PERIODIC_MODE= fixed or moving).
+    reduction : Reduction or None
+        Settings of the greedy selection; None: all candidates are control nodes.
     boundary, fans, tracks
         Topology, and where sliding nodes slide.
     pairs : tuple of Pair
@@ -60,6 +63,7 @@ class Plan:
     same_as: IntArray
     images: IntArray
     periodic_displacement: bool
+    reduction: Reduction | None
     boundary: Boundary
     fans: Fans
     tracks: Tracks
@@ -133,6 +137,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
         periodic_displacement=free,
+        reduction=_reduction(case),
         boundary=boundary,
         fans=fans,
         tracks=tracks,
@@ -180,3 +185,18 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     lowest = np.full(label.max() + 1, count, np.int64)
     np.minimum.at(lowest, label, np.arange(count))
     return lowest[label]
+
+
+def _reduction(case: Case) -> Reduction | None:
+    """Return the settings of the selection in the solver's terms."""
+    given = case.reduction
+    if given is None:
+        return None
+    return Reduction(
+        tolerance=given.tolerance,
+        pick="double" if given.double_edge else "one",
+        level={"size": "size", "tol": "ratio"}[given.criterion] if given.multilevel else "none",
+        level_size=given.level_size,
+        level_ratio=given.level_tolerance,
+        gamma=given.gamma,
+    )

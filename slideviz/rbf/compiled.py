@@ -11,13 +11,32 @@ a time, because Numba's fallback thread pool must not be entered from two thread
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import factorial
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange, set_num_threads
 
 LOCK = threading.Lock()
+
+SMALL = 2_000_000
+"""Pairs below which waking other threads costs more than it saves."""
+
+
+@contextmanager
+def one_at_a_time(pairs: int) -> Iterator[None]:
+    """Hold the lock, and keep small work on one thread."""
+    with LOCK:
+        threads = get_num_threads()
+        if pairs < SMALL:
+            set_num_threads(1)
+        try:
+            yield
+        finally:
+            set_num_threads(threads)
+
 
 OPTIONS: dict[str, Any] = {
     "nogil": True,
@@ -104,17 +123,16 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def fill_matrix(c, directions, half, scale, rows, out):  # type: ignore[no-untyped-def]
-    """Write rows of G_ab = phi(|x_a - x_b|) (n_a . n_b) to out (rows, n).
+def fill_matrix(x, c, across, along, half, scale, out):  # type: ignore[no-untyped-def]
+    """Write G_ab = phi(|x_a - c_b|) (m_a . n_b) to out (N, n).
 
-    ``c`` (4, n) has the features of each constraint's node, ``directions`` (d, n) its unit
-    direction; d = 0 leaves the dot product out. ``half`` is 0 for Euclidean features.
+    ``x`` (4, N) and ``c`` (4, n) have the features of each constraint's node, ``across`` (d, N)
+    and ``along`` (d, n) its unit direction; d = 0 leaves the dot product out. ``half`` is 0 for
+    Euclidean features.
     """
-    first, last = rows
-    d = directions.shape[0]
-    for i in prange(last - first):
-        a = first + i
-        x0, x1, x2, x3 = c[0, a], c[1, a], c[2, a], c[3, a]
+    d = across.shape[0]
+    for a in prange(x.shape[1]):
+        x0, x1, x2, x3 = x[0, a], x[1, a], x[2, a], x[3, a]
         for b in range(c.shape[1]):
             d0, d3 = x0 - c[0, b], x3 - c[3, b]
             if half > 0.0:
@@ -127,6 +145,6 @@ def fill_matrix(c, directions, half, scale, rows, out):  # type: ignore[no-untyp
             if d > 0:
                 dot = 0.0
                 for k in range(d):
-                    dot += directions[k, a] * directions[k, b]
+                    dot += across[k, a] * along[k, b]
                 value *= dot
-            out[i, b] = value
+            out[a, b] = value

@@ -71,7 +71,7 @@ def evaluate(
     for start in range(0, total, size):
         part = np.ascontiguousarray(x[:, start : start + size])
         result = np.empty_like(part[:3])
-        with compiled.LOCK:
+        with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
             if rotational:
                 compiled.sum_rotational(part, c, w, basis.half, scale, result)
             elif rows == 4:
@@ -85,32 +85,44 @@ def evaluate(
 
 def matrix(
     basis: Basis,
-    features: FloatArray,
-    directions: FloatArray | None = None,
+    rows: tuple[FloatArray, FloatArray | None],
+    columns: tuple[FloatArray, FloatArray | None] | None = None,
     tick: Tick = no_tick,
 ) -> FloatArray:
-    """Return G_ab = phi(|x_a - x_b|) (n_a . n_b), (n, n), symmetric.
+    """Return G_ab = phi(|x_a - c_b|) (m_a . n_b), (N, n).
 
     Parameters
     ----------
-    features : (k, n)
-        Of the node of each constraint.
-    directions : (n, d) or None
-        Unit direction of each constraint; None leaves the dot product out.
+    rows, columns
+        Features (k, N) of the node of each constraint, and its unit direction (N, d), or None
+        to leave the dot product out. ``columns`` None: the same as the rows.
     """
-    c = _rows(features, 4)
-    n = c.shape[1]
-    normals = np.zeros((0, n)) if directions is None else np.ascontiguousarray(directions.T)
-    out = np.empty((n, n))
+    x, across = _rows(rows[0], 4), _directions(*rows)
+    c, along = (x, across) if columns is None else (_rows(columns[0], 4), _directions(*columns))
+    total, n = x.shape[1], c.shape[1]
+    out = np.empty((total, n))
     size = max(1, CHUNK // max(1, n))
-    for start in range(0, n, size):
-        stop = min(n, start + size)
-        with compiled.LOCK:
+    for start in range(0, total, size):
+        part = slice(start, min(total, start + size))
+        with compiled.one_at_a_time((part.stop - part.start) * n):
             compiled.fill_matrix(
-                c, normals, basis.half, 1.0 / basis.radius, (start, stop), out[start:stop]
+                np.ascontiguousarray(x[:, part]),
+                c,
+                np.ascontiguousarray(across[:, part]),
+                along,
+                basis.half,
+                1.0 / basis.radius,
+                out[part],
             )
-        tick(stop / n)
+        tick(part.stop / total)
     return out
+
+
+def _directions(features: FloatArray, directions: FloatArray | None) -> FloatArray:
+    """Return unit directions as contiguous rows (d, n); d = 0 without directions."""
+    if directions is None:
+        return np.zeros((0, features.shape[1]))
+    return np.ascontiguousarray(directions.T)
 
 
 def _rows(values: FloatArray, rows: int) -> FloatArray:

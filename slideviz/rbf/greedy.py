@@ -1,0 +1,349 @@
+"""Greedy selection of control nodes (thesis section 2.5), block-wise and matrix-free.
+
+A cycle takes the candidates of largest error as a pool, forms the pool's Schur complement with
+the Cholesky factor grown so far, and runs the exact one-node Newton greedy (Pazouki and
+Schaback 2011) inside the pool: pick the largest residual, eliminate it from the pool's matrix
+and residuals, and so on, until enough nodes are picked or the pool's largest residual falls far
+below the largest of all. The picked rows are appended to the factor, the weights follow from
+two triangular solves, and the residual of all candidates is recomputed by the fused sums, which
+is also the exact error. So nothing is factorised twice and no candidates-by-controls matrix
+exists; picking one or two nodes in a cycle, as the thesis does, is the same with a small pool.
+
+Candidates are sorted by position, and every number depends on one candidate and the order of
+the control nodes alone: neither numbering nor threads change the selection.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.evaluate import evaluate, matrix
+from slideviz.rbf.problem import Cycle, Problem, Reduction, Rows, Watch
+from slideviz.rbf.solve import PIVOT_GUARD
+
+POOL = 1024
+"""Largest number of rows in the pool of a block."""
+
+POOL_START = 192
+POOL_SHARE = 16
+"""The pool begins small and has this many candidates for each node to pick: as good, measured
+by the number of control nodes, and cheaper than the largest one from the start."""
+
+BLOCK_LIMIT = 64
+"""Largest number of nodes picked in a cycle."""
+
+STALE = 0.3
+"""A block ends when the pool's largest error is below this part of the largest of all."""
+
+
+class GreedyFit:
+    """An interpolant that meets its constraints to a tolerance with few control nodes.
+
+    Attributes
+    ----------
+    controls : (c,) int64
+        The chosen nodes, in the order of their choice.
+    weights : (c, d) float64
+        Their coefficients, summed over the levels (Eq. 2.38).
+    dropped : (m,) int64
+        Nodes left out by the pivot guard although their error is above the tolerance.
+    history : tuple of Cycle
+    """
+
+    def __init__(self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> None:
+        assert problem.reduction is not None
+        self._problem, self._watch, self._settings = problem, watch, problem.reduction
+        d = problem.values.shape[1]
+        self.history = history
+        self.controls: IntArray = np.empty(0, np.int64)
+        self.weights: FloatArray = np.empty((0, d))
+        self.dropped: IntArray = np.empty(0, np.int64)
+        self._start = perf_counter() - (history[-1].seconds if history else 0.0)
+        self._level = history[-1].level if history else 1
+        self._rows = Rows(np.empty(0, np.int64), None, np.empty((0, d)))
+        self._candidate = np.empty(0, np.int64)
+        self._new_level()
+
+    def _new_level(self) -> None:
+        """Begin a level: an empty factor for what the levels before left."""
+        self._settled = self.controls, self.weights
+        self._factor = np.empty((0, 0))
+        self._half = np.empty((0, self._rows.right.shape[1]))
+        self._chosen = np.empty(0, np.int64)
+        self._barred = np.zeros(len(self._rows.nodes), bool)
+
+    def add(self, rows: Rows) -> None:
+        """Meet these constraints too, and select until all errors are below the tolerance."""
+        rows = self._sorted(rows)
+        if len(self._rows.nodes):
+            rows = Rows(
+                np.concatenate([self._rows.nodes, rows.nodes]),
+                None,
+                np.concatenate([self._rows.right, rows.right]),
+            )
+        else:
+            self._half = np.empty((0, rows.right.shape[1]))
+        self._rows = rows
+        new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
+        self._candidate = np.cumsum(new) - 1
+        self._first = np.flatnonzero(new)
+        more = len(rows.nodes) - len(self._barred)
+        self._barred = np.concatenate([self._barred, np.zeros(more, bool)])
+        with self._watch.phase("select"):
+            self._select()
+
+    def _sorted(self, rows: Rows) -> Rows:
+        """Return the rows ordered by position, rows of one node together."""
+        coords = self._problem.coords[rows.nodes]
+        keys = [np.arange(len(coords)), *(coords[:, k] for k in reversed(range(coords.shape[1])))]
+        order = np.lexsort(keys)
+        normals = None if rows.normals is None else rows.normals[order]
+        return Rows(rows.nodes[order], normals, rows.right[order])
+
+    def _select(self) -> None:
+        """Run cycles until the error is below the tolerance, or nothing is left to choose."""
+        settings = self._settings
+        target = self._targets()
+        residual = target - self._values(*self._own())
+        errors = self._errors(residual)
+        goal = self._level_goal(errors)
+        while True:
+            self._record(errors)
+            if errors.max(initial=0.0) <= settings.tolerance or self._full():
+                break
+            if self._level_done(errors, goal):
+                self._new_level()
+                self._level += 1
+                target, goal = self._targets(), self._level_goal(errors)
+                residual = target
+            if not self._grow(target, residual, errors):
+                break
+            residual = target - self._values(*self._own())
+            errors = self._errors(residual)
+            self._watch.report("select", self._fraction(errors))
+        self._note_dropped(errors)
+
+    def _level_goal(self, errors: FloatArray) -> float:
+        return float(errors.max(initial=0.0)) * self._settings.level_ratio
+
+    def _level_done(self, errors: FloatArray, goal: float) -> bool:
+        """Tell whether the level is complete (section 2.5.2, 5.3.2)."""
+        if self._settings.level == "size":
+            count = len(np.unique(self._candidate[self._chosen]))
+            return count >= self._settings.level_size
+        return self._settings.level == "ratio" and 0 < len(self._chosen) and errors.max() < goal
+
+    def _full(self) -> bool:
+        limit = self._settings.max_nodes
+        return limit is not None and len(self.controls) >= limit
+
+    def _fraction(self, errors: FloatArray) -> float:
+        """Return how far the error has fallen from its first value, on a logarithmic scale."""
+        first, now = self.history[0].error, float(errors.max(initial=0.0))
+        span = np.log(max(first, 1e-300) / self._settings.tolerance)
+        return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))
+
+    def _record(self, errors: FloatArray) -> None:
+        cycle = Cycle(
+            len(self.history) + 1,
+            self._level,
+            float(errors.max(initial=0.0)),
+            len(self.controls),
+            perf_counter() - self._start,
+        )
+        self.history = (*self.history, cycle)
+
+    def _note_dropped(self, errors: FloatArray) -> None:
+        """Remember the candidates that are barred although their error is too large."""
+        over = errors > self._settings.tolerance
+        barred = np.zeros(len(errors), bool)
+        barred[self._candidate[self._barred]] = True
+        barred[self._candidate[self._chosen]] = False
+        self.dropped = np.unique(self._rows.nodes[self._first[over & barred]])
+
+    def _targets(self) -> FloatArray:
+        """Return what this level has to meet: the data less the levels before, (r, m)."""
+        if not len(self._settled[0]):
+            return self._rows.right
+        return self._rows.right - self._values(*self._settled)
+
+    def _own(self) -> tuple[IntArray, FloatArray]:
+        """Return nodes and weights (c, d) of this level."""
+        if not len(self._chosen):
+            return self._chosen, np.empty((0, self._problem.values.shape[1]))
+        w = solve_triangular(self._factor, self._half, lower=True, trans=1, check_finite=False)
+        nodes, normals = self._rows.nodes[self._chosen], self._rows.normals
+        return nodes, w if normals is None else w * normals[self._chosen]
+
+    def _values(self, nodes: IntArray, weights: FloatArray) -> FloatArray:
+        """Return the interpolant of these weights in each row, (r, m)."""
+        features, rows = self._problem.features, self._rows
+        at = rows.nodes[self._first]
+        if not len(nodes):
+            return np.zeros_like(rows.right)
+        s = evaluate(self._problem.basis, features[:, at], features[:, nodes], weights)
+        s = s[self._candidate]
+        return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
+
+    def _errors(self, residual: FloatArray) -> FloatArray:
+        """Return the error of each candidate node: the length of its residual, (c,)."""
+        squares = np.einsum("rm,rm->r", residual, residual)
+        return np.sqrt(np.add.reduceat(squares, self._first)) if len(squares) else squares
+
+    def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
+        """Pick nodes, extend the factor and the weights; tell whether any could be picked."""
+        open_ = np.zeros(len(errors), bool)
+        open_[self._candidate[~self._barred]] = True
+        count, pool = self._pool(np.where(open_, errors, -1.0), residual)
+        while len(pool):
+            rows = np.flatnonzero(np.isin(self._candidate, pool) & ~self._barred)
+            picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
+            if picked:
+                self._update_weights()
+                return True
+            # All of the pool fell to the pivot guard: try the next ones.
+            open_[pool] = False
+            count, pool = self._pool(np.where(open_, errors, -1.0), residual)
+        return False
+
+    def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
+        """Return how many nodes to pick, and the candidates to pick them from."""
+        settings, chosen = self._settings, len(self.controls)
+        eligible = np.count_nonzero(errors > settings.tolerance)
+        if not eligible:
+            return 0, np.empty(0, np.int64)
+        worst = int(np.argmax(errors))
+        if settings.pick == "one":
+            return 1, np.array([worst])
+        if settings.pick == "double":
+            return self._double(errors, residual, worst)
+        per_node = max(1, len(self._candidate) // max(1, len(errors)))
+        count = int(np.clip(chosen // 4, 4, BLOCK_LIMIT))
+        size = min(eligible, POOL // per_node, max(POOL_START, POOL_SHARE * count))
+        order = np.argsort(-errors, kind="stable")[:size]
+        if settings.level == "size":
+            left = settings.level_size - len(np.unique(self._candidate[self._chosen]))
+            count = min(count, max(1, left))
+        if settings.max_nodes is not None:
+            count = min(count, max(1, settings.max_nodes - chosen))
+        return count, np.sort(order)
+
+    def _double(self, errors: FloatArray, residual: FloatArray, worst: int) -> tuple[int, IntArray]:
+        """Return the worst candidate and the worst one whose error is more than 90° from its."""
+        normals, d = self._rows.normals, self._problem.values.shape[1]
+        vectors = residual
+        if normals is not None:
+            vectors = np.zeros((len(errors), d))
+            np.add.at(vectors, self._candidate, residual * normals)
+        opposite = np.where(vectors @ vectors[worst] < 0, errors, -1.0)
+        second = int(np.argmax(opposite))
+        if opposite[second] <= self._settings.tolerance:
+            return 1, np.array([worst])
+        return 2, np.sort([worst, second])
+
+    def _pick(
+        self,
+        rows: IntArray,
+        residual: FloatArray,
+        count: int,
+        largest: float,
+        target: FloatArray,
+    ) -> bool:
+        """Run the Newton greedy on the pool's rows and append what it picks to the factor."""
+        features, normals = self._problem.features, self._rows.normals
+        basis, old = self._problem.basis, self._chosen
+
+        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
+            nodes = self._rows.nodes[index]
+            return features[:, nodes], None if normals is None else normals[index]
+
+        schur = matrix(basis, place(rows))
+        left = np.empty((0, len(rows)))
+        if len(old):
+            left = solve_triangular(
+                self._factor,
+                matrix(basis, place(old), place(rows)),
+                lower=True,
+                check_finite=False,
+            )
+            schur -= left.T @ left
+        floor = 0.0 if self._settings.pick != "block" else STALE * largest
+        floor = max(floor, self._settings.tolerance)
+        picked, basis_part = _newton(schur, residual, self._candidate[rows], (count, floor))
+        self._barred[rows[np.diag(schur) <= PIVOT_GUARD]] = True
+        if not len(picked):
+            return False
+        self._append(rows[picked], left[:, picked], basis_part[picked, : len(picked)], target)
+        return True
+
+    def _append(
+        self, rows: IntArray, left: FloatArray, corner: FloatArray, target: FloatArray
+    ) -> None:
+        """Append rows (L21, L22) to the factor, and their entries to L^-1 b."""
+        n, more = len(self._chosen), len(rows)
+        factor = np.zeros((n + more, n + more), order="F")
+        factor[:n, :n] = self._factor
+        factor[n:, :n] = left.T
+        factor[n:, n:] = corner
+        rest = target[rows] - left.T @ self._half
+        half = solve_triangular(corner, rest, lower=True, check_finite=False)
+        self._factor, self._half = factor, np.concatenate([self._half, half])
+        self._chosen = np.concatenate([self._chosen, rows])
+        self._barred[rows] = True
+
+    def _update_weights(self) -> None:
+        """Set controls and weights from this level and the settled ones."""
+        nodes, weights = self._own()
+        nodes = np.concatenate([self._settled[0], nodes])
+        weights = np.concatenate([self._settled[1], weights])
+        unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
+        total = np.zeros((len(unique), weights.shape[1]))
+        np.add.at(total, group, weights)
+        order = np.argsort(first)
+        self.controls, self.weights = unique[order], total[order]
+
+
+def _newton(
+    schur: FloatArray, residual: FloatArray, candidate: IntArray, limits: tuple[int, float]
+) -> tuple[IntArray, FloatArray]:
+    """Return the rows picked by the one-node Newton greedy, and the Newton basis (p, k).
+
+    Parameters
+    ----------
+    schur : (p, p)
+        What remains of the pool's matrix after the nodes chosen before.
+    residual : (p, m)
+    candidate : (p,)
+        The node of each row; all rows of a node are picked together.
+    limits
+        Number of nodes, and the error below which to stop (the first is always taken).
+    """
+    count, floor = limits
+    pivot = np.diag(schur).copy()
+    rest = residual.copy()
+    basis = np.zeros((len(schur), min(len(schur), count * 3)))
+    open_ = pivot > PIVOT_GUARD
+    picked: list[int] = []
+    names, group = np.unique(candidate, return_inverse=True)
+    for turn in range(count):
+        squares = np.where(open_, np.einsum("pm,pm->p", rest, rest), 0.0)
+        error = np.sqrt(np.bincount(group, squares, len(names)))
+        best = int(np.argmax(error))
+        if error[best] <= 0 or (turn and error[best] < floor):
+            break
+        for row in np.flatnonzero((group == best) & open_):
+            if pivot[row] <= PIVOT_GUARD:
+                continue
+            k = len(picked)
+            v = schur[:, row] - basis[:, :k] @ basis[row, :k]
+            v /= np.sqrt(pivot[row])
+            rest -= np.outer(v, rest[row] / np.sqrt(pivot[row]))
+            pivot -= v * v
+            basis[:, k] = v
+            picked.append(int(row))
+        open_ &= (group != best) & (pivot > PIVOT_GUARD)
+    return np.array(picked, np.int64), basis
