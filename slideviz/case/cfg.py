@@ -6,9 +6,10 @@ Everything that a file has wrong is reported at once. Paths in it are relative t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from slideviz.case.check import contradictions
 from slideviz.case.key import GROUPS, REDUCTION, ROLE_KEYS, Key
@@ -119,29 +120,49 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
             problems.append((entry.line, sentence))
     if not entries and not problems:
         raise CaseError(f"{path}: has no `KEY= value` line; `slideviz keys` lists the keys")
-    case, wrong, remarks = Case(), set[str](), []
+    case, values, remarks = Case(), dict[str, Any](), list[str]()
     for name, key in KEYS.items():
         if name not in rows:
             continue
         entry = rows[name]
         try:
-            case = _put(case, key, entry)
+            values[name] = _value(key, entry)
+            case = key.put(case, values[name])
         except CaseError as problem:
-            wrong.add(name)
+            values.pop(name, None)
             problems += [(entry.line, f"{name}: {line}") for line in str(problem).splitlines()]
         else:
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
+    problems += _second_roles(rows, values)
     for keys, sentence in contradictions(case):
-        if wrong.isdisjoint(keys):
+        # A key that could not be read is told already; what follows from it is not worth telling.
+        if all(key in values for key in keys if key in rows):
             problems.append((next(rows[key].line for key in keys if key in rows), sentence))
     return case, problems, tuple(remarks)
 
 
-def _put(case: Case, key: Key, entry: Entry) -> Case:
+def _value(key: Key, entry: Entry) -> Any:
     if not entry.value:
         raise CaseError(f"it has no value; needed is {key.kind.allowed}")
-    return key.put(case, key.kind.read(entry.value))
+    return key.kind.read(entry.value)
+
+
+def _second_roles(rows: Mapping[str, Entry], values: Mapping[str, Any]) -> list[Problem]:
+    """Return the markers that stand in two lists, at the later of their lines."""
+    problems: list[Problem] = []
+    first: dict[str, Entry] = {}
+    lists = [entry for key, entry in rows.items() if key in _ROLE_OF and key in values]
+    for entry in sorted(lists, key=lambda entry: entry.line):
+        for name in values[entry.key]:
+            other = first.setdefault(name, entry)
+            if other is not entry:
+                sentence = (
+                    f"{entry.key}: marker {name!r} is in {other.key} too, line {other.line}; "
+                    "a marker has one role: take it out of one of the lists"
+                )
+                problems.append((entry.line, sentence))
+    return problems
 
 
 def _text(case: Case, path: Path) -> str:

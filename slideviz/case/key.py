@@ -103,14 +103,6 @@ def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
     """Return the row of the list of the markers that have a role."""
 
     def put(case: Case, names: tuple[str, ...]) -> Case:
-        taken = [
-            f"marker {marker!r} is in {ROLE_KEYS[case.roles[marker]]} too; a marker has one "
-            "role: take it out of one of the lists"
-            for marker in names
-            if marker in case.roles
-        ]
-        if taken:
-            raise CaseError("\n".join(taken))
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})
 
     return Key(name, BOUNDARIES, kind, meaning, put, lambda case: case.markers_with(wanted) or None)

@@ -1,0 +1,286 @@
+"""Each key: what it means, what it allows, and how it is explained."""
+
+import pytest
+
+from slideviz.case.cfg import describe_keys, set_key
+from slideviz.case.key import GROUPS
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case, FromFile, Reduction, Translate
+from slideviz.errors import CaseError
+
+# MARKER_PERIODIC is not in the thesis's example file, but RBF-SliDe needs it.
+RBF_SLIDE = {
+    "MESH_FILENAME",
+    "MESH_OUT_FILENAME",
+    "DEFORMATION_FILENAME",
+    "GENERATE_QUALITY",
+    "MARKER_BDRY",
+    "MARKER_MOVING",
+    "MARKER_INTERNAL",
+    "MARKER_PERIODIC",
+    "PERIODIC_TYPE",
+    "PERIODIC_DIRECTION",
+    "CURVED",
+    "SLIDING_MODE",
+    "PERIODIC_MODE",
+    "STEPS",
+    "INFLUENCE_FACTOR",
+    "DATA_REDUCTION",
+    "DATA_RED_TOLERANCE",
+    "MULTILEVEL",
+    "MULTI_CRIT",
+    "LVL_TOL_CRIT",
+    "LVL_SIZE",
+    "DOUBLE_EDGE",
+    "GAMMA",
+}
+
+
+def test_which_keys_rbf_slide_has():
+    assert {name for name, key in KEYS.items() if key.rbf_slide} == RBF_SLIDE
+
+
+def test_reference_names_every_key_with_default_and_meaning():
+    text = describe_keys()
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 100
+    for key in KEYS.values():
+        assert key.group in GROUPS
+        mark = " " if key.rbf_slide else "+"
+        assert f"{mark} {key.name}= {key.kind.allowed}   [{key.default}]" in lines
+        assert key.meaning.endswith(".")
+        assert key.meaning in " ".join(text.split())
+    assert "(BLADE, translate, dx, dy[, dz])" in text
+
+
+@pytest.mark.parametrize("key", [k for k in KEYS.values() if k.default != "not set"])
+def test_defaults_in_the_reference_are_those_of_the_case(key):
+    base = Case(reduction=Reduction()) if key.name != "DATA_REDUCTION" else Case()
+    assert key.put(base, key.kind.read(key.default)) == base
+
+
+@pytest.mark.parametrize(
+    ("line", "field", "value"),
+    [
+        ("ZONE= 2", "zone", 2),
+        ("STEPS= +20", "steps", 20),
+        ("CURVED= true", "curved", True),
+        ("GENERATE_QUALITY= False", "generate_quality", False),
+        ("PERIODIC_TYPE= 1", "periodic_type", "rotational"),
+        ("PERIODIC_TYPE= Translational", "periodic_type", "translational"),
+        ("PERIODIC_MODE= Moving", "periodic", "moving"),
+        ("PERIODIC_AXIS= X", "axis", (1.0, 0.0, 0.0)),
+        ("PERIODIC_AXIS= (0, .5, -1e-1)", "axis", (0.0, 0.5, -0.1)),
+        ("PERIODIC_ORIGIN= 1 2 3", "origin", (1.0, 2.0, 3.0)),
+        ("PERIODIC_ORIGIN= (1, 2)", "origin", (1.0, 2.0, 0.0)),
+        ("FEATURE_ANGLE= 180", "feature_angle_deg", 180.0),
+        ("INFLUENCE_FACTOR= 1E+2", "influence_factor", 100.0),
+        ("QUALITY_METRIC= RBF-SliDe", "quality_metric", "rbf-slide"),
+        ("MESH_FILENAME= NONE", "mesh_file", None),
+    ],
+)
+def test_values(read, line, field, value):
+    assert getattr(read(line), field) == value
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("STEPS= 1.5", r"STEPS: '1.5' is not a whole number from 1"),
+        ("STEPS= -3", r"STEPS: -3 is too small; needed is a whole number from 1"),
+        ("ZONE= 0", r"ZONE: 0 is too small"),
+        ("STEPS= 99999999999", r"STEPS: '99999999999' is not a whole number"),
+        ("GAMMA= 2,5", r"GAMMA: '2,5' is not a number; write decimals with a point"),
+        ("GAMMA= nan", r"GAMMA: 'nan' is not a number"),
+        ("GAMMA= 1_0", r"GAMMA: '1_0' is not a number"),
+        ("GAMMA= 1e999", r"GAMMA: '1e999' is too large for a number; needed is a finite one"),
+        ("INFLUENCE_FACTOR= 0", r"INFLUENCE_FACTOR: 0 is out of range; needed is a number above 0"),
+        ("LVL_TOL_CRIT= 1", r"LVL_TOL_CRIT: 1 is out of range; .* above 0 and below 1"),
+        ("FEATURE_ANGLE= 181", r"FEATURE_ANGLE: 181 is out of range; .* above 0 up to 180"),
+        ("SLIDING_MODE= sp", r"SLIDING_MODE: 'sp' is not one of none \| ps \| ds"),
+        ("PERIODIC_MODE= fix", r"is not one of none \| .* moving; did you mean fixed\?"),
+        ("PERIODIC_TYPE= 2", r"'2' is not one of auto \| translational \| rotational"),
+        ("PERIODIC_AXIS= w", r"'w' is not an axis; write x, y, z or three numbers"),
+        ("PERIODIC_AXIS= (0, 0, 0)", r"the axis \(0, 0, 0\) has no direction"),
+        ("PERIODIC_AXIS= (1, a, 0)", r"PERIODIC_AXIS: 'a' is not a number"),
+        ("PERIODIC_ORIGIN= 1", r"the point has 1 values; needed are 2 or 3 numbers"),
+        ('MESH_FILENAME= "a" b', r"""'"a" b' is not one file name; write it as "name\""""),
+        ('MESH_FILENAME= ""', r"the file name is empty; give one, or NONE"),
+        ('MESH_FILENAME= "a', r"""the quotation mark in '"a' is not closed; close it"""),
+        ("MARKER_FIXED= (A, A)", r"MARKER_FIXED: marker 'A' is listed twice; list it once"),
+        ('MARKER_FIXED= ("")', r"a marker has an empty name; give one"),
+        ("MARKER_FIXED= (A", r"a bracket of '\(A' is missing; .* needs a backslash"),
+        ("MARKER_FIXED= (A), (B)", r"'\(A\), \(B\)' is not one list of names; write \( A, B \)"),
+        ("MARKER_PERIODIC= (A, B, 1, 2)", r"numbers stand among the names; write \( A, B \)"),
+    ],
+)
+def test_wrong_values(read, line, words):
+    with pytest.raises(CaseError, match=rf"a\.cfg:1: .*{words}"):
+        read(line)
+
+
+def test_settings_of_data_reduction_are_checked_even_without_it(read):
+    assert read("DATA_REDUCTION= NO\nGAMMA= 3").reduction is None
+    assert read("GAMMA= 3\nLVL_SIZE= 4\nDATA_REDUCTION= YES").reduction == Reduction(
+        gamma=3.0, level_size=4
+    )
+    with pytest.raises(CaseError, match="GAMMA: -1 is out of range"):
+        read("DATA_REDUCTION= NO\nGAMMA= -1")
+
+
+@pytest.mark.parametrize("text", ["( )", "()", "NONE", "( none )"])
+def test_empty_lists(read, text):
+    assert read(f"MARKER_INTERNAL= {text}").roles == {}
+
+
+@pytest.mark.parametrize("text", ["(A, B)", "( A B )", "A, B", "A B", "(A,B,)", '("A", B)'])
+def test_lists_with_commas_or_spaces(read, text):
+    assert read(f"MARKER_FIXED= {text}").roles == {"A": "fixed", "B": "fixed"}
+
+
+def test_names_between_quotes(read):
+    case = read('MARKER_FIXED= ( "tip #2, upper", "NONE", "5", "a""b", "x\\" )')
+    assert case.markers_with("fixed") == ("tip #2, upper", "NONE", "5", 'a"b', "x\\")
+
+
+def test_periodic_markers_as_su2_writes_them(read):
+    case = read(
+        "STEPS= 2\nMARKER_PERIODIC= (A, B, 0,0,0, 0,0,30.0, 0,0,0, C, D, 1,2,3,4,5,6,7,8,9)"
+    )
+    assert case.markers_with("periodic") == ("A", "B", "C", "D")
+    assert len(case.warnings) == 1
+    assert "a.cfg:2: MARKER_PERIODIC: the numbers after the names are not used" in case.warnings[0]
+
+
+def test_names_that_are_numbers(read):
+    case = read("MARKER_PERIODIC= (1, 2)\nMARKER_FIXED= (3 4)")
+    assert case.roles == {"1": "periodic", "2": "periodic", "3": "fixed", "4": "fixed"}
+    assert case.warnings == ()
+
+
+def test_a_marker_has_one_role(read):
+    with pytest.raises(CaseError) as caught:
+        read("MARKER_FIXED= (A, B, C)\nMARKER_MOVING= (A)\nMARKER_INTERNAL= (B)\nSTEPS= 1")
+    lines = [line.rpartition("a.cfg:")[2] for line in str(caught.value).splitlines()]
+    end = "a marker has one role: take it out of one of the lists"
+    assert lines == [
+        f"2: MARKER_MOVING: marker 'A' is in MARKER_FIXED too, line 1; {end}",
+        f"3: MARKER_INTERNAL: marker 'B' is in MARKER_FIXED too, line 1; {end}",
+    ]
+
+
+def test_markers_in_the_boundary_only_slide_wherever_the_line_stands(read):
+    case = read("MARKER_BDRY= (A, B, C, D)\nMARKER_MOVING= (B)\nMARKER_PERIODIC= (C, D)")
+    assert case.roles == {"A": "sliding", "B": "moving", "C": "periodic", "D": "periodic"}
+
+
+@pytest.mark.parametrize(
+    ("word", "given", "kind", "direction"),
+    [
+        ("0", "auto", "auto", 0),
+        ("x", "auto", "translational", 0),
+        ("Y", "0", "translational", 1),
+        ("z", "auto", "auto", 2),
+        ("z", "0", "translational", 2),
+        ("theta", "auto", "rotational", 1),
+        ("1", "1", "rotational", 1),
+    ],
+)
+def test_periodic_direction(read, word, given, kind, direction):
+    case = read(f"PERIODIC_DIRECTION= {word}\nPERIODIC_TYPE= {given}")
+    assert (case.direction, case.periodic_type) == (direction, kind)
+
+
+@pytest.mark.parametrize(
+    ("word", "given", "words"),
+    [
+        ("x", "1", "x is a direction of translational periodicity, and PERIODIC_TYPE= rotational"),
+        ("theta", "0", "theta is a direction of rotational periodicity, and PERIODIC_TYPE= tr"),
+        ("0", "1", r"rotational periodicity repeats in theta, not in r \(PERIODIC_DIRECTION= 0\)"),
+        ("2", "1", "repeats in theta, not in z .*; write theta, or PERIODIC_TYPE= translational"),
+        ("z", "1", "repeats in theta, not in z"),
+        ("r", "auto", "repeats in theta, not in r"),
+    ],
+)
+def test_wrong_periodic_direction(read, word, given, words):
+    with pytest.raises(CaseError, match=rf"a\.cfg:2: .*{words}"):
+        read(f"PERIODIC_TYPE= {given}\nPERIODIC_DIRECTION= {word}")
+
+
+def test_motion_of_a_marker_that_does_not_move(read):
+    match = r"a\.cfg:2: motion 2 names 'BLAD', which does not move; .*; did you mean BLADE\?"
+    with pytest.raises(CaseError, match=match):
+        read(
+            "MARKER_MOVING= (BLADE)\nMOTION= (BLADE, translate, 1, 0) ; (BLAD, scale, 2, centroid)"
+        )
+
+
+def test_no_follow_up_error_when_the_moving_markers_are_not_readable(read):
+    with pytest.raises(CaseError) as caught:
+        read("MARKER_MOVING= (BLADE\nMOTION= (BLADE, translate, 1, 0)")
+    assert "a bracket" in str(caught.value)
+    assert "does not move" not in str(caught.value)
+
+
+def test_overwriting_the_mesh_is_warned_of(read):
+    case = read("MESH_FILENAME= a.su2\nMESH_OUT_FILENAME= ./b/../a.su2")
+    assert len(case.warnings) == 1
+    assert "the undeformed mesh would be overwritten" in case.warnings[0]
+
+
+def test_windows_paths(read, tmp_path):
+    case = read('MESH_FILENAME= meshes\\fine\\wing 2.su2 \nDEFORMATION_FILENAME= "m\\d.txt"')
+    assert case.mesh_file == tmp_path / "meshes" / "fine" / "wing 2.su2"
+    assert case.motions == (FromFile(tmp_path / "m" / "d.txt"),)
+
+
+class TestSetKey:
+    def test_plain(self):
+        assert set_key(Case(), "steps", " 7 ") == Case(steps=7)
+
+    def test_a_list_replaces_the_list_and_takes_markers_from_others(self):
+        case = Case(roles={"A": "moving", "B": "fixed", "C": "sliding"})
+        changed = set_key(case, "MARKER_MOVING", "(B)")
+        assert changed.roles == {"B": "moving", "C": "sliding"}
+        assert set_key(case, "MARKER_MOVING", "( )").roles == {"B": "fixed", "C": "sliding"}
+
+    def test_boundary_leaves_other_roles(self):
+        case = set_key(Case(roles={"A": "moving"}), "MARKER_BDRY", "(A, B)")
+        assert case.roles == {"A": "moving", "B": "sliding"}
+
+    def test_motions_and_file(self):
+        case = Case(roles={"A": "moving"}, motions=(Translate("A", (1.0, 0.0)),))
+        case = set_key(case, "DEFORMATION_FILENAME", "d.txt")
+        assert [type(m) for m in case.motions] == [FromFile, Translate]
+        assert case.motions[0].path.as_posix() == "d.txt"
+        case = set_key(case, "MOTION", "(A, translate, 2, 0)")
+        assert case.motions[1:] == (Translate("A", (2.0, 0.0)),)
+        case = set_key(case, "DEFORMATION_FILENAME", "other.txt")
+        assert len(case.motions) == 2
+        case = set_key(case, "DEFORMATION_FILENAME", "NONE")
+        assert case.motions == (Translate("A", (2.0, 0.0)),)
+
+    def test_data_reduction_comes_and_goes_with_its_warning(self):
+        case = set_key(set_key(Case(warnings=("other",)), "DATA_REDUCTION", "YES"), "GAMMA", "3")
+        assert case.reduction == Reduction(gamma=3.0)
+        assert set_key(case, "DATA_REDUCTION", "YES").reduction == case.reduction
+        assert [text[:10] for text in case.warnings] == ["other", "DATA_REDUC"]
+        assert set_key(case, "DATA_REDUCTION", "NO") == Case(warnings=("other",))
+
+    def test_remark(self):
+        case = set_key(Case(), "MARKER_PERIODIC", "(A, B, 0,0,0, 0,0,0, 0,1,0)")
+        assert case.warnings[0].startswith("--set MARKER_PERIODIC=(A, B")
+
+    @pytest.mark.parametrize(
+        ("key", "value", "words"),
+        [
+            ("STEP", "1", "--set STEP=1: unknown key 'STEP'; did you mean STEPS?"),
+            ("STEPS", "0", "--set STEPS=0: 0 is too small; needed is a whole number from 1"),
+            ("GAMMA", "5", "--set GAMMA=5: it needs DATA_REDUCTION= YES; set that first"),
+            ("MOTION", "(A)", "--set MOTION=(A): motion 1: needed are a marker and one of"),
+        ],
+    )
+    def test_wrong(self, key, value, words):
+        with pytest.raises(CaseError) as caught:
+            set_key(Case(), key, value)
+        assert str(caught.value).startswith(words)
