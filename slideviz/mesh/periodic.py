@@ -168,6 +168,8 @@ def _match_kind(
         image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
     distance, partner = (np.asarray(found) for found in cKDTree(target).query(image))
     one_to_one = len(np.unique(partner)) == len(partner)
+    # Two parts of one straight side are shifts of each other, but share a node: no images.
+    one_to_one &= kind == "rotational" or not len(np.intersect1d(a, b))
     trivial = max(float(np.linalg.norm(vector)) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
     pair = Pair(
         *names,
@@ -191,37 +193,61 @@ def pair_up(
 ) -> tuple[Pair, ...]:
     """Return the pairs that the named markers form, whatever their order.
 
+    All have one transformation, or its inverse: where a marker matches several others (two
+    halves of a straight side), the partner is chosen so that they do.
+
     Raises
     ------
     MeshError
-        A marker has no partner, or two pairs have different periods.
+        A marker has no partner, or the pairs have different transformations.
     """
     if len(names) % 2 or not names:
         raise MeshError(
             f"{mesh.name}: {len(names)} periodic markers ({', '.join(names) or 'none'}); "
             "they come in pairs"
         )
-    rest, pairs = list(names), []
-    while rest:
-        first = rest.pop(0)
-        for second in rest:
+
+    def pairs_of(rest: Sequence[str], model: Pair | None) -> tuple[Pair, ...] | None:
+        """Return pairs of all the rest that agree with the model, or None."""
+        if not rest:
+            return ()
+        for second in rest[1:]:
             try:
-                pairs.append(match(mesh, first, second, kind, axis, origin))
-            except MeshError:
+                pair = match(mesh, rest[0], second, kind, axis, origin)
+            except MeshError as problem:
+                reasons.append(problem)
                 continue
-            rest.remove(second)
-            break
-        else:
-            match(mesh, first, rest[0], kind, axis, origin)  # raises, with the reason
-    for other in pairs[1:]:
-        same = other.kind == pairs[0].kind and np.isclose(other.period, pairs[0].period, rtol=1e-6)
-        if not same:
-            raise MeshError(
-                f"{mesh.name}: the periodic pairs {pairs[0].first!r}, {pairs[0].second!r} "
-                f"({pairs[0].describe()}) and {other.first!r}, {other.second!r} "
-                f"({other.describe()}) differ; one period is possible"
-            )
-    return tuple(pairs)
+            if model is not None and not _agree(model, pair):
+                reasons.append(_differ(mesh, model, pair))
+                continue
+            others = pairs_of([name for name in rest[1:] if name != second], model or pair)
+            if others is not None:
+                return (pair, *others)
+        return None
+
+    reasons: list[MeshError] = []
+    found = pairs_of(list(names), None)
+    if found is None:
+        raise next((r for r in reasons if "one period" in str(r)), reasons[0])
+    return found
+
+
+def _agree(one: Pair, other: Pair) -> bool:
+    """Tell whether two pairs have the same transformation or its inverse."""
+    if one.kind != other.kind:
+        return False
+    if one.kind == "rotational":
+        return abs(one.period - other.period) <= TOLERANCE * one.period
+    gaps = [np.linalg.norm(one.vector - sign * other.vector) for sign in (1, -1)]
+    return bool(min(gaps) <= TOLERANCE * one.period)
+
+
+def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
+    """Return the error for two pairs that have different transformations."""
+    return MeshError(
+        f"{mesh.name}: the periodic pairs {one.first!r}, {one.second!r} ({one.describe()}) and "
+        f"{other.first!r}, {other.second!r} ({other.describe()}) differ; one period is possible"
+    )
 
 
 def find_pairs(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Pair, ...]:

@@ -1,0 +1,320 @@
+"""Small meshes for tests, whose nodes, sides and names follow from index arithmetic alone.
+
+A mesh is made from cells in a parameter space (a grid), from rules that name each side there,
+and from a map to physical space. So a test can tell what every node is without the code under
+test.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, Marker, Mesh
+
+SIDE_TYPE = {2: {2: 3}, 3: {3: 5, 4: 9}}
+"""VTK identifier of a side by dimension of the mesh and number of nodes."""
+
+KUHN = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+"""A hexahedron as six tetrahedra around its diagonal; neighbours of a grid conform."""
+
+Rule = tuple[str, Callable[[np.ndarray], bool]]
+
+
+def box_rules(shape: Sequence[int]) -> list[Rule]:
+    """Name the sides of a grid x_m, x_p, y_m, ..., and everything else BLOCK."""
+    rules: list[Rule] = []
+    for axis, size in enumerate(shape):
+        for letter, end in (("m", 0), ("p", size)):
+            rules.append(
+                (f"{'xyz'[axis]}_{letter}", lambda p, a=axis, e=end: bool(np.all(p[:, a] == e)))
+            )
+    return [*rules, ("BLOCK", lambda p: True)]
+
+
+def make_mesh(
+    points: np.ndarray,
+    blocks: Sequence[tuple[int, np.ndarray]],
+    rules: Sequence[Rule],
+    params: np.ndarray | None = None,
+    name: str = "test mesh",
+) -> Mesh:
+    """Mesh of the cells; sides of one cell only get the name of the first rule they obey.
+
+    Nodes that no cell uses are removed. A rule sees the parameters (k, p) of a side's nodes; a
+    side that obeys no rule belongs to no marker.
+    """
+    params = points if params is None else params
+    seen: dict[tuple[int, ...], list[tuple[int, ...]]] = defaultdict(list)
+    for vtk, table in blocks:
+        for nodes in np.asarray(table):
+            for local in ELEMENTS[vtk].facets:
+                side = tuple(int(nodes[k]) for k in local)
+                seen[tuple(sorted(side))].append(side)
+    found: dict[str, list[tuple[int, ...]]] = {rule[0]: [] for rule in rules}
+    for sides in seen.values():
+        if len(sides) == 1:
+            at = params[list(sides[0])]
+            named = next((n for n, obeys in rules if obeys(at)), None)
+            if named is not None:
+                found[named].append(sides[0])
+    used = np.unique(np.concatenate([np.ravel(t) for _, t in blocks]))
+    new = np.full(len(points), -1)
+    new[used] = np.arange(len(used))
+    dim = points.shape[1]
+    markers = []
+    for label, sides in found.items():
+        if sides:
+            by_size = defaultdict(list)
+            for side in sides:
+                by_size[SIDE_TYPE[dim][len(side)]].append([new[k] for k in side])
+            markers.append(Marker(label, Cells.from_blocks(by_size.items())))
+    cells = Cells.from_blocks([(vtk, new[np.asarray(t)]) for vtk, t in blocks])
+    return Mesh(points[used], cells, tuple(markers), name=name)
+
+
+def grid(
+    shape: Sequence[int],
+    hole: Sequence[tuple[int, int]] | None = None,
+    kind: str = "plain",
+    place: Callable[[np.ndarray], np.ndarray] | None = None,
+    rules: Sequence[Rule] | None = None,
+    wrap: int | None = None,
+) -> Mesh:
+    """Structured mesh of ``shape`` cells, without the cells of ``hole``.
+
+    ``kind``: plain (quadrilaterals, hexahedra), simplex (triangles, tetrahedra), prism, mixed.
+    ``place`` maps indices (n, d) to points; default is the unit box. ``wrap`` joins the last
+    layer of that axis to the first (an annulus).
+    """
+    dim = len(shape)
+    sizes = [s if a == wrap else s + 1 for a, s in enumerate(shape)]
+    index = np.stack(np.meshgrid(*[np.arange(s) for s in sizes], indexing="ij"), -1)
+    index = index.reshape(-1, dim)
+    number = np.arange(len(index)).reshape(sizes)
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    if dim == 3:
+        corners = [(*c, k) for k in (0, 1) for c in corners]
+    cells, where = [], []
+    for cell in np.ndindex(*shape):
+        inside = hole and all(lo <= c < hi for c, (lo, hi) in zip(cell, hole, strict=True))
+        if inside:
+            continue
+        at = [
+            tuple((c + s) % m for c, s, m in zip(cell, step, sizes, strict=True))
+            for step in corners
+        ]
+        cells.append([number[a] for a in at])
+        where.append(cell)
+    cells, where = np.array(cells), np.array(where)
+    extra, blocks = _split(cells, where, kind, dim, len(index))
+    params = np.concatenate([index.astype(float), *[index[c].mean(0)[None] for c in extra]])
+    mapped = place or (lambda p: p / np.array(shape, float))
+    return make_mesh(mapped(params), blocks, rules or box_rules(shape), params, f"{kind} {dim}D")
+
+
+def _split(cells, where, kind, dim, count):
+    """Cells with middle nodes, and blocks of element types."""
+    if kind == "plain":
+        return [], [(9 if dim == 2 else 12, cells)]
+    if dim == 2:
+        cut = np.ones(len(cells), bool) if kind == "simplex" else where.sum(axis=1) % 2 == 0
+        triangles = np.concatenate([cells[cut][:, [0, 1, 2]], cells[cut][:, [0, 2, 3]]])
+        return [], [(t, c) for t, c in ((5, triangles), (9, cells[~cut])) if len(c)]
+    if kind == "simplex":
+        return [], [(10, np.concatenate([cells[:, list(t)] for t in KUHN]))]
+    part = np.ones(len(cells), int) if kind == "prism" else where[:, 0] % 3
+    prisms = cells[part == 1]
+    blocks = [(12, cells[part == 0])]
+    blocks.append(
+        (13, np.concatenate([prisms[:, [0, 1, 2, 4, 5, 6]], prisms[:, [0, 2, 3, 4, 6, 7]]]))
+    )
+    split = cells[part == 2]
+    pyramids = [
+        [cell[k] for k in reversed(side)] + [count + i]
+        for i, cell in enumerate(split)
+        for side in ELEMENTS[12].facets
+    ]
+    if pyramids:
+        blocks.append((14, np.array(pyramids)))
+    return list(split), [(t, c) for t, c in blocks if len(c)]
+
+
+def square(n: int = 10, kind: str = "plain", block: bool = True) -> Mesh:
+    """Unit square of n cells a side with a block of 2 x 2 cells (n even) in the middle."""
+    h = n // 2
+    return grid((n, n), [(h - 1, h + 1)] * 2 if block else None, kind)
+
+
+def cube(n: int = 6, kind: str = "plain", block: bool = True) -> Mesh:
+    """Unit cube of n cells a side with a block of 2 x 2 x 2 cells in the middle."""
+    h = n // 2
+    return grid((n, n, n), [(h - 1, h + 1)] * 3 if block else None, kind)
+
+
+def ring(shape, low=0.5, high=1.0, angle_deg=30.0, start_deg=0.0):
+    """Map of indices to (r, theta[, z]), as Cartesian points about z."""
+
+    def place(p: np.ndarray) -> np.ndarray:
+        r = low + (high - low) * p[:, 0] / shape[0]
+        t = np.radians(start_deg + angle_deg * p[:, 1] / shape[1])
+        columns = [r * np.cos(t), r * np.sin(t)]
+        if p.shape[1] == 3:
+            columns.append(p[:, 2] / shape[2])
+        return np.stack(columns, axis=1)
+
+    return place
+
+
+def sector(n: int = 8, angle_deg: float = 30.0, low: float = 0.5, start_deg: float = 0.0) -> Mesh:
+    """2D sector: inner, outer, per1, per2, and a block of 2 x 2 cells."""
+    shape, h = (n, n), n // 2
+    return grid(
+        shape,
+        [(h - 1, h + 1)] * 2,
+        place=ring(shape, low, 1.0, angle_deg, start_deg),
+        rules=_renamed(shape, ("inner", "outer", "per1", "per2")),
+    )
+
+
+def passage(shape=(4, 6, 8), angle_deg: float = 30.0, kind: str = "plain") -> Mesh:
+    """Annular sector with hub, shroud, per1, per2, inflow, outflow and a blade between them."""
+    j, k = shape[1] // 2, shape[2] // 2
+    return grid(
+        shape,
+        [(0, shape[0]), (j - 1, j + 1), (k - 1, k + 1)],
+        kind,
+        place=ring(shape, angle_deg=angle_deg),
+        rules=[
+            *_renamed(shape, ("hub", "shroud", "per1", "per2", "inflow", "outflow"))[:-1],
+            ("blade", lambda p: True),
+        ],
+    )
+
+
+def _renamed(shape, names) -> list[Rule]:
+    rules = box_rules(shape)
+    return [*((n, r[1]) for n, r in zip(names, rules, strict=False)), rules[-1]]
+
+
+def annulus(n: int = 24, layers: int = 5, far_parts: int = 1) -> Mesh:
+    """Full ring: ``wall`` at r = 0.5, and the far field at r = 2 as ``far0``, ``far1``, ..."""
+    shape = (layers, n)
+
+    def part(p: np.ndarray, k: int) -> bool:
+        if not np.all(p[:, 0] == layers):
+            return False
+        first = p[:, 1].min() if np.ptp(p[:, 1]) == 1 else p[:, 1].max()
+        return int(first * far_parts // n) == k
+
+    rules: list[Rule] = [("wall", lambda p: bool(np.all(p[:, 0] == 0)))]
+    rules += [(f"far{k}", lambda p, k=k: part(p, k)) for k in range(far_parts)]
+    return grid(shape, place=ring(shape, 0.5, 2.0, 360.0), rules=rules, wrap=1)
+
+
+def airfoil(n: int = 40, layers: int = 8, first: float = 0.05) -> Mesh:
+    """O-grid around a symmetric profile with a sharp trailing edge, one closed marker."""
+    shape = (layers, n)
+
+    def place(p: np.ndarray) -> np.ndarray:
+        t = 2 * np.pi * p[:, 1] / n
+        x = 0.5 * (1 + np.cos(t))
+        half = 0.6 * (
+            0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4
+        )
+        profile = np.stack([x, half * np.sign(np.sin(t)) * (np.abs(np.sin(t)) > 1e-9)], axis=1)
+        far = np.array([0.5, 0.0]) + 3 * np.stack([np.cos(t), np.sin(t)], axis=1)
+        s = p[:, 0] / layers
+        s = (first * s + (1 - first) * s**2)[:, None]
+        return (1 - s) * profile + s * far
+
+    return grid(
+        shape,
+        place=place,
+        rules=[("airfoil", lambda p: bool(np.all(p[:, 0] == 0))), ("far", lambda p: True)],
+        wrap=1,
+    )
+
+
+def sphere_in_box(n: int = 4, layers: int = 3) -> Mesh:
+    """Hexahedra between a sphere of radius 0.4 (``sphere``) and a cube of side 2 (six sides)."""
+    lattice = np.stack(np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    outer = lattice[np.any((lattice == 0) | (lattice == n), axis=1)]
+    number = {tuple(p): i for i, p in enumerate(outer)}
+    quads = []
+    for axis in range(3):
+        for end in (0, n):
+            for a, b in np.ndindex(n, n):
+                ring_ = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)]
+                quads.append([number[tuple(np.insert(q, axis, end))] for q in ring_])
+    quads = np.array(quads)
+    on_cube = 2 * outer / n - 1.0
+    normal = on_cube / np.linalg.norm(on_cube, axis=1)[:, None]
+    count = len(outer)
+    s = np.linspace(0, 1, layers + 1)
+    points = np.concatenate([(1 - t) * 0.4 * normal + t * on_cube for t in s])
+    cells = np.concatenate(
+        [np.hstack([quads + k * count, quads + (k + 1) * count]) for k in range(layers)]
+    )
+    # A hexahedron whose base looks away from its top is turned.
+    for cell in cells:
+        a, b, d, e = points[cell[[0, 1, 3, 4]]]
+        if np.dot(np.cross(b - a, d - a), e - a) < 0:
+            cell[:] = cell[[0, 3, 2, 1, 4, 7, 6, 5]]
+    rules: list[Rule] = [
+        (f"{'xyz'[a]}_{w}", lambda p, a=a, e=e: bool(np.allclose(p[:, a], e)))
+        for a in range(3)
+        for w, e in (("m", -1.0), ("p", 1.0))
+    ]
+    return make_mesh(points, [(12, cells)], [*rules, ("sphere", lambda p: True)])
+
+
+def plate(n: int = 8) -> Mesh:
+    """Square with a thin plate: a slit whose two faces are markers with nodes of their own.
+
+    The tips are shared. Slit: y = 1/2, x from 1/4 to 3/4 (n a multiple of 4).
+    """
+    base = square(n, block=False)
+    x, y = (base.points * n).round().astype(int).T
+    slit = np.flatnonzero((y == n // 2) & (x > n // 4) & (x < 3 * n // 4))
+    twin = np.full(len(base.points), -1)
+    twin[slit] = len(base.points) + np.arange(len(slit))
+    cells = np.array(base.cells.by_type[9][1])
+    above = base.points[cells].mean(axis=1)[:, 1] > 0.5
+    cells[above] = np.where(twin[cells[above]] >= 0, twin[cells[above]], cells[above])
+    points = np.concatenate([base.points, base.points[slit]])
+    row = np.flatnonzero((y == n // 2) & (x >= n // 4) & (x <= 3 * n // 4))
+    row = row[np.argsort(x[row])]
+    top = np.where(twin[row] >= 0, twin[row], row)
+    slits = [
+        Marker(label, Cells.from_blocks([(3, np.stack([line[:-1], line[1:]], axis=1))]))
+        for label, line in (("below", row), ("above", top))
+    ]
+    return Mesh(points, Cells.from_blocks([(9, cells)]), (*base.markers, *slits), name="plate")
+
+
+def layered(n: int = 12, first: float = 1e-6) -> Mesh:
+    """Square whose cells shrink geometrically to ``first`` at y = 0 (a boundary layer)."""
+    ratio = (1.0 / first) ** (1.0 / (n - 1))
+    heights = first * ratio ** np.arange(n)
+    y = np.r_[0.0, np.cumsum(heights)]
+
+    def place(p: np.ndarray) -> np.ndarray:
+        return np.stack([p[:, 0] / n, y[p[:, 1].astype(int)] / y[-1]], axis=1)
+
+    return grid((n, n), place=place)
+
+
+def permuted(mesh: Mesh, order: np.ndarray) -> Mesh:
+    """The same mesh with node ``order[i]`` of the old one as node i."""
+    new = np.empty(len(order), np.int64)
+    new[order] = np.arange(len(order))
+    markers = tuple(
+        Marker(m.name, Cells.from_types(m.cells.types, new[m.cells.connectivity]))
+        for m in mesh.markers
+    )
+    cells = Cells.from_types(mesh.cells.types, new[mesh.cells.connectivity])
+    return Mesh(mesh.points[order], cells, markers, name=mesh.name)
