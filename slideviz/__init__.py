@@ -12,7 +12,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.deform import Step, deform
+    from slideviz.staircase import Step, deform
     from slideviz.errors import SlidevizError
     from slideviz.mesh.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
@@ -25,8 +25,8 @@ _HOME = {
     "Mesh": "mesh.model",
     "Quality": "mesh.quality",
     "SlidevizError": "errors",
-    "Step": "deform",
-    "deform": "deform",
+    "Step": "staircase",
+    "deform": "staircase",
     "quality": "mesh.quality",
     "read": "mesh.files",
     "write": "mesh.files",

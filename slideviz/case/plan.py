@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -192,10 +193,13 @@ def _reduction(case: Case) -> Reduction | None:
     given = case.reduction
     if given is None:
         return None
+    level: Literal["none", "size", "ratio"] = "none"
+    if given.multilevel:
+        level = "size" if given.criterion == "size" else "ratio"
     return Reduction(
         tolerance=given.tolerance,
         pick="double" if given.double_edge else "one",
-        level={"size": "size", "tol": "ratio"}[given.criterion] if given.multilevel else "none",
+        level=level,
         level_size=given.level_size,
         level_ratio=given.level_tolerance,
         gamma=given.gamma,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.deform import Step
+    from slideviz.staircase import Step
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
 
@@ -54,8 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    data = {"size-skew": found.values, "size": found.size, "skew": found.skew}
-    write(output, last.mesh, overwrite=arguments.force, cell_data=data)
+    write(output, last.mesh, overwrite=arguments.force, cell_data=_cell_data(output, found))
     if case.generate_quality:
         _write_qualities(output.with_name(output.stem + "_qual.txt"), found)
     seconds["write"] += time.perf_counter()
@@ -136,6 +135,13 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     return steps
 
 
+def _cell_data(path: Path, found: Quality) -> dict | None:
+    """Return the qualities for formats that hold cell data, None for the others."""
+    if path.suffix.lower() not in (".vtu", ".vtk", ".xdmf"):
+        return None
+    return {"size-skew": found.values, "size": found.size, "skew": found.skew}
+
+
 def _write_qualities(path: Path, found: Quality) -> None:
     """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
     from slideviz.errors import CaseError
@@ -181,7 +187,7 @@ def info(arguments: argparse.Namespace) -> int:
     from slideviz import quality, read
     from slideviz.cli import DONE
     from slideviz.cli.report import info_report, save_json, table
-    from slideviz.mesh.files import unused_nodes
+    from slideviz.mesh.check import unused_nodes
     from slideviz.mesh.periodic import find_pairs
 
     mesh = read(arguments.mesh, zone=arguments.zone)
@@ -228,8 +234,7 @@ def quality(arguments: argparse.Namespace) -> int:
     if arguments.output and arguments.output.suffix.lower() == ".csv":
         _write_csv(arguments.output, found)
     elif arguments.output:
-        data = {"size-skew": found.values, "size": found.size, "skew": found.skew}
-        write(arguments.output, mesh, cell_data=data)
+        write(arguments.output, mesh, cell_data=_cell_data(arguments.output, found))
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")

@@ -6,7 +6,7 @@ import sys
 import time
 from types import TracebackType
 
-from slideviz.deform import Progress
+from slideviz.staircase import Progress
 
 _PHASES = {
     "classify": "sorting nodes",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deform import Step
+from slideviz.staircase import Step
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.problem import Cycle, Problem, Rows, Watch
 from slideviz.rbf.solve import factorise
@@ -27,6 +27,9 @@ class ExactFit:
         self._problem, self._watch = problem, watch
         self._rows: Rows | None = None
         self.history: tuple[Cycle, ...] = ()
+        self.controls: IntArray = np.empty(0, np.int64)
+        self.weights: FloatArray = np.empty((0, problem.values.shape[1]))
+        self.dropped: IntArray = np.empty(0, np.int64)
 
     def add(self, rows: Rows) -> None:
         """Solve with these rows and all before them."""
@@ -46,5 +49,5 @@ class ExactFit:
         self.controls, self.weights = rows.nodes, weights
         if rows.normals is not None:
             self.controls, group = np.unique(rows.nodes, return_inverse=True)
-            self.weights: FloatArray = np.zeros((len(self.controls), rows.normals.shape[1]))
+            self.weights = np.zeros((len(self.controls), rows.normals.shape[1]))
             np.add.at(self.weights, group, weights * rows.normals)

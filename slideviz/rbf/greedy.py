@@ -22,7 +22,7 @@ from scipy.linalg import solve_triangular
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import evaluate, matrix
-from slideviz.rbf.problem import Cycle, Problem, Reduction, Rows, Watch
+from slideviz.rbf.problem import Cycle, Problem, Rows, Watch
 from slideviz.rbf.solve import PIVOT_GUARD
 
 POOL = 1024
@@ -135,7 +135,7 @@ class GreedyFit:
         if self._settings.level == "size":
             count = len(np.unique(self._candidate[self._chosen]))
             return count >= self._settings.level_size
-        return self._settings.level == "ratio" and 0 < len(self._chosen) and errors.max() < goal
+        return self._settings.level == "ratio" and len(self._chosen) > 0 and errors.max() < goal
 
     def _full(self) -> bool:
         limit = self._settings.max_nodes
@@ -262,7 +262,7 @@ class GreedyFit:
             return features[:, nodes], None if normals is None else normals[index]
 
         schur = matrix(basis, place(rows))
-        left = np.empty((0, len(rows)))
+        left: FloatArray = np.empty((0, len(rows)))
         if len(old):
             left = solve_triangular(
                 self._factor,
