@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, IntArray, Mesh
+
+
+def printable(path: str | Path) -> str:
+    """Return a path as it can stand in a message, even when its name is no text."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
+def path_error(path: Path, message: str) -> MeshError:
+    """Return the error ``path: message``."""
+    return MeshError(f"{printable(path)}: {message}")
 
 
 def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import stat
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.check import path_error
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.su2 import read_su2
 from slideviz.mesh.su2_scan import Progress
@@ -20,6 +22,8 @@ _READ_BYTES = 1 << 24
 _READING = 0.1
 """Fraction of the time for reading that getting the bytes takes."""
 _SNIFFED_BYTES = 1 << 16
+_UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
+_NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
 def read(path: str | Path, zone: int | None = None, progress: Progress | None = None) -> Mesh:
@@ -44,47 +48,66 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
     try:
         if _is_su2(path):
             data = _read_bytes(path, tick)
-            return read_su2(path, data, zone, lambda f: tick(_READING + (1 - _READING) * f))
+            return read_su2(path, data, zone, lambda done: tick(_READING + (1 - _READING) * done))
         if zone not in (None, 1):
-            raise MeshError(
-                f"{path}: there is no zone {zone}, for only SU2 files have zones; leave it out"
+            raise path_error(
+                path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
             )
         from slideviz.mesh.foreign import read_foreign
 
         return read_foreign(path, tick)
-    except OSError as problem:
-        raise MeshError(f"{path}: cannot be read: {_reason(problem)}") from problem
     except MemoryError as problem:
-        raise MeshError(
-            f"{path}: there is not enough memory to read it; use a machine with more"
+        raise path_error(
+            path, "there is not enough memory to read it; use a machine with more"
         ) from problem
 
 
 def _is_su2(path: Path) -> bool:
     """Tell whether it is an SU2 file, by ending or, where that says nothing, by content."""
-    if not path.exists():
-        raise MeshError(f"{path}: there is no such file; check the name and the folder")
-    if path.is_dir():
-        raise MeshError(f"{path}: this is a folder; choose a mesh file in it")
-    if not path.is_file():
-        raise MeshError(f"{path}: this is a device or pipe; choose an ordinary file")
-    if path.suffix.lower() == ".su2":
-        return True
-    if path.suffix.lower() not in ("", ".txt", ".dat", ".mesh", ".grid"):
-        return False
-    with path.open("rb") as file:
-        return re.search(rb"^\s*NDIME\s*=", file.read(_SNIFFED_BYTES), re.I | re.M) is not None
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise path_error(path, "this is a folder; choose a mesh file in it")
+        if not stat.S_ISREG(mode):
+            raise path_error(path, "this is a device or pipe; choose an ordinary file")
+        if path.suffix.lower() not in _UNSURE:
+            return path.suffix.lower() == ".su2"
+        with path.open("rb") as file:
+            return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None
+    except (OSError, ValueError) as problem:
+        raise _unreadable(path, problem) from problem
 
 
 def _read_bytes(path: Path, progress: Progress) -> bytes:
     """Return the content, block by block so that it can be stopped."""
-    size = max(path.stat().st_size, 1)
-    blocks = []
-    with path.open("rb") as file:
-        while block := file.read(_READ_BYTES):
-            blocks.append(block)
-            progress(_READING * min(file.tell() / size, 1.0))
+    blocks, done = [], 0
+    for size, block in _blocks(path):
+        blocks.append(block)
+        done += len(block)
+        progress(_READING * min(done / size, 1.0))
     return b"".join(blocks)
+
+
+def _blocks(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield the size of the file and a block of it, again and again."""
+    try:
+        with path.open("rb") as file:
+            size = max(path.stat().st_size, 1)
+            while block := file.read(_READ_BYTES):
+                yield size, block
+    except OSError as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def _unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
+    """Return the error for a file that the system does not give."""
+    if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
+        return path_error(path, "there is no such file; check the name and the folder")
+    if isinstance(problem, PermissionError):
+        remedy = "no permission; change its permissions or copy it to another folder"
+    else:
+        remedy = f"{problem.strerror or problem}; check the disk, or copy the file elsewhere"
+    return path_error(path, f"cannot be read: {remedy}")
 
 
 def write(
@@ -113,9 +136,10 @@ def write(
     """
     path = Path(path)
     if not overwrite and _is_source(path, mesh):
-        raise MeshError(
-            f"{path}: this is the file that the mesh was read from; choose another name, or ask "
-            "for overwriting"
+        raise path_error(
+            path,
+            "this is the file that the mesh was read from; choose another name, or ask "
+            "for overwriting",
         )
     values = _checked(mesh, cell_data or {})
     if path.suffix.lower() != ".su2":
@@ -124,9 +148,8 @@ def write(
         write_foreign(path, mesh, values)
         return
     if values:
-        raise MeshError(
-            f"{path}: an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu "
-            "file"
+        raise path_error(
+            path, f"an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu file"
         )
     with atomic_write(path) as file:
         for block in su2_blocks(mesh):
@@ -151,9 +174,3 @@ def _checked(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArra
                 "cells; give one value or one row for each cell"
             )
     return values
-
-
-def _reason(problem: OSError) -> str:
-    if isinstance(problem, PermissionError):
-        return "no permission; change its permissions or copy it to another folder"
-    return f"{problem.strerror or problem}; check the disk or copy the file to another folder"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from slideviz.mesh.check import printable
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
 from slideviz.mesh.su2_numbers import parse_cells, parse_points
 from slideviz.mesh.su2_scan import Lines, Progress, scan
@@ -68,7 +69,7 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
     MeshError
         The file has a mistake; the message has the line.
     """
-    lines = scan(data, str(path), lambda done: progress(_SCANNED * done))
+    lines = scan(data, printable(path), lambda done: progress(_SCANNED * done))
     sections = find_sections(lines)
     found = find_zone(lines, sections, find_bounds(lines, sections, zone))
     sizes = [len(found.elements), len(found.points), *(len(m.rows) for m in found.markers)]
@@ -97,7 +98,7 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
         cells=cells,
         markers=markers,
         document=document,
-        name=path.name,
+        name=printable(path.name),
         zone=found.bounds.number,
         zones=found.bounds.zones,
         source=path.resolve(),

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from slideviz.mesh.model import IntArray
+from slideviz.mesh.su2_rows import Rows
 from slideviz.mesh.su2_scan import Lines, show
 from slideviz.mesh.su2_sections import KNOWN, Bounds, Section, count_of
 
@@ -77,8 +76,7 @@ class _Walk:
         self.lines = lines
         self.sections = sections
         self.bounds = bounds
-        self.data_lines = np.flatnonzero(lines.numeric)
-        self.text_lines = np.flatnonzero(~lines.numeric & (lines.words > 0))
+        self.rows = Rows(lines)
 
     def zone(self) -> Zone:
         """Return where the parts stand."""
@@ -88,15 +86,15 @@ class _Walk:
             raise self.lines.error(
                 heads["NDIME"].line, f"NDIME= {dim} is not possible; write 2 or 3"
             )
-        self._no_data(heads["NDIME"])
-        elements = self._rows(heads["NELEM"], "elements")
-        points = self._rows(heads["NPOIN"], "points")
+        self.rows.none(heads["NDIME"])
+        elements = self.rows.counted(heads["NELEM"], "elements")
+        points = self.rows.counted(heads["NPOIN"], "points")
         for key, rows in (("NELEM", elements), ("NPOIN", points)):
             if not len(rows):
                 raise self.lines.error(
                     heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
                 )
-        self._no_data(heads["NMARK"])
+        self.rows.none(heads["NMARK"])
         markers, sends, kept = self._walk()
         self._check_markers(heads["NMARK"], markers, len(sends))
         return Zone(self.bounds, dim, elements, points, markers, sends, kept)
@@ -119,51 +117,6 @@ class _Walk:
             )
         return found[0]
 
-    def _numbers(self, section: Section) -> IntArray:
-        """Return the numeric lines of a section."""
-        i, j = np.searchsorted(self.data_lines, [section.line, section.stop])
-        return self.data_lines[i:j]
-
-    def _no_data(self, section: Section) -> None:
-        rows = self._numbers(section)
-        if len(rows):
-            raise self.lines.error(
-                int(rows[0]),
-                f"numbers stand here after {section.key}= {show(section.value)}, where none "
-                "belong; remove the line or restore the keyword before it",
-            )
-
-    def _rows(self, section: Section, what: str) -> IntArray:
-        """Return the lines of a counted section, which must be as many as it says."""
-        count = count_of(self.lines, section)
-        rows = self._numbers(section)
-        texts = self.text_lines[
-            np.searchsorted(self.text_lines, section.line, "right") : np.searchsorted(
-                self.text_lines, section.stop
-            )
-        ]
-        last = rows[count - 1] if 0 < count <= len(rows) else section.line
-        if len(texts) and (len(rows) < count or texts[0] < last):
-            word = self.lines.line(int(texts[0])).split()[0]
-            raise self.lines.error(
-                int(texts[0]),
-                f"{show(word)!r} stands where one of the {count} {what} should be ({section.key} "
-                f"on line {section.line + 1}); correct it",
-            )
-        if len(rows) < count:
-            raise self.lines.error(
-                min(section.stop, len(self.lines) - 1),
-                f"only {len(rows)} {what} precede this line, but {section.key}= {count} (line "
-                f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
-            )
-        if len(rows) > count:
-            raise self.lines.error(
-                int(rows[count]),
-                f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
-                f"says: {len(rows)}; correct the count",
-            )
-        return rows
-
     def _walk(self) -> tuple[tuple[MarkerRows, ...], Ranges, Ranges]:
         """Return the boundaries, and the bounds of SEND_RECEIVE and of unknown sections."""
         markers, sends, kept = [], [], []
@@ -174,7 +127,7 @@ class _Walk:
             if section.key == "MARKER_TAG":
                 name = self._name(section)
                 head, at = self._marker_head(section, at, name == SEND_RECEIVE)
-                rows = self._rows(head, f"elements of marker {name}")
+                rows = self.rows.counted(head, f"elements of marker {name}")
                 if name == SEND_RECEIVE:
                     sends.append((section.line, head.stop))
                 else:
@@ -189,7 +142,7 @@ class _Walk:
 
     def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, int]:
         """Return the MARKER_ELEMS section of a marker, and the place after it."""
-        self._no_data(tag)
+        self.rows.none(tag)
         following = self.sections[at] if at < len(self.sections) else None
         if following is None or following.key != "MARKER_ELEMS":
             raise self.lines.error(
@@ -200,7 +153,7 @@ class _Walk:
         at += 1
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
             # The elements stand after this line, which belongs to the marker.
-            self._no_data(following)
+            self.rows.none(following)
             stop = self.sections[at].stop
             following = Section(following.key, following.value, self.sections[at].line, stop)
             at += 1

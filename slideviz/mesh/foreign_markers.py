@@ -1,0 +1,155 @@
+"""The named boundaries of a mesh that meshio read, whatever way its format names them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
+from slideviz.mesh.outer import outer_facets, smooth_parts
+
+if TYPE_CHECKING:
+    import meshio
+
+Groups = dict[str, list[tuple[int, IntArray]]]
+
+# The numbers that formats put on cells, the telling ones first, and how to name a nameless one.
+_TAGS = {
+    "marker": "marker",
+    "gmsh:physical": "physical",
+    "cell_tags": "family",
+    "medit:ref": "ref",
+    "ugrid:ref": "ref",
+    "nastran:ref": "ref",
+    "netgen:index": "index",
+    "gmsh:geometrical": "geometrical",
+}
+# Here 0 means that the element is in no group.
+_ZERO_IS_NONE = ("marker", "gmsh:physical", "cell_tags")
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Elements of one type: where in meshio's list, VTK identifier, nodes (m, n)."""
+
+    index: int
+    vtk: int
+    nodes: IntArray
+
+
+def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> tuple[Marker, ...]:
+    """Return the boundaries of a mesh.
+
+    Looked for, in this order: named sets of boundary elements, numbers on boundary elements
+    (with names where the file has them), named sets of points. Where there is nothing of these
+    the outer surface is divided at its edges.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Points and cells.
+    data : meshio.Mesh
+        What meshio read.
+    sides : sequence of Block
+        Its elements of one dimension less than the mesh.
+    """
+    groups = _by_cell_sets(data, sides) or _by_tags(mesh, data, sides)
+    if groups:
+        return tuple(Marker(name, Cells.from_blocks(parts)) for name, parts in groups.items())
+    facets = outer_facets(mesh)
+    return _by_point_sets(mesh, data, facets) or smooth_parts(mesh, facets)
+
+
+def _by_cell_sets(data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
+    """Return the elements in each named set of cells."""
+    groups: Groups = {}
+    for name, members in data.cell_sets.items():
+        if name.startswith("gmsh:"):
+            continue
+        for block in sides:
+            # Some readers leave out the blocks at the end, or put None for an empty set.
+            chosen = members[block.index] if block.index < len(members) else None
+            if chosen is not None and len(chosen):
+                _add(groups, name, block.vtk, block.nodes[np.asarray(chosen, np.int64)])
+    return groups
+
+
+def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
+    """Return the elements with each number of the first cell data that has any."""
+    others = [key for key in data.cell_data if key not in _TAGS]
+    for key in [*_TAGS, *others]:
+        values = _numbers(data, key, sides)
+        if values is None:
+            continue
+        names = _names(data, mesh.dim - 1) if key in _TAGS else {}
+        groups: Groups = {}
+        # By size, for MED counts downward from -1.
+        for number in sorted(np.unique(np.concatenate(values)).tolist(), key=abs):
+            if number == 0 and key in _ZERO_IS_NONE and 0 not in names:
+                continue
+            for name in names.get(number, [f"{_TAGS.get(key, key)}_{number}"]):
+                for block, numbers in zip(sides, values, strict=True):
+                    _add(groups, name, block.vtk, block.nodes[numbers == number])
+        if groups:
+            return groups
+    return {}
+
+
+def _numbers(data: meshio.Mesh, key: str, sides: Sequence[Block]) -> list[NDArray] | None:
+    """Return the whole numbers on each block of boundary elements, or None."""
+    if not sides or key not in data.cell_data:
+        return None
+    values = [np.asarray(data.cell_data[key][block.index]) for block in sides]
+    if any(array.ndim != 1 or array.dtype.kind not in "iu" for array in values):
+        return None
+    if key not in _TAGS:
+        # A different number on each element is an identifier, not a group.
+        distinct = len(np.unique(np.concatenate(values)))
+        if distinct > 1 and distinct > 0.5 * sum(map(len, values)):
+            return None
+    return values
+
+
+def _names(data: meshio.Mesh, dim: int) -> dict[int, list[str]]:
+    """Return the names of each number on elements of a dimension."""
+    found: dict[int, list[str]] = {}
+    for name, value in data.field_data.items():
+        pair = np.ravel(value)
+        if pair.dtype.kind in "iu" and len(pair) == 2 and pair[1] == dim:
+            found.setdefault(int(pair[0]), []).append(str(name))
+    for number, names in getattr(data, "cell_tags", {}).items():
+        found.setdefault(int(number), []).extend(names)
+    return found
+
+
+def _add(groups: Groups, name: str, vtk: int, nodes: IntArray) -> None:
+    clean = "".join(c for c in name if c.isprintable()).strip() or "unnamed"
+    groups.setdefault(clean, []).append((vtk, nodes))
+
+
+def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker, ...]:
+    """Return the outer facets whose nodes are all in a named set of points.
+
+    A facet goes to the smallest set that has it, so that a set of all points takes nothing away.
+    """
+    free = np.ones(len(facets), bool)
+    found = {}
+    for name, members in sorted(data.point_sets.items(), key=lambda item: len(item[1])):
+        inside = np.zeros(len(mesh.points), bool)
+        inside[np.asarray(members, np.int64)] = True
+        parts = []
+        for vtk, ids, nodes in _rows(facets):
+            chosen = free[ids] & inside[nodes].all(axis=1)
+            free[ids[chosen]] = False
+            parts.append((vtk, nodes[chosen]))
+        found[name] = Marker(name, Cells.from_blocks(parts))
+    return tuple(found[name] for name in data.point_sets if len(found[name].cells))
+
+
+def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:
+    for vtk, (ids, nodes) in cells.by_type.items():
+        yield vtk, ids, nodes

@@ -1,0 +1,99 @@
+"""meshio, made quiet: it prints, ends the process on some errors and raises whatever it meets.
+
+Here all of that becomes one ``MeshError``.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import path_error
+
+if TYPE_CHECKING:
+    import meshio
+
+# The streams are redirected for the whole process, so two threads must not do it at once.
+_STREAMS = threading.Lock()
+
+
+def formats_of(path: Path) -> list[str]:
+    """Return the names of meshio's formats that fit the ending of the file.
+
+    Raises
+    ------
+    MeshError
+        There is none.
+    """
+    import meshio
+
+    # Gmsh before ANSYS, which has the same ending but is rare.
+    table = meshio.extension_to_filetypes
+    suffixes = [s.lower() for s in path.suffixes]
+    for ending in ("".join(suffixes[-2:]), "".join(suffixes[-1:])):
+        if ending in table and ending != ".su2":
+            return sorted(table[ending], key=lambda name: name != "gmsh")
+    raise path_error(
+        path,
+        f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .vtu, "
+        ".vtk, .msh, .med, .inp and others of meshio",
+    )
+
+
+@contextmanager
+def quiet(path: Path, what: str) -> Iterator[None]:
+    """Return a context in which meshio neither prints nor ends the process.
+
+    Raises
+    ------
+    MeshError
+        Whatever the block raises, as one sentence: ``path: cannot be <what>: ...``.
+    """
+    said = StringIO()
+    try:
+        with _STREAMS, redirect_stdout(said), redirect_stderr(said):
+            yield
+    except ModuleNotFoundError as problem:
+        raise path_error(
+            path, f"cannot be {what}: this format needs the package {problem.name}; install it"
+        ) from problem
+    except (MeshError, MemoryError):
+        raise
+    except OSError as problem:
+        # h5py raises this for its own reasons too, without a number.
+        reason = problem.strerror if problem.errno else "it is not a file of this format"
+        raise path_error(
+            path, f"cannot be {what}: {reason}; check the file, its ending and the disk"
+        ) from problem
+    except (Exception, SystemExit) as problem:
+        words = str(problem) if isinstance(problem, Exception) else ""
+        reason = " ".join((words or said.getvalue()).split())[:160] or type(problem).__name__
+        raise path_error(
+            path,
+            f"cannot be {what}: meshio says {reason!r}; use another format, such as .su2 or .vtu",
+        ) from problem
+
+
+def load(path: Path, formats: list[str]) -> meshio.Mesh:
+    """Return what meshio reads from the file in the first of the formats that it can be.
+
+    Raises
+    ------
+    MeshError
+        It is none of them; the message is that of the first.
+    """
+    import meshio
+
+    problems = []
+    for name in formats:
+        try:
+            with quiet(path, f"read as {name}"):
+                return meshio.read(path, file_format=name)
+        except MeshError as problem:
+            problems.append(problem)
+    raise problems[0]
