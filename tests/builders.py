@@ -14,6 +14,7 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.periodic import Pair
 
 SIDE_TYPE = {2: {2: 3}, 3: {3: 5, 4: 9}}
 """VTK identifier of a side by dimension of the mesh and number of nodes."""
@@ -318,3 +319,9 @@ def permuted(mesh: Mesh, order: np.ndarray) -> Mesh:
     )
     cells = Cells.from_types(mesh.cells.types, new[mesh.cells.connectivity])
     return Mesh(mesh.points[order], cells, markers, name=mesh.name)
+
+
+def pair(kind, dim, vector=(0, 0, 0), angle=0.0, axis=(0.0, 0.0, 1.0), origin=(0.0, 0.0, 0.0)):
+    """A periodic pair without nodes."""
+    shift = np.array(vector, float)[:dim]
+    return Pair("a", "b", kind, shift, angle, axis, origin, np.empty((0, 2), np.int64), 0.0)
