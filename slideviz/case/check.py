@@ -160,7 +160,7 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
         )
     if len(markers) % 2:
         yield (
-            f"MARKER_PERIODIC has {len(markers)} markers ({', '.join(markers)}); they come in "
+            f"MARKER_PERIODIC has an odd number of markers ({', '.join(markers)}); they come in "
             "pairs: name the partner too"
         )
     if case.periodic == "moving" and case.sliding == "none":

@@ -148,9 +148,9 @@ def _table_problems(
         return []
     row_line = [line for line, content in enumerate(lines, start=1) if content.strip()]
     last = f"its nodes are 0 to {count - 1}"
-    problems = [(row_line[i], f"{index[i]!s} is not a node number") for i in _first(broken)]
+    problems = [(row_line[i], f"{index[i]:.15g} is not a node number") for i in _first(broken)]
     problems += [
-        (row_line[i], f"node {int(index[i])} is not in the mesh; {last}") for i in _first(outside)
+        (row_line[i], f"node {index[i]:.15g} is not in the mesh; {last}") for i in _first(outside)
     ]
     problems += [
         (row_line[i], f"node {int(index[i])} is not on {of}; take the line out or change the roles")

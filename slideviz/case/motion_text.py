@@ -120,7 +120,8 @@ def _read_rotate(marker: str, rest: list[Word]) -> Rotate:
     letter = bool(items) and items[0].text.lower() in ("x", "y", "z")
     n_axis = 1 if letter else 3 if len(items) > 3 else 0
     place = items[n_axis:]
-    if not (at_centroid and len(place) == 1) and len(place) not in (2, 3 if n_axis else 2):
+    allowed = (1,) if at_centroid else (2, 3) if n_axis else (2,)
+    if len(place) not in allowed:
         raise CaseError(
             "after the angle needed are the axis (x, y, z or three numbers; not in 2D) and then "
             "centroid or the point"

@@ -1,0 +1,128 @@
+"""The grammar of MOTION."""
+
+from pathlib import Path
+
+import pytest
+
+from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.case.motion_text import GRAMMAR, read_motions
+from slideviz.errors import CaseError
+
+X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "motion"),
+    [
+        ("(B, translate, 1, -2)", Translate("B", (1.0, -2.0))),
+        ("( B translate 1 2 3e-1 )", Translate("B", (1.0, 2.0, 0.3))),
+        ("(B, translate, (1, 2, 3))", Translate("B", (1.0, 2.0, 3.0))),
+        ("(B, rotate, 5, centroid)", Rotate("B", 5.0, "centroid", Z)),
+        ("(B, ROTATE, 5, Centroid)", Rotate("B", 5.0, "centroid", Z)),
+        ("(B, rotate, 5, 1, 2)", Rotate("B", 5.0, (1.0, 2.0), Z)),
+        ("(B, rotate, 5, (1, 2))", Rotate("B", 5.0, (1.0, 2.0), Z)),
+        ("(B, rotate, 5, x, centroid)", Rotate("B", 5.0, "centroid", X)),
+        ("(B, rotate, 5, X, 1, 2, 3)", Rotate("B", 5.0, (1.0, 2.0, 3.0), X)),
+        ("(B, rotate, 5, 1, 0, 0, centroid)", Rotate("B", 5.0, "centroid", X)),
+        ("(B, rotate, 5.0, 1, 0, 0, 1, 2, 3)", Rotate("B", 5.0, (1.0, 2.0, 3.0), X)),
+        ("(B, rotate, 5.0, (1, 0, 0), (1, 2, 3))", Rotate("B", 5.0, (1.0, 2.0, 3.0), X)),
+        ("(B, rotate, 5, z, 1, 2)", Rotate("B", 5.0, (1.0, 2.0), Z)),
+        ("(B, scale, 1.1, centroid)", Scale("B", (1.1,))),
+        ("(B, scale, 1, 2, 3, centroid)", Scale("B", (1.0, 2.0, 3.0))),
+        ("(B, scale, 2, 0, 1)", Scale("B", (2.0,), (0.0, 1.0))),
+        ("(B, scale, 2, (0, 1))", Scale("B", (2.0,), (0.0, 1.0))),
+        ("(B, scale, 2, (0, 1, 2))", Scale("B", (2.0,), (0.0, 1.0, 2.0))),
+        ("(B, scale, 2, 3, (0, 1))", Scale("B", (2.0, 3.0), (0.0, 1.0))),
+        ("(B, scale, (2, 3), (0, 1))", Scale("B", (2.0, 3.0), (0.0, 1.0))),
+        ("(B, scale, 2, 3, 4, 0, 1, 2)", Scale("B", (2.0, 3.0, 4.0), (0.0, 1.0, 2.0))),
+        ("(B, file, a\\b.txt)", FromFile(Path("a/b.txt"), "B")),
+        ('(B, file, "my, (file).txt")', FromFile(Path("my, (file).txt"), "B")),
+        ("(*, file, b.txt)", FromFile(Path("b.txt"))),
+        ('("*", file, b.txt)', FromFile(Path("b.txt"), "*")),
+        ('("a b", translate, 0, 0)', Translate("a b", (0.0, 0.0))),
+    ],
+)
+def test_motions(text, motion):
+    assert read_motions(text) == (motion,)
+
+
+@pytest.mark.parametrize("sign", [";", " ; ", ",", " ", ";;"])
+def test_sequences(sign):
+    first, second = Translate("B", (1.0, 0.0)), Translate("C", (0.0, 1.0))
+    assert read_motions(f"(B, translate, 1, 0){sign}(C, translate, 0, 1)") == (first, second)
+    assert read_motions(f"(B, translate, 1, 0){sign}") == (first,)
+
+
+@pytest.mark.parametrize("text", ["NONE", "( )", "()"])
+def test_no_motion(text):
+    assert read_motions(text) == ()
+
+
+def test_examples_of_the_reference_are_read():
+    for line in GRAMMAR[:-1]:
+        text = line.split("  ")[0]
+        for word, value in {
+            "dx, dy[, dz]": "1, 2",
+            "degrees": "5",
+            "px, py[, pz]": "1, 2",
+            "px, py, pz": "1, 2, 3",
+            "px, py": "1, 2",
+            "AXIS": "0, 1, 0",
+            "FACTORS": "2",
+        }.items():
+            text = text.replace(word, value)
+        assert len(read_motions(text)) == 1, line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("B, translate, 1, 0", r"each motion needs a pair of brackets, as in \(BLADE, translate"),
+        ("(B, translate, 1, 0) C", "each motion needs a pair of brackets"),
+        ("(B, translate, 1, 0))", "each motion needs a pair of brackets"),
+        ("(B, translate, 1, 0", "a bracket is not closed; .* needs a backslash at the end"),
+        ('(B, file, "a)', "the quotation mark .* is not closed"),
+        ("(B)", "motion 1: needed are a marker and one of translate, rotate, scale, file"),
+        ("(B, translate, 1, 0) ; ()", "motion 2: needed are a marker and one of"),
+        ("((B), translate, 1, 0)", "motion 1: it does not begin with the name of a marker"),
+        ('("", translate, 1, 0)', "motion 1: it does not begin with the name of a marker"),
+        ("(B, rotat, 5)", "'rotat' is not one of translate, .*; did you mean rotate?"),
+        ("(*, translate, 1, 0)", r"\* \(all moving markers\) goes with `file` only; name the"),
+        ("(B, translate, 1)", "the shift has 1 values; needed are 2 or 3 numbers"),
+        ("(B, translate, 1, 2, 3, 4)", "the shift has 4 values"),
+        ("(B, translate, 1, y)", "'y' is not a number"),
+        ("(B, rotate)", "the angle is missing; write rotate, angle in degrees, centroid"),
+        ("(B, rotate, centroid)", "'centroid' is not a number"),
+        ("(B, rotate, nan, centroid)", "'nan' is not a number"),
+        ("(B, rotate, 5)", "after the angle needed are the axis"),
+        ("(B, rotate, 5, x)", "after the angle needed are the axis"),
+        ("(B, rotate, 5, 1, 0, 0)", "after the angle needed are the axis"),
+        ("(B, rotate, 5, 1, 0, 0, 1)", "after the angle needed are the axis"),
+        ("(B, rotate, 5, 1, centroid)", "after the angle needed are"),
+        ("(B, rotate, 5, 1, 2, 3, 4, 5, 6, 7)", "after the angle needed are the axis"),
+        ("(B, rotate, 5, 0, 0, 0, centroid)", "the axis .* has no direction"),
+        ("(B, rotate, 5, w, centroid)", "after the angle needed are"),
+        ("(B, scale, 2)", "needed are one factor .* put the point in brackets"),
+        ("(B, scale)", "needed are one factor or one for each axis"),
+        ("(B, scale, centroid)", "0 factors are given; needed is one, or one for each axis"),
+        ("(B, scale, 2, 3, 0, 1)", r"put the point in brackets: scale, 1.1, \(0, 0, 0\)"),
+        ("(B, scale, 1, 2, 3, 4, centroid)", "4 factors are given"),
+        ("(B, scale, (0, 1))", "0 factors are given"),
+        ("(B, scale, -2, centroid)", "the factor -2 is not above 0: it would fold the marker"),
+        ("(B, file)", "needed is .MARKER, file, path.; a path with spaces, .* needs quotes"),
+        ("(B, file, a b.txt)", "a path with spaces, commas or brackets needs quotes"),
+        ('(B, file, "")', "needed is .MARKER, file, path."),
+    ],
+)
+def test_wrong_motions(text, words):
+    with pytest.raises(CaseError, match=words):
+        read_motions(text)
+
+
+def test_all_wrong_motions_at_once():
+    with pytest.raises(CaseError) as caught:
+        read_motions("(B) ; (B, translate, 1, 0) ; (B, scale)")
+    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [
+        "motion 1",
+        "motion 3",
+    ]

@@ -1,0 +1,218 @@
+"""What is written reads back without loss, or is not written at all."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from slideviz.case.cfg import read_case, write_case
+from slideviz.case.model import (
+    PERIODIC_MODES,
+    ROLES,
+    SLIDING,
+    Case,
+    FromFile,
+    Reduction,
+    Rotate,
+    Scale,
+    Translate,
+)
+from slideviz.case.motion import moved_points
+from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.errors import CaseError
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
+text = st.text(
+    st.characters(codec="utf-8", exclude_characters="\n\r\0"), min_size=1, max_size=12
+) | st.sampled_from(
+    ["A", "NONE", "none", "5", "1e3", "*", "(", "a b", 'q"q', "50%", "x\\", "centroid"]
+)
+point = st.just("centroid") | st.tuples(finite, finite) | st.tuples(finite, finite, finite)
+axis = st.tuples(finite, finite, finite).filter(any)
+whole = st.integers(1, 999_999_999)
+
+
+def is_file_name(name: str) -> bool:
+    return "/" not in name and "\\" not in name and name not in (".", "..") and len(name) < 100
+
+
+names = text.filter(is_file_name)
+
+
+def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
+    factors = st.lists(positive, min_size=1, max_size=3).map(tuple)
+    vector = st.tuples(finite, finite) | st.tuples(finite, finite, finite)
+    return st.one_of(
+        st.builds(Translate, marker, vector),
+        st.builds(Rotate, marker, finite, point, axis),
+        st.builds(Scale, marker, factors, point),
+        st.builds(FromFile, path, marker | st.just("")),
+    )
+
+
+reductions = st.builds(
+    Reduction,
+    positive,
+    st.booleans(),
+    st.sampled_from(["size", "tol"]),
+    st.floats(0, 1, exclude_min=True, exclude_max=True),
+    whole,
+    st.booleans(),
+    positive,
+)
+
+
+@st.composite
+def cases(draw: st.DrawFn, folder: Path) -> Case:
+    path = st.lists(names, min_size=1, max_size=2).map(lambda parts: folder.joinpath(*parts))
+    roles = draw(st.dictionaries(text, st.sampled_from(ROLES), max_size=5))
+    moving = [name for name, role in roles.items() if role == "moving"]
+    motions = ()
+    if moving:
+        motion = motions_of(st.sampled_from(moving), path)
+        motions = tuple(draw(st.lists(motion, max_size=4)))
+    kind, direction = draw(
+        st.sampled_from(
+            [("auto", None), ("auto", 2), ("translational", 0), ("rotational", 1), ("auto", 1)]
+        )
+    )
+    return Case(
+        mesh_file=draw(st.none() | path),
+        mesh_out=draw(st.none() | path),
+        zone=draw(st.none() | whole),
+        roles=roles,
+        motions=motions,
+        sliding=draw(st.sampled_from(SLIDING)),
+        periodic=draw(st.sampled_from(PERIODIC_MODES)),
+        periodic_type=kind,
+        direction=direction,
+        axis=draw(axis),
+        origin=draw(st.tuples(finite, finite, finite)),
+        feature_angle_deg=draw(st.floats(0, 180, exclude_min=True)),
+        curved=draw(st.booleans()),
+        steps=draw(whole),
+        influence_factor=draw(positive),
+        reduction=draw(st.none() | reductions),
+        quality_metric=draw(st.sampled_from(["knupp", "rbf-slide"])),
+        generate_quality=draw(st.booleans()),
+    )
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_read_gives_back_what_was_written(data, tmp_path):
+    case = data.draw(cases(tmp_path / "deep" / "down"))
+    folder = data.draw(st.sampled_from(["", "deep", "deep/down", "elsewhere"]))
+    (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    path = tmp_path / folder / "a.cfg"
+    write_case(path, case)
+    again = read_case(path)
+    assert repr(again.change(source=None, warnings=(), roles={})) == repr(case.change(roles={}))
+    assert again.roles == case.roles
+    assert [again.markers_with(role) for role in ROLES] == [
+        case.markers_with(role) for role in ROLES
+    ]
+    # And the text is settled: a second round changes nothing.
+    first = path.read_bytes()
+    write_case(path, again)
+    assert path.read_bytes() == first
+
+
+@given(st.lists(motions_of(text, names.map(Path)), max_size=5).map(tuple))
+def test_motions_read_back_to_the_bit(motions):
+    assert repr(read_motions(write_motions(motions).replace("\\\n", " "))) == repr(motions)
+
+
+def test_a_saved_motion_moves_points_to_the_same_bits(tmp_path):
+    motions = (Rotate("A", 1 / 3, (0.1, 0.7), (0.0, 0.0, 1.0)), Translate("A", (0.1 + 0.2, 1e-300)))
+    case = Case(roles={"A": "moving"}, motions=motions)
+    case.write(tmp_path / "a.cfg")
+    points = np.random.default_rng(7).random((50, 2))
+    again = Case.read(tmp_path / "a.cfg").motions
+    assert moved_points(again, points).tobytes() == moved_points(motions, points).tobytes()
+
+
+def test_paths_are_written_relative_and_survive_a_move(tmp_path):
+    (tmp_path / "old" / "cases").mkdir(parents=True)
+    mesh = tmp_path / "old" / "meshes" / "wing.su2"
+    write_case(tmp_path / "old" / "cases" / "a.cfg", Case(mesh_file=mesh))
+    assert "MESH_FILENAME= ../meshes/wing.su2\n" in (tmp_path / "old/cases/a.cfg").read_text()
+    (tmp_path / "old").rename(tmp_path / "new")
+    assert read_case(tmp_path / "new/cases/a.cfg").mesh_file == tmp_path / "new/meshes/wing.su2"
+
+
+def test_files_far_away_are_written_with_their_full_path(tmp_path):
+    mesh = Path("/nowhere/near/wing.su2")
+    write_case(tmp_path / "a.cfg", Case(mesh_file=mesh))
+    assert "MESH_FILENAME= /nowhere/near/wing.su2\n" in (tmp_path / "a.cfg").read_text()
+    assert read_case(tmp_path / "a.cfg").mesh_file == mesh
+
+
+def test_paths_relative_to_the_current_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    write_case(Path("sub/a.cfg"), Case(mesh_file=Path("wing.su2")))
+    assert "MESH_FILENAME= ../wing.su2\n" in Path("sub/a.cfg").read_text()
+    assert read_case(Path("sub/a.cfg")).mesh_file == Path("wing.su2")
+
+
+def test_links_lead_to_the_right_file(tmp_path):
+    """``link/..`` is the folder of the link's target, also for the reader."""
+    (tmp_path / "real" / "cases").mkdir(parents=True)
+    (tmp_path / "link").symlink_to(tmp_path / "real" / "cases")
+    mesh, decoy = tmp_path / "real" / "m.su2", tmp_path / "m.su2"
+    for file in (mesh, decoy):
+        file.write_text(file.as_posix())
+    write_case(tmp_path / "link" / "a.cfg", Case(mesh_file=mesh, mesh_out=decoy))
+    case = read_case(tmp_path / "link" / "a.cfg")
+    assert case.mesh_file is not None
+    assert case.mesh_out is not None
+    assert case.mesh_file.read_text() == mesh.as_posix()
+    assert case.mesh_out.read_text() == decoy.as_posix()
+
+
+@pytest.mark.parametrize(
+    ("case", "words"),
+    [
+        (Case(roles={"a\nb": "moving"}), r"MARKER_MOVING: 'a\\nb' cannot be written .* line break"),
+        (Case(roles={"": "fixed"}), "MARKER_FIXED: an empty name cannot be written"),
+        (Case(roles={"a\udcff": "fixed"}), "it is not UTF-8; rename it"),
+        (Case(mesh_file=Path("a\\b.su2")), r"MESH_FILENAME: .* it has a backslash; rename it"),
+        (Case(steps=0), "STEPS: 0 is too small"),
+        (Case(influence_factor=float("nan")), "INFLUENCE_FACTOR: 'nan' is not a number"),
+        (Case(sliding="maybe"), "SLIDING_MODE: 'maybe' is not one of none"),
+        (Case(axis=(0.0, 0.0, 0.0)), "PERIODIC_AXIS: the axis .* has no direction"),
+        (Case(motions=(Translate("A", (1.0, 0.0)),)), "motion 1 names 'A', which does not move"),
+        (
+            Case(roles={"A": "moving"}, motions=(Translate("A", (1.0,)), Scale("A", (0.0,)))),
+            r"motion 1: the shift has 1 values(.|\n)*motion 2: the factor 0 is not above 0",
+        ),
+        (Case(roles={"A": "wall"}), "a case file cannot hold some of its values; check roles"),
+    ],
+)
+def test_what_cannot_be_read_back_is_not_written(tmp_path, case, words):
+    path = tmp_path / "a.cfg"
+    path.write_text("old")
+    with pytest.raises(CaseError, match=rf"a\.cfg: cannot be written: (.|\n)*{words}"):
+        write_case(path, case)
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.cfg"]  # noqa: PTH208
+
+
+def test_missing_folder(tmp_path):
+    with pytest.raises(CaseError, match=r"a\.cfg: cannot be written: the folder does not exist"):
+        write_case(tmp_path / "no" / "a.cfg", Case())
+
+
+def test_long_motions_stand_one_in_a_line(tmp_path):
+    motions = (Translate("A", (1.0, 2.0)), Rotate("A", 5.0), Scale("A", (2.0,), (0.0, 1.0)))
+    write_case(tmp_path / "a.cfg", Case(roles={"A": "moving"}, motions=motions))
+    assert (
+        "MOTION= (A, translate, 1.0, 2.0) ; \\\n"
+        "    (A, rotate, 5.0, centroid) ; \\\n"
+        "    (A, scale, 2.0, (0.0, 1.0))\n"
+    ) in (tmp_path / "a.cfg").read_text()
