@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.staircase import Step
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.staircase import Step
 
 
 def window(arguments: argparse.Namespace) -> int:
@@ -55,8 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     write(output, last.mesh, overwrite=arguments.force, cell_data=_cell_data(output, found))
-    if case.generate_quality:
-        _write_qualities(output.with_name(output.stem + "_qual.txt"), found)
+    qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
+    if qualities:
+        _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
     if arguments.picture:
         from slideviz.view.picture import picture
@@ -68,7 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
     if text is not None:
         print(text, end="")
     elif not arguments.quiet:
-        _print_run(arguments, report, found, output)
+        files = {"mesh": output, "quality of each cell": qualities}
+        files |= {"report": arguments.json, "picture": arguments.picture}
+        _print_run(report, found, files)
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
     if found.inverted:
@@ -151,7 +154,7 @@ def _write_qualities(path: Path, found: Quality) -> None:
         file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
 
 
-def _print_run(arguments: argparse.Namespace, report: dict, found: Quality, output: Path) -> None:
+def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> None:
     from slideviz.cli.report import quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
@@ -163,8 +166,7 @@ def _print_run(arguments: argparse.Namespace, report: dict, found: Quality, outp
     print(table(rows))
     phases = ", ".join(f"{k} {v:.2f}" for k, v in spent.items() if k != "total" and v >= 0.005)
     print(f"  {spent['total']:.2f} s ({phases or 'all phases below 0.01'})")
-    print(f"mesh: {output}")
-    for name, path in (("report", arguments.json), ("picture", arguments.picture)):
+    for name, path in files.items():
         if path:
             print(f"{name}: {path}")
 
@@ -267,17 +269,22 @@ def _write_csv(path: Path, found: Quality) -> None:
 
 def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples."""
-    from slideviz.case.samples import SAMPLES, write_sample
+    from slideviz.case.samples import SAMPLES, VARIANTS, write_sample
     from slideviz.cli import DONE
     from slideviz.cli.report import table
 
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")
         print(table([(name, about) for name, about in SAMPLES.items()]))
+        print("variants (--variant):")
+        print(table([(name, ", ".join(kinds)) for name, kinds in VARIANTS.items()]))
         return DONE
     folder = arguments.output or Path(arguments.name)
-    for path in write_sample(arguments.name, folder, arguments.size):
+    paths = write_sample(arguments.name, folder, arguments.size, arguments.variant, arguments.force)
+    for path in paths:
         print(path)
+    case = next(path for path in paths if path.suffix == ".cfg")
+    print(f"now: slideviz run {case}   or: slideviz {case}")
     return DONE
 
 

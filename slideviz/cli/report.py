@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.staircase import Step
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.staircase import Step
 
 LISTED = 100
 """Inverted cells named in a report."""

@@ -1,0 +1,266 @@
+"""The commands: their JSON, exit codes, files and sentences."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.samples import write_sample
+from slideviz.cli import run
+
+SECONDS = {
+    *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
+}
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    """A folder with the 25 by 25 square case."""
+    write_sample("square", tmp_path / "square")
+    return tmp_path / "square"
+
+
+def test_run_writes_mesh_and_report(square, tmp_path, capsys):
+    report_file = tmp_path / "report.json"
+    assert run(["run", str(square / "square.cfg"), "--json", str(report_file)]) == 0
+    report = json.loads(report_file.read_text())
+    assert set(report) >= {
+        *("case", "sliding", "periodic", "steps", "quality", "control_nodes", "max_error"),
+        *("seconds", "node_counts", "warnings"),
+    }
+    assert set(report["seconds"]) >= SECONDS
+    assert report["sliding"] == "ps"
+    assert report["periodic"] == "moving"
+    assert report["steps"] == 20
+    assert len(report["control_nodes"]) == 20
+    assert report["quality"]["min"] == pytest.approx(0.389560, abs=1e-6)
+    assert report["quality"]["mean"] == pytest.approx(0.666192, abs=1e-6)
+    assert report["quality"]["inverted"] == 0
+    assert report["quality"]["cells"] == 620
+    assert report["node_counts"] == {
+        "moving": 12,
+        "fixed": 0,
+        "sliding_edge": 52,
+        "sliding_surface": 0,
+        "internal": 612,
+    }
+    assert report["max_error"] < 1e-10
+    out = capsys.readouterr().out
+    assert "minimum quality" in out
+    assert "0.38956" in out
+    found = sv.quality(
+        sv.read(square / "square_deformed.su2"), reference=sv.read(square / "mesh.su2")
+    )
+    assert found.min == report["quality"]["min"]
+
+
+def test_json_dash_prints_only_json(square, capsys):
+    assert run(["run", str(square / "square.cfg"), "--json", "-", "--set", "STEPS=2"]) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == 2
+
+
+def test_set_changes_keys_and_output_is_chosen(square, tmp_path):
+    out = tmp_path / "x.vtu"
+    argv = ["run", str(square / "square.cfg"), "-o", str(out), "-q"]
+    assert run([*argv, "--set", "SLIDING_MODE=ds", "--set", "STEPS= 3"]) == 0
+    import meshio
+
+    written = meshio.read(out)
+    values = written.get_cell_data("size-skew", "quad")
+    base, deformed = sv.read(square / "mesh.su2"), sv.read(out)
+    assert np.array_equal(values, sv.quality(deformed, reference=base).values)
+
+
+def test_inverted_cells_give_code_3_and_are_named(square, capsys):
+    argv = ["run", str(square / "square.cfg"), "--set", "STEPS=1", "--set", "SLIDING_MODE=none"]
+    assert run([*argv, "--set", "PERIODIC_MODE=none"]) == 3
+    err = capsys.readouterr().err
+    assert "cells are inverted" in err
+    assert "quadrilateral" in err
+    assert "STEPS" in err
+    assert (square / "square_deformed.su2").exists()
+
+
+def test_steps_dir_has_every_step(square, tmp_path):
+    folder = tmp_path / "steps"
+    argv = ["run", str(square / "square.cfg"), "--set", "STEPS=3", "--steps-dir", str(folder)]
+    assert run([*argv, "-q"]) == 0
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["mesh_1.su2", "mesh_2.su2", "mesh_3.su2"]
+    last = sv.read(folder / "mesh_3.su2")
+    assert np.array_equal(last.points, sv.read(square / "square_deformed.su2").points)
+
+
+def test_quiet_prints_nothing(square, capsys):
+    assert run(["run", str(square / "square.cfg"), "-q", "--set", "STEPS=1"]) in (0, 3)
+    assert capsys.readouterr().out == ""
+
+
+def test_input_mesh_is_not_overwritten(square, capsys):
+    before = (square / "mesh.su2").read_bytes()
+    argv = ["run", str(square / "square.cfg"), "-o", str(square / "mesh.su2")]
+    assert run(argv) == 1
+    assert "is the input mesh" in capsys.readouterr().err
+    assert (square / "mesh.su2").read_bytes() == before
+    assert run([*argv, "--force", "-q"]) == 0
+    assert (square / "mesh.su2").read_bytes() != before
+
+
+def test_info_tells_what_is_there(square, capsys):
+    assert run(["info", str(square / "mesh.su2"), "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["dimension"] == 2
+    assert report["cells_by_type"] == {"quadrilateral": 620}
+    assert [m["name"] for m in report["markers"]] == ["LEFT", "RIGHT", "LOWER", "UPPER", "BLOCK"]
+    assert ["LOWER", "UPPER"] in [pair["markers"] for pair in report["periodic_pairs"]]
+    assert report["quality"]["min"] == pytest.approx(1.0)
+    assert run(["info", str(square / "mesh.su2")]) == 0
+    assert "quadrilateral" in capsys.readouterr().out
+
+
+def test_quality_against_reference(square, tmp_path, capsys):
+    assert run(["run", str(square / "square.cfg"), "-q"]) == 0
+    deformed, table = square / "square_deformed.su2", tmp_path / "q.csv"
+    argv = ["quality", str(deformed), "--reference", str(square / "mesh.su2")]
+    assert run([*argv, "--json", "-", "-o", str(table)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["min"] == pytest.approx(0.389560, abs=1e-6)
+    assert sum(report["histogram"]["counts"]) == 620
+    assert report["worst"][0]["quality"] == report["min"]
+    rows = table.read_text().splitlines()
+    assert rows[0] == "cell,size_skew,size,skew,status"
+    assert min(float(row.split(",")[1]) for row in rows[1:]) == report["min"]
+    assert run(argv) == 0
+    assert "worst cells" in capsys.readouterr().out
+
+
+def test_sample_lists_and_refuses_unknown(capsys, tmp_path):
+    assert run(["sample"]) == 0
+    assert "cylindrical" in capsys.readouterr().out
+    assert run(["sample", "sqare", "-o", str(tmp_path)]) == 1
+    assert "square" in capsys.readouterr().err
+
+
+def test_keys_lists_every_key(capsys):
+    assert run(["keys"]) == 0
+    text = capsys.readouterr().out
+    for key in ("MESH_FILENAME", "SLIDING_MODE", "MARKER_PERIODIC", "MOTION", "FEATURE_ANGLE"):
+        assert key in text
+
+
+@pytest.mark.parametrize(
+    ("argv", "code"),
+    [
+        (["run"], 2),
+        (["run", "a.cfg", "--nonsense"], 2),
+        (["--nonsense"], 2),
+        (["quality", "a.su2", "--metric", "other"], 2),
+        (["run", "missing.cfg"], 1),
+        (["info", "missing.su2"], 1),
+        (["missing.su2"], 1),
+        (["--help"], 0),
+        (["run", "--help"], 0),
+        (["--version"], 0),
+    ],
+)
+def test_exit_codes(argv, code, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(argv) == code
+    out = capsys.readouterr()
+    assert (out.out or out.err).strip()
+    assert "Traceback" not in out.err
+
+
+def test_set_must_be_an_assignment(square, capsys):
+    assert run(["run", str(square / "square.cfg"), "--set", "STEPS"]) == 1
+    assert "KEY=VALUE" in capsys.readouterr().err
+
+
+def test_case_without_mesh_is_told(tmp_path, capsys):
+    (tmp_path / "a.cfg").write_text("STEPS= 2\n")
+    assert run(["run", str(tmp_path / "a.cfg")]) == 1
+    assert "MESH_FILENAME" in capsys.readouterr().err
+
+
+def test_an_unforeseen_error_is_one_message(square, monkeypatch, capsys):
+    def broken(*_, **__):
+        raise ZeroDivisionError("boom")
+
+    monkeypatch.setattr("slideviz.quality", broken, raising=False)
+    assert run(["run", str(square / "square.cfg")]) == 1
+    err = capsys.readouterr().err
+    assert "internal error (ZeroDivisionError: boom)" in err
+    assert "Traceback" not in err
+
+
+def test_out_of_memory_is_one_sentence(square, monkeypatch, capsys):
+    def broken(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr("slideviz.deform", broken, raising=False)
+    assert run(["run", str(square / "square.cfg")]) == 1
+    assert "out of memory" in capsys.readouterr().err
+
+
+def test_a_pipe_that_closes_is_no_error(square):
+    call = (
+        f"{sys.executable} -m slideviz info {square / 'mesh.su2'} | true; echo ${{PIPESTATUS[0]}}"
+    )
+    done = subprocess.run(["bash", "-c", call], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"
+    assert "Traceback" not in done.stderr
+
+
+def test_interrupt_leaves_nothing_half_written(square):
+    argv = [sys.executable, "-m", "slideviz", "run", str(square / "square.cfg")]
+    child = subprocess.Popen([*argv, "--set", "STEPS=100000"], stderr=subprocess.PIPE, text=True)
+    time.sleep(4)
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert "cancelled" in err
+    assert "Traceback" not in err
+    assert sorted(path.name for path in square.iterdir()) == [
+        "displacement.txt",
+        "mesh.su2",
+        "square.cfg",
+    ]
+
+
+def test_version_loads_nothing_heavy():
+    code = (
+        "import sys; sys.argv=['slideviz','--version']\n"
+        "from slideviz.__main__ import main; main()\n"
+        "heavy={'numpy','scipy','numba','pyvista','vtk','matplotlib','qtpy','meshio'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == f"slideviz {sv.__version__}\n"
+
+
+def test_public_names_are_what_they_say():
+    for name in sv.__all__:
+        assert getattr(sv, name) is not None
+    assert callable(sv.deform)
+    assert callable(sv.quality)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        sv.nonsense  # noqa: B018
+
+
+def test_readme_python_example(square, monkeypatch):
+    """The example of the Python interface, as the README has it."""
+    monkeypatch.chdir(square)
+    mesh, case = sv.read("mesh.su2"), sv.Case.read("square.cfg")
+    *_, last = sv.deform(case, mesh)
+    found = sv.quality(last.mesh, reference=mesh)
+    sv.write("out.su2", last.mesh)
+    assert found.inverted == 0
+    assert np.array_equal(sv.read("out.su2").points, last.mesh.points)
