@@ -1,0 +1,153 @@
+"""Sample cases: those of the thesis (chapter 4), at any size, and a blade passage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, FromFile
+from slideviz.case.sample_passage import passage_case, passage_mesh
+from slideviz.case.sample_thesis import FILE, thesis_case
+from slideviz.case.words import nearest
+from slideviz.errors import CaseError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.model import Mesh
+
+SAMPLES: Mapping[str, str] = {
+    "square": "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
+    "polar": "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
+    "hexahedron": "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
+    "cylindrical": "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
+    "passage": "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
+}
+"""What each sample is, by name."""
+
+DEFAULT_SIZES = {"square": 25, "polar": 25, "hexahedron": 25, "cylindrical": 25, "passage": 36}
+VARIANTS: Mapping[str, tuple[str, ...]] = {
+    "square": ("file", "motion", "translate"),
+    "polar": ("file",),
+    "hexahedron": ("file", "motion", "flat"),
+    "cylindrical": ("file",),
+    "passage": ("motion",),
+}
+"""How each sample can move, the default first.
+
+``file``: as a displacement file; ``motion``: the same by MOTION keys; ``translate``: the case of
+thesis Figure 4.4, which moves the block close to two sides; ``flat``: that of Figure 4.14, without
+a component in z.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A mesh and a case that deforms it.
+
+    Attributes
+    ----------
+    name : str
+        One of ``SAMPLES``.
+    mesh : Mesh
+        The undeformed mesh.
+    case : Case
+        Its files are named as if they were in the current folder; ``write_sample`` puts them
+        into another.
+    displacement : Displacements or None
+        What the case's displacement file is to hold, where it has one.
+    """
+
+    name: str
+    mesh: Mesh
+    case: Case
+    displacement: Displacements | None = None
+
+
+def sample(name: str, size: int | None = None, variant: str | None = None) -> Sample:
+    """Return a sample case.
+
+    Parameters
+    ----------
+    name : str
+        One of ``SAMPLES``.
+    size : int, optional
+        Cells in each direction; of the passage: cells along its inflow. The thesis's
+        (25), or 36 for the passage, when left out.
+    variant : str, optional
+        One of ``VARIANTS[name]``; the first when left out.
+
+    Raises
+    ------
+    CaseError
+        There is no such sample or variant, or the size is too small.
+    """
+    if name not in SAMPLES:
+        hint = nearest(name, SAMPLES)
+        raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
+    kind = variant or VARIANTS[name][0]
+    if kind not in VARIANTS[name]:
+        raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(VARIANTS[name])}")
+    cells = DEFAULT_SIZES[name] if size is None else size
+    if name == "passage":
+        return Sample(name, passage_mesh(cells), passage_case())
+    return Sample(name, *thesis_case(name, cells, kind))
+
+
+def write_sample(
+    name: str,
+    folder: str | Path,
+    size: int | None = None,
+    variant: str | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write ``mesh.su2``, ``displacement.txt`` where there is one, and ``NAME.cfg``; return them.
+
+    Parameters are those of ``sample`` and:
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; made if there is none.
+    overwrite : bool
+        Whether to replace files that exist.
+
+    Raises
+    ------
+    CaseError, MeshError
+        As of ``sample``; or a file exists or cannot be written.
+    """
+    from slideviz.mesh.files import write
+
+    made, folder = sample(name, size, variant), Path(folder)
+    mesh, table, case = folder / "mesh.su2", folder / FILE, folder / f"{name}.cfg"
+    paths = [mesh, *([table] if made.displacement else []), case]
+    there = [path for path in paths if path.exists()]
+    if there and not overwrite:
+        raise CaseError(f"{there[0]}: exists already; remove it or choose another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
+    write(mesh, made.mesh)
+    if made.displacement is not None:
+        with atomic_write(table, CaseError) as file:
+            file.write(_displacement_text(made.displacement).encode())
+    _in_folder(made.case, folder, name).write(case)
+    return paths
+
+
+def _in_folder(case: Case, folder: Path, name: str) -> Case:
+    """Return the case with its files in that folder."""
+    motions = tuple(
+        replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
+        for motion in case.motions
+    )
+    mesh, out = folder / "mesh.su2", folder / f"{name}_deformed.su2"
+    return case.change(mesh_file=mesh, mesh_out=out, motions=motions)
+
+
+def _displacement_text(table: Displacements) -> str:
+    """Return the lines of a displacement file that reads back bit for bit."""
+    rows = zip(table.nodes.tolist(), table.vectors.tolist(), strict=True)
+    return "".join("\t".join([str(node), *map(repr, row)]) + "\n" for node, row in rows)
