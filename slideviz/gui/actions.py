@@ -1,0 +1,205 @@
+"""Menus, tool bar and shortcuts: one table of actions."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QAction, QActionGroup, QKeySequence
+from qtpy.QtWidgets import QLabel, QMainWindow, QSizePolicy, QToolBar, QWidget
+
+from slideviz.gui.fields import Choice
+from slideviz.gui.icons import icon
+from slideviz.gui.theme import THEMES
+from slideviz.view import changes
+from slideviz.view.state import COLOUR_BY, Session
+
+TOGGLES = (
+    ("edges", "Mesh edges", "E", "Draw the edges of the cells."),
+    ("undeformed", "Undeformed", "U", "Draw the undeformed boundaries as a ghost."),
+    ("motion_ghost", "Motion ghost", "G", "Draw where the motions take the moving boundaries."),
+    ("legend", "Legend", "L", "Draw the legend of roles or the colour bar."),
+    ("perspective", "Perspective", "P", "Perspective instead of parallel projection (3D meshes)."),
+)
+SIDE_KEYS = {"+x": "1", "-x": "Shift+1", "+y": "2", "-y": "Shift+2", "+z": "3", "-z": "Shift+3"}
+_ICONS = {"motion_ghost": "ghost"}
+
+
+class Actions:
+    """The actions of the main window, by name in ``self.by_name``."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self.window = window
+        self.by_name: dict[str, QAction] = {}
+        self._icons: dict[str, str] = {}
+        self._make_file()
+        self._make_view()
+        self._make_tool_bar()
+
+    def _add(self, name: str, text: str, function=None, keys="", image: str = "") -> QAction:
+        act = QAction(text, self.window)
+        act.setObjectName(name)
+        if keys:
+            act.setShortcut(QKeySequence(keys))
+        if function is not None:
+            act.triggered.connect(lambda _=False: function())
+        if image:
+            self._icons[name] = image
+        tip = text.replace("…", "").replace("&", "")
+        act.setToolTip(f"{tip} ({act.shortcut().toString()})" if keys else tip)
+        self.by_name[name] = act
+        return act
+
+    def _make_file(self) -> None:
+        files, window = self.window.files, self.window
+        menu = window.menuBar().addMenu("&File")
+        standard = QKeySequence.StandardKey
+        menu.addAction(self._add("open", "&Open…", files.ask_and_open, standard.Open, "open"))
+        self.recent = menu.addMenu("Open &recent")
+        self.recent.aboutToShow.connect(self._fill_recent)
+        self.samples = menu.addMenu("Open sa&mple")
+        for name, text in files.samples.items():
+            act = self.samples.addAction(f"{name}: {text}")
+            act.triggered.connect(partial(lambda name, _=False: files.open_sample(name), name))
+        self.samples.setEnabled(bool(files.samples))
+        menu.addSeparator()
+        for name, text, function, keys, image in (
+            ("save_mesh", "&Save mesh as…", files.save_mesh, standard.Save, "save"),
+            ("save_case", "Save &case as…", files.save_case, "Ctrl+Shift+S", "case"),
+            ("save_picture", "Save &picture…", files.save_picture, "Ctrl+P", "picture"),
+        ):
+            menu.addAction(self._add(name, text, function, keys, image))
+        menu.addSeparator()
+        menu.addAction(self._add("quit", "&Quit", window.close, standard.Quit))
+        run = window.menuBar().addMenu("&Run")
+        run.addAction(self._add("run", "&Run", window.start_run, "F5", "run"))
+        run.addAction(self._add("cancel", "&Cancel", window.cancel, "", "cancel"))
+
+    def _fill_recent(self) -> None:
+        self.recent.clear()
+        for path in self.window.files.recent():
+            act = self.recent.addAction(str(path))
+            act.triggered.connect(lambda _=False, path=path: self.window.files.open_path(path))
+        if self.recent.isEmpty():
+            self.recent.addAction("(none yet)").setEnabled(False)
+
+    def _make_view(self) -> None:
+        window = self.window
+        menu = window.menuBar().addMenu("&View")
+        for name, text, keys, tip in TOGGLES:
+            act = self._add(name, text, None, keys, _ICONS.get(name, name))
+            act.setCheckable(True)
+            act.setToolTip(f"{tip} ({keys})")
+            act.toggled.connect(partial(self._toggle, name))
+            menu.addAction(act)
+        menu.addSeparator()
+        menu.addAction(self._add("fit", "&Fit all", window.fit, "F", "fit"))
+        sides = menu.addMenu("Look &from")
+        for side, keys in {**SIDE_KEYS, "iso": "0"}.items():
+            text = "isometric" if side == "iso" else side
+            sides.addAction(self._add(f"side{side}", text, partial(window.look_from, side), keys))
+        menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
+        menu.addSeparator()
+        steps = menu.addMenu("&Steps")
+        player = window.player
+        for name, text, function, keys in (
+            ("step_first", "Undeformed", lambda: player.go(0), "Home"),
+            ("step_previous", "Step back", lambda: player.step(-1), "Alt+Left"),
+            ("step_play", "Play or pause", player.toggle, "Space"),
+            ("step_next", "Step on", lambda: player.step(1), "Alt+Right"),
+            ("step_last", "Last step", lambda: player.go(10**9), "End"),
+        ):
+            steps.addAction(self._add(name, text, function, keys))
+        menu.addSeparator()
+        themes = menu.addMenu("&Theme")
+        group = QActionGroup(window)
+        for theme in THEMES:
+            act = self._add(f"theme_{theme}", theme.capitalize())
+            act.setCheckable(True)
+            group.addAction(act)
+            act.triggered.connect(lambda _=False, theme=theme: window.set_theme(theme))
+            themes.addAction(act)
+        self.panels = menu.addMenu("&Panels")
+
+    def add_panels(self, docks) -> None:
+        """Offer to show and hide the docks."""
+        for dock in docks:
+            self.panels.addAction(dock.toggleViewAction())
+
+    def _toggle(self, name: str, checked: bool) -> None:
+        if getattr(self.window.store.session.view, name) != checked:
+            self.window.store.change(changes.set_view, **{name: checked})
+
+    def _make_tool_bar(self) -> None:
+        window = self.window
+        bar = QToolBar("Tools")
+        bar.setObjectName("tools")
+        bar.setMovable(False)
+        bar.setIconSize(QSize(20, 20))
+        window.addToolBar(bar)
+        self.bar = bar
+        for name in ("open", "save_mesh", "save_case", "save_picture"):
+            bar.addAction(self.by_name[name])
+        bar.addSeparator()
+        bar.addWidget(QLabel(" Colour by "))
+        self.colour = Choice(dict(COLOUR_BY))
+        self.colour.setObjectName("colour_by")
+        self.colour.setToolTip("What the colours of the view say; quality is always 0 to 1.")
+        self.colour.chosen.connect(
+            lambda value: window.store.change(changes.set_view, colour_by=value)
+        )
+        bar.addWidget(self.colour)
+        bar.addSeparator()
+        for name, *_ in TOGGLES:
+            bar.addAction(self.by_name[name])
+        bar.addSeparator()
+        bar.addAction(self.by_name["fit"])
+        for side in ("+x", "+y", "+z", "iso"):
+            self.by_name[f"side{side}"].setIconText(
+                side.strip("+").upper() if side != "iso" else "Iso"
+            )
+            bar.addAction(self.by_name[f"side{side}"])
+        space = QWidget()
+        space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        bar.addWidget(space)
+        self.zone = Choice({})
+        self.zone.setObjectName("zone")
+        self.zone.setToolTip("Which zone of the file is open.")
+        self.zone.chosen.connect(window.files.open_zone)
+        self.zone_label = bar.addWidget(QLabel(" Zone "))
+        self.zone_shown = bar.addWidget(self.zone)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+
+    def set_icon_colour(self, colour: str) -> None:
+        """Redraw the icons in another colour."""
+        for name, image in self._icons.items():
+            self.by_name[name].setIcon(icon(image, colour))
+
+    def sync(self, session: Session, busy: bool, ready: bool) -> None:
+        """Show the session: what is checked, what can be done."""
+        opened = session.mesh is not None
+        for name, *_ in TOGGLES:
+            act = self.by_name[name]
+            act.blockSignals(True)
+            act.setChecked(getattr(session.view, name))
+            act.blockSignals(False)
+            act.setEnabled(opened)
+        flat = opened and session.mesh.dim == 2
+        self.by_name["perspective"].setEnabled(opened and not flat)
+        for side in (*SIDE_KEYS, "iso"):
+            self.by_name[f"side{side}"].setEnabled(opened and not flat)
+        for name in ("save_case", "save_picture", "fit", "show_all"):
+            self.by_name[name].setEnabled(opened)
+        self.by_name["save_mesh"].setEnabled(opened and not busy)
+        self.by_name["run"].setEnabled(ready and not busy)
+        self.by_name["cancel"].setEnabled(busy)
+        self.colour.setEnabled(opened)
+        self.colour.show_value(session.view.colour_by)
+        zones = session.mesh.zones if opened else 1
+        if self.zone.count() != zones:
+            self.zone.clear()
+            for zone in range(1, zones + 1):
+                self.zone.addItem(f"{zone} of {zones}", zone)
+        self.zone.show_value(session.mesh.zone if opened else 1)
+        for shown in (self.zone_label, self.zone_shown):
+            shown.setVisible(zones > 1)

@@ -1,0 +1,218 @@
+"""Questions to the user, each a function, and the banner that tells what went wrong."""
+
+from __future__ import annotations
+
+import html
+import traceback
+from pathlib import Path
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QMessageBox,
+    QPlainTextEdit,
+    QPushButton,
+    QSpinBox,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.errors import SlidevizError
+
+PICTURE_FILTERS = "PNG picture (*.png)"
+CASE_FILTERS = "Case (*.cfg)"
+
+
+def mesh_filters() -> str:
+    """Return the formats a mesh can be saved in: SU2 first, VTU with quality, then meshio's."""
+    import meshio
+
+    others = sorted(
+        suffix
+        for suffix in meshio._helpers.extension_to_filetypes
+        if suffix not in (".su2", ".vtu") and suffix.count(".") == 1
+    )
+    return (
+        "SU2 mesh (*.su2);;VTU with quality (*.vtu);;"
+        f"Other formats ({' '.join('*' + suffix for suffix in others)})"
+    )
+
+
+def ask_open(parent: QWidget, folder: Path) -> Path | None:
+    """Return the file to open, or None."""
+    import meshio
+
+    every = " ".join("*" + suffix for suffix in sorted(meshio.extension_to_filetypes))
+    filters = f"SU2 meshes and cases (*.su2 *.cfg);;All meshes (*.su2 {every});;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Open a mesh or case", str(folder), filters)
+    return Path(name) if name else None
+
+
+def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
+    """Return the file to write, with an ending, or None. It asks before one is replaced."""
+    name, chosen = QFileDialog.getSaveFileName(parent, title, str(default), filters)
+    if not name:
+        return None
+    path = Path(name)
+    if not path.suffix:
+        suffix = chosen.split("*")[-1].split(")")[0].split()[0] if "*" in chosen else ""
+        path = path.with_suffix(suffix or default.suffix)
+    return path
+
+
+def ask_unsaved(parent: QWidget, what: str) -> str:
+    """Return ``save``, ``discard`` or ``cancel`` for changes that would be lost."""
+    box = QMessageBox(parent)
+    box.setIcon(QMessageBox.Icon.Question)
+    box.setWindowTitle("Unsaved changes")
+    box.setText(what)
+    box.setInformativeText("Save the case first? It repeats the result exactly.")
+    save = box.addButton("Save case…", QMessageBox.ButtonRole.AcceptRole)
+    discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
+    box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(save)
+    box.exec()
+    clicked = box.clickedButton()
+    return "save" if clicked is save else "discard" if clicked is discard else "cancel"
+
+
+def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
+    """Return whether the mesh that was opened may be replaced by the deformed one."""
+    answer = QMessageBox.warning(
+        parent,
+        "Replace the input mesh?",
+        f"{path.name} is the mesh you opened. Replacing it cannot be undone.",
+        QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
+        QMessageBox.StandardButton.Cancel,
+    )
+    return answer == QMessageBox.StandardButton.Yes
+
+
+class PictureDialog(QDialog):
+    """How large a picture is, and whether its background is transparent."""
+
+    SIZES = ("as the view", "1280 × 800", "1920 × 1080", "3840 × 2160", "other")
+
+    def __init__(self, parent: QWidget, view_size: tuple[int, int]) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Save picture")
+        self._view_size = view_size
+        form = QFormLayout(self)
+        self.choice = QComboBox()
+        self.choice.addItems(self.SIZES)
+        self.width_px, self.height_px = QSpinBox(), QSpinBox()
+        row = QHBoxLayout()
+        for box, value in zip((self.width_px, self.height_px), view_size, strict=True):
+            box.setRange(64, 8192)
+            box.setValue(value)
+            box.setSuffix(" px")
+            row.addWidget(box)
+        self.transparent = QCheckBox("transparent background")
+        form.addRow("Size", self.choice)
+        form.addRow("Width, height", row)
+        form.addRow("", self.transparent)
+        buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
+        )
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        form.addRow(buttons)
+        self.choice.currentTextChanged.connect(self._size_chosen)
+
+    def _size_chosen(self, text: str) -> None:
+        if text == self.SIZES[0]:
+            size = self._view_size
+        elif "×" in text:
+            size = tuple(int(part) for part in text.split("×"))
+        else:
+            return
+        self.width_px.setValue(size[0])
+        self.height_px.setValue(size[1])
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Return width and height in pixels."""
+        return self.width_px.value(), self.height_px.value()
+
+
+def message_of(error: BaseException) -> str:
+    """Return what an error means for the user."""
+    if isinstance(error, SlidevizError):
+        return str(error)
+    return f"Something unexpected went wrong ({type(error).__name__}): {error}"
+
+
+class DetailsDialog(QDialog):
+    """The full text of an error, to be copied."""
+
+    def __init__(self, parent: QWidget, text: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Details")
+        self.resize(720, 380)
+        layout = QVBoxLayout(self)
+        self.text = QPlainTextEdit(text)
+        self.text.setReadOnly(True)
+        self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        layout.addWidget(self.text)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        self.copy.clicked.connect(lambda: QApplication.clipboard().setText(text))
+        buttons.rejected.connect(self.close)
+        layout.addWidget(buttons)
+
+
+class Banner(QFrame):
+    """A message across the top of the view that stays until it is closed."""
+
+    shown = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("banner")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 6, 6, 6)
+        self.text = QLabel()
+        self.text.setWordWrap(True)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.details = QPushButton("Details…")
+        self.details.clicked.connect(self._show_details)
+        close = QToolButton()
+        close.setText("✕")
+        close.setToolTip("Close the message")
+        close.clicked.connect(self.hide)
+        row.addWidget(self.text, 1)
+        row.addWidget(self.details)
+        row.addWidget(close)
+        self._full = ""
+        self.hide()
+
+    def tell(self, text: str, full: str = "") -> None:
+        """Show a message, with a longer text behind “Details”."""
+        lines = text.splitlines() or [""]
+        brief = "\n".join(lines[:4]) + ("\n…" if len(lines) > 4 else "")
+        self.text.setText(html.escape(brief).replace("\n", "<br>"))
+        self._full = full or (text if len(lines) > 4 else "")
+        self.details.setVisible(bool(self._full))
+        self.show()
+        self.shown.emit(text)
+
+    def tell_error(self, error: BaseException) -> None:
+        """Show what an error means; the trace is behind “Details” if it was not expected."""
+        full = ""
+        if not isinstance(error, SlidevizError):
+            full = "".join(traceback.format_exception(error))
+        self.tell(message_of(error), full)
+
+    def _show_details(self) -> None:
+        self.dialog = DetailsDialog(self, self._full)
+        self.dialog.open()

@@ -1,0 +1,169 @@
+"""Small input fields: numbers and vectors that are checked as they are typed."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from qtpy.QtCore import QLocale, Signal
+from qtpy.QtWidgets import QComboBox, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+
+
+def number_text(value: float) -> str:
+    """Return a number as short as it can be without losing a digit."""
+    text = repr(float(value))
+    return text.removesuffix(".0")
+
+
+class NumberField(QLineEdit):
+    """A number; what is not allowed is marked at once, with the reason as tooltip.
+
+    ``allowed`` returns an empty text, or why a value may not be.
+    """
+
+    changed = Signal(float)
+
+    def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
+        super().__init__(number_text(value))
+        self._allowed = allowed or (lambda _: "")
+        self._value = float(value)
+        self._tip = ""
+        self.setMinimumWidth(46)
+        self.setLocale(QLocale.c())
+        self.textEdited.connect(self._edited)
+        self.editingFinished.connect(self._tidy)
+
+    @property
+    def value(self) -> float:
+        """Return the last valid number."""
+        return self._value
+
+    @property
+    def problem(self) -> str:
+        """Return why the text is not valid, or an empty text."""
+        try:
+            # A decimal comma is what many people type; thousands are not separated here.
+            value = float(self.text().strip().replace(",", "."))
+        except ValueError:
+            return f"“{self.text()}” is not a number"
+        if not math.isfinite(value):
+            return "the number must be finite"
+        return self._allowed(value)
+
+    def set_tip(self, text: str) -> None:
+        """Explain the field; shown while its value is valid."""
+        self._tip = text
+        self._mark(self.problem)
+
+    def show_value(self, value: float) -> None:
+        """Show a number without telling; what is being typed is left if it means the same."""
+        if value == self._value and (self.hasFocus() or not self.problem):
+            return
+        self._value = float(value)
+        self.setText(number_text(value))
+        self._mark("")
+
+    def _edited(self) -> None:
+        problem = self.problem
+        self._mark(problem)
+        if not problem:
+            self._value = float(self.text().strip().replace(",", "."))
+            self.changed.emit(self._value)
+
+    def _tidy(self) -> None:
+        if self.problem:
+            self.setText(number_text(self._value))
+            self._mark("")
+
+    def _mark(self, problem: str) -> None:
+        self.setToolTip(problem or self._tip)
+        if bool(self.property("bad")) != bool(problem):
+            self.setProperty("bad", bool(problem))
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+
+class VectorField(QWidget):
+    """Two or three numbers in a row."""
+
+    changed = Signal(tuple)
+
+    def __init__(self, values: Sequence[float] = (0.0, 0.0, 0.0), names: str = "xyz") -> None:
+        super().__init__()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(4)
+        self.fields: list[NumberField] = []
+        self._labels: list[QLabel] = []
+        for name, value in zip(names, values, strict=True):
+            label, field = QLabel(name), NumberField(value)
+            field.setAccessibleName(name)
+            field.changed.connect(lambda _: self.changed.emit(self.value))
+            row.addWidget(label)
+            row.addWidget(field, 1)
+            self.fields.append(field)
+            self._labels.append(label)
+        self.count = len(self.fields)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    @property
+    def value(self) -> tuple[float, ...]:
+        """Return the numbers, as many as the mesh has dimensions."""
+        return tuple(field.value for field in self.fields[: self.count])
+
+    def set_count(self, count: int) -> None:
+        """Show the first ``count`` numbers only."""
+        self.count = count
+        for index, (label, field) in enumerate(zip(self._labels, self.fields, strict=True)):
+            label.setVisible(index < count)
+            field.setVisible(index < count)
+
+    def show_value(self, values: Sequence[float]) -> None:
+        """Show numbers without telling."""
+        for field, value in zip(self.fields, values, strict=False):
+            field.show_value(value)
+
+    def set_tip(self, text: str) -> None:
+        """Explain the field."""
+        for field in self.fields:
+            field.set_tip(text)
+
+
+class Choice(QComboBox):
+    """A drop-down of values with words; the wheel scrolls the panel instead of changing it."""
+
+    chosen = Signal(object)
+
+    def __init__(self, words: dict[object, str]) -> None:
+        super().__init__()
+        self.words = dict(words)
+        for value, text in words.items():
+            self.addItem(text, value)
+        self.setMinimumContentsLength(8)
+        self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
+
+    def show_value(self, value: object) -> None:
+        """Show a value without telling."""
+        index = self.findData(value)
+        if index >= 0 and index != self.currentIndex():
+            self.setCurrentIndex(index)
+
+    def wheelEvent(self, event) -> None:
+        event.ignore()
+
+
+def positive(value: float) -> str:
+    """Return why a number is not above zero."""
+    return "" if value > 0 else f"{number_text(value)} must be greater than 0"
+
+
+def not_zero(value: float) -> str:
+    """Return why a number may not be zero."""
+    return "" if value else "0 would flatten the boundary"
+
+
+def angle_limit(value: float) -> str:
+    """Return why a feature angle is out of range."""
+    return "" if 0 < value <= 180 else f"{number_text(value)} must be above 0 and at most 180"

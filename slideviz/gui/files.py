@@ -1,0 +1,209 @@
+"""Opening and saving: which file, in what order, with what question before."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+from qtpy.QtCore import QObject, QSettings, QStandardPaths
+from qtpy.QtWidgets import QDialog
+
+from slideviz.errors import SlidevizError
+from slideviz.gui import dialogs
+from slideviz.view import changes, jobs
+
+log = logging.getLogger("slideviz")
+RECENT = 10
+
+
+class Files(QObject):
+    """The files of a window."""
+
+    def __init__(self, window, settings: QSettings) -> None:
+        super().__init__(window)
+        self.window = window
+        self.settings = settings
+        self.samples = known_samples()
+        self._saved_to: Path | None = None
+
+    # Open ------------------------------------------------------------------------------
+
+    def recent(self) -> list[Path]:
+        """Return the files used last, newest first."""
+        listed = self.settings.value("recent", []) or []
+        listed = [listed] if isinstance(listed, str) else listed
+        return [Path(text) for text in listed]
+
+    def remember(self, path: Path) -> None:
+        """Put a file at the top of the recent ones."""
+        every = [path, *(other for other in self.recent() if other != path)][:RECENT]
+        self.settings.setValue("recent", [str(each) for each in every])
+        self.settings.setValue("folder", str(path.parent))
+
+    def folder(self) -> Path:
+        """Return where file dialogs start."""
+        path = Path(str(self.settings.value("folder", "")) or Path.home())
+        return path if path.is_dir() else Path.home()
+
+    def ask_and_open(self) -> None:
+        """Ask for a file and open it."""
+        path = dialogs.ask_open(self.window, self.folder())
+        if path is not None:
+            self.open_path(path)
+
+    def open_path(self, path: Path, zone: int | None = None) -> None:
+        """Open a mesh or case in the background, unless the user would rather keep what is."""
+        if self.may_go_on():
+            path = Path(path).absolute()
+            self.window.start_job(f"Opening {path.name}", self._opened, jobs.open_file, path, zone)
+
+    def open_zone(self, zone: int) -> None:
+        """Open another zone of the file that is open."""
+        session = self.window.store.session
+        if session.mesh is None or session.path is None or zone == session.mesh.zone:
+            return
+        self.open_path(session.path, zone)
+        self.window.sync_actions()
+
+    def open_sample(self, name: str) -> None:
+        """Write a sample case into a folder of this program and open it."""
+        from slideviz.case.samples import write_sample
+
+        try:
+            folder = sample_folder() / name
+            written = write_sample(name, folder, overwrite=True)
+            self.open_path(next(path for path in written if path.suffix == ".cfg"))
+        except (OSError, SlidevizError) as error:
+            self.window.banner.tell_error(error)
+
+    def _opened(self, opened: jobs.Opened) -> None:
+        session = opened.session
+        self._saved_to = None
+        path = session.case.source or session.path
+        if path is not None and sample_folder() not in path.parents:
+            self.remember(path)
+        self.window.show_opened(opened)
+        mesh = session.mesh
+        log.info(
+            "opened %s: %dD, %d cells, %d points, %d boundaries",
+            session.path, mesh.dim, len(mesh.cells), len(mesh.points), len(mesh.markers),
+        )  # fmt: skip
+
+    def may_go_on(self) -> bool:
+        """Ask about unsaved changes; return whether they may be dropped or were saved."""
+        session = self.window.store.session
+        what = []
+        if session.unsaved_case:
+            what.append("the case has changes")
+        if session.unsaved_mesh:
+            what.append("the deformed mesh has not been saved")
+        if not what:
+            return True
+        text = " and ".join(what)
+        answer = dialogs.ask_unsaved(self.window, f"{text[0].upper()}{text[1:]}.")
+        return answer == "discard" or (answer == "save" and self.save_case())
+
+    # Save ------------------------------------------------------------------------------
+
+    def _stem(self) -> str:
+        session = self.window.store.session
+        path = session.path or session.case.source
+        return path.stem if path is not None else "mesh"
+
+    def save_mesh(self) -> None:
+        """Ask for a name and write the mesh of the step that is shown."""
+        session = self.window.store.session
+        frame = session.frame
+        if frame is None or self.window.runner.busy:
+            return
+        step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
+        default = self.folder() / f"{self._stem()}{step}.su2"
+        filters = dialogs.mesh_filters()
+        path = dialogs.ask_save(self.window, "Save mesh", default, filters)
+        if path is None:
+            return
+        overwrite = _same(path, session.path)
+        if overwrite and not dialogs.ask_overwrite_input(self.window, path):
+            return
+        self.settings.setValue("folder", str(path.parent))
+        last = frame is session.frames[-1]
+        self.window.start_job(
+            f"Saving {path.name}",
+            lambda saved: self._mesh_saved(saved, last),
+            jobs.save_mesh,
+            path,
+            frame,
+            overwrite,
+        )
+
+    def _mesh_saved(self, path: Path, last: bool) -> None:
+        if last:
+            self._saved_to = path
+            self.window.store.change(changes.saved_mesh)
+        self.window.say(f"Saved {path}")
+
+    def save_case(self) -> bool:
+        """Ask for a name and write the case; return whether it was written."""
+        session = self.window.store.session
+        if session.mesh is None:
+            return False
+        source = session.case.source
+        default = source or self.folder() / f"{self._stem()}.cfg"
+        path = dialogs.ask_save(self.window, "Save case", default, dialogs.CASE_FILTERS)
+        if path is None:
+            return False
+        case = session.case
+        if self._saved_to is not None and self._saved_to.suffix == ".su2":
+            case = case.change(mesh_out=self._saved_to)
+        try:
+            case.write(path)
+        except (OSError, SlidevizError) as error:
+            self.window.banner.tell_error(error)
+            return False
+        self.window.store.change(changes.saved_case, replace(case, source=path))
+        self.remember(path)
+        self.window.say(f"Saved {path}")
+        return True
+
+    def save_picture(self) -> None:
+        """Ask for size and name and write a picture of the view."""
+        view = self.window.view
+        dialog = dialogs.PictureDialog(self.window, (view.width(), view.height()))
+        if dialog.exec() != QDialog.DialogCode.Accepted:
+            return
+        default = self.folder() / f"{self._stem()}.png"
+        path = dialogs.ask_save(self.window, "Save picture", default, dialogs.PICTURE_FILTERS)
+        if path is None:
+            return
+        try:
+            self.window.write_picture(path, dialog.size_px, dialog.transparent.isChecked())
+        except (OSError, SlidevizError) as error:
+            self.window.banner.tell_error(error)
+            return
+        self.settings.setValue("folder", str(path.parent))
+        self.window.say(f"Saved {path}")
+
+
+def _same(path: Path, other: Path | None) -> bool:
+    try:
+        return other is not None and path.samefile(other)
+    except OSError:
+        return False
+
+
+def sample_folder() -> Path:
+    """Return where the sample cases are written to be opened."""
+    places = QStandardPaths.standardLocations(QStandardPaths.StandardLocation.CacheLocation)
+    return Path(places[0] if places else tempfile.gettempdir()) / "slideviz-samples"
+
+
+def known_samples() -> dict[str, str]:
+    """Return the sample cases: name and description."""
+    if find_spec("slideviz.case.samples") is None:
+        return {}
+    from slideviz.case import samples
+
+    return dict(samples.SAMPLES)

@@ -1,0 +1,185 @@
+"""The motion panel: what the moving boundaries do, in sequence, and the form for one of them."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from functools import partial
+
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QMenu,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.gui.icons import icon
+from slideviz.gui.motion_editor import KINDS, MotionEditor, describe, new_motion
+from slideviz.view import changes
+from slideviz.view.state import Session
+from slideviz.view.store import Store
+
+
+class MotionPanel(QWidget):
+    """Lists the motions and edits the chosen one."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._syncing = False
+        self._mesh = None
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 4)
+        layout.setSpacing(4)
+        layout.addLayout(self._make_buttons())
+        self.list = QListWidget()
+        self.list.setObjectName("motions")
+        self.list.setMinimumHeight(44)
+        self.list.setAlternatingRowColors(True)
+        self.list.currentRowChanged.connect(lambda _: self._row_changed())
+        layout.addWidget(self.list, 1)
+        self.editor = MotionEditor()
+        self.editor.changed.connect(self._edited)
+        layout.addWidget(self.editor)
+        self.hint = QLabel()
+        self.hint.setWordWrap(True)
+        self.hint.setProperty("hint", True)
+        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self.hint)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(2)
+        self.add = QToolButton()
+        self.add.setObjectName("add_motion")
+        self.add.setText("Add motion")
+        self.add.setIcon(icon("add"))
+        self.add.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self.add)
+        self.add_actions = {}
+        for kind, words in KINDS.items():
+            self.add_actions[kind] = menu.addAction(words.capitalize())
+            self.add_actions[kind].triggered.connect(partial(self._add, kind))
+        self.add.setMenu(menu)
+        row.addWidget(self.add)
+        row.addStretch(1)
+        self.up, self.down, self.remove = (
+            self._button("up", "Perform it earlier", lambda: self._move(-1)),
+            self._button("down", "Perform it later", lambda: self._move(1)),
+            self._button("remove", "Remove the motion (Del)", self._remove),
+        )
+        for button in (self.up, self.down, self.remove):
+            row.addWidget(button)
+        return row
+
+    def _button(self, name: str, tip: str, function) -> QToolButton:
+        button = QToolButton()
+        button.setObjectName(f"motion_{name}")
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
+        button.clicked.connect(function)
+        return button
+
+    def set_icon_colour(self, colour: str) -> None:
+        """Redraw the icons in another colour."""
+        self.add.setIcon(icon("add", colour))
+        for button, name in ((self.up, "up"), (self.down, "down"), (self.remove, "remove")):
+            button.setIcon(icon(name, colour))
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session."""
+        motions, moving = session.case.motions, session.case.markers_with("moving")
+        self._syncing = True
+        try:
+            texts = [f"{i}.  {describe(motion)}" for i, motion in enumerate(motions, 1)]
+            current = self.list.currentRow()
+            if self.list.count() != len(texts):
+                # A new motion is the one to be edited; after a removal, its neighbour is.
+                current = len(texts) - 1 if len(texts) > self.list.count() else current
+                self.list.clear()
+                self.list.addItems(texts)
+            for row, text in enumerate(texts):
+                self.list.item(row).setText(text)
+                self.list.item(row).setToolTip(text)
+            self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
+        finally:
+            self._syncing = False
+        if session.mesh is not self._mesh:
+            self._mesh = session.mesh
+            self.editor.set_centroids(_centroids(session))
+        self._sync_editor(session)
+        self._sync_buttons(session, moving)
+
+    def _sync_editor(self, session: Session) -> None:
+        row, motions = self.list.currentRow(), session.case.motions
+        dim = session.mesh.dim if session.mesh else 3
+        motion = motions[row] if 0 <= row < len(motions) else None
+        self.editor.show_motion(motion, session.case.markers_with("moving"), dim)
+
+    def _sync_buttons(self, session: Session, moving: tuple[str, ...]) -> None:
+        row, count = self.list.currentRow(), self.list.count()
+        self.up.setEnabled(row > 0)
+        self.down.setEnabled(0 <= row < count - 1)
+        self.remove.setEnabled(row >= 0)
+        self.add.setEnabled(bool(moving))
+        if session.mesh is None:
+            why = "Open a mesh first."
+        elif not moving:
+            why = "No boundary moves yet. Give one the role “moving” in the table above."
+        else:
+            why = ""
+        self.add.setToolTip(why or "Add a motion; several are performed in sequence.")
+        self.hint.setText(why or "Add the motions of the boundary; the view shows them at once.")
+        self.hint.setVisible(bool(why) or count == 0)
+
+    # Widgets to state ------------------------------------------------------------------
+
+    def _row_changed(self) -> None:
+        if not self._syncing:
+            session = self.store.session
+            self._sync_editor(session)
+            self._sync_buttons(session, session.case.markers_with("moving"))
+
+    def _add(self, kind: type, *_checked: bool) -> None:
+        session = self.store.session
+        moving = session.case.markers_with("moving")
+        chosen = [name for name in session.view.selected if name in moving]
+        marker = (chosen or list(moving))[0]
+        self.store.change(changes.add_motion, new_motion(kind, marker, session.mesh.dim))
+
+    def _edited(self, motion: object) -> None:
+        self.store.change(changes.replace_motion, self.list.currentRow(), motion)
+
+    def _remove(self) -> None:
+        self.store.change(changes.remove_motion, self.list.currentRow())
+
+    def _move(self, by: int) -> None:
+        row = self.list.currentRow()
+        self.store.change(changes.move_motion, row, by)
+        self.list.setCurrentRow(row + by)
+
+    def keyPressEvent(self, event) -> None:
+        if event.key() == Qt.Key.Key_Delete and self.list.hasFocus() and self.remove.isEnabled():
+            self._remove()
+            return
+        super().keyPressEvent(event)
+
+
+def _centroids(session: Session) -> dict[str, tuple[float, ...]]:
+    if session.mesh is None:
+        return {}
+    points = session.mesh.points
+    return {
+        marker.name: tuple(float(v) for v in points[marker.nodes].mean(axis=0))
+        for marker in session.mesh.markers
+        if len(marker.nodes)
+    }

@@ -1,0 +1,115 @@
+"""The run panel: start, what is missing, progress, cancel."""
+
+from __future__ import annotations
+
+import html
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
+
+from slideviz.gui.icons import icon
+from slideviz.view.changes import is_missing
+from slideviz.view.jobs import Doing
+from slideviz.view.state import Session
+from slideviz.view.store import Store
+
+
+class RunPanel(QWidget):
+    """Starts and cancels a run; says what a run still needs, as a link to where it is given."""
+
+    run_wanted = Signal()
+    cancel_wanted = Signal()
+    place_wanted = Signal(str)
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._busy = ""
+        self._missing = ()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 6)
+        layout.setSpacing(5)
+        row = QHBoxLayout()
+        self.run = QPushButton(icon("run", "#ffffff"), "Run")
+        self.run.setObjectName("run")
+        self.run.setShortcut("Ctrl+R")
+        self.run.clicked.connect(self.run_wanted)
+        self.cancel = QPushButton(icon("cancel"), "Cancel")
+        self.cancel.setObjectName("cancel")
+        self.cancel.setShortcut("Esc")
+        self.cancel.setToolTip("Stop within a second (Esc); the steps that are done stay.")
+        self.cancel.clicked.connect(self.cancel_wanted)
+        self.text = QLabel()
+        self.text.setWordWrap(True)
+        self.text.setMinimumHeight(34)
+        self.text.setTextFormat(Qt.TextFormat.RichText)
+        self.text.linkActivated.connect(self.place_wanted)
+        row.addWidget(self.run)
+        row.addWidget(self.cancel)
+        row.addWidget(self.text, 1)
+        layout.addLayout(row)
+        self.bar = QProgressBar()
+        self.bar.setRange(0, 1000)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(6)
+        layout.addWidget(self.bar)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def sync(self, session: Session) -> None:
+        """Show whether a run can start, and if not what it needs."""
+        # Some checks look at the mesh: not again while only the view changes.
+        key = (session.mesh, session.case)
+        if key != getattr(self, "_key", None):
+            self._key = key
+            self._missing = is_missing(session)
+        self.cancel.setVisible(bool(self._busy))
+        self.run.setVisible(not self._busy)
+        self.run.setEnabled(not self._missing)
+        if self._busy:
+            return
+        self.bar.setValue(0)
+        if self._missing:
+            first = self._missing[0]
+            more = len(self._missing) - 1
+            text = html.escape(first.text)
+            self.text.setText(
+                f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
+            )
+            tip = "\n".join(missing.text for missing in self._missing)
+            self.text.setToolTip(tip)
+            self.run.setToolTip(tip)
+            return
+        self.run.setToolTip("Deform the mesh with these settings (Ctrl+R).")
+        self.text.setToolTip("")
+        if session.outdated:
+            self.text.setText("Settings changed since the last run.")
+        else:
+            self.text.setText("Done." if session.deformed else "Ready.")
+
+    def set_busy(self, what: str) -> None:
+        """Show that a job runs (its name), or with an empty text that none does."""
+        self._busy = what
+        self.cancel.setEnabled(True)
+        self.bar.setRange(0, 1000)
+        self.bar.setValue(0)
+        if what:
+            self.text.setText(html.escape(what))
+            self.text.setToolTip("")
+        self.sync(self.store.session)
+
+    def show_doing(self, doing: Doing) -> None:
+        """Show how far the job is."""
+        if not self._busy:
+            return
+        self.text.setText(html.escape(doing.text))
+        if doing.fraction is None:
+            self.bar.setRange(0, 0)
+        else:
+            self.bar.setRange(0, 1000)
+            self.bar.setValue(round(1000 * doing.fraction))
+
+    def show_cancelling(self) -> None:
+        """Show that the job was asked to stop."""
+        self.cancel.setEnabled(False)
+        self.text.setText("Cancelling…")

@@ -1,0 +1,183 @@
+"""Pure functions from one session to the next: everything the user can ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from slideviz.case.model import Case, FromFile, Motion, Role
+from slideviz.mesh.periodic import Pair
+from slideviz.view.guess import guess_case, guess_roles
+from slideviz.view.state import Frame, Session, ViewState
+
+Place = Literal["open", "boundaries", "motion", "method"]
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What must be put right before a run, in words, and which panel does it."""
+
+    text: str
+    place: Place
+
+
+def open_mesh(
+    first: Frame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
+) -> Session:
+    """Return a session with a mesh just read; without a case its roles are guessed."""
+    mesh = first.mesh
+    guesses = {} if case is not None else guess_roles(mesh, pairs)
+    chosen = guess_case(mesh, guesses, pairs) if case is None else case
+    listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
+    others = {name: role for name, role in chosen.roles.items() if name not in listed}
+    chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
+    return Session(mesh, path, chosen, guesses, tuple(pairs), (first,), saved=chosen)
+
+
+def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
+    """Return the session with these boundaries in that role, which confirms it for them."""
+    changed = tuple(names)
+    roles = dict(session.case.roles) | dict.fromkeys(changed, role)
+    guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
+    motions = tuple(
+        motion
+        for motion in session.case.motions
+        if not motion.marker or roles.get(motion.marker) == "moving"
+    )
+    case = session.case.change(roles=roles, motions=motions)
+    if "periodic" not in roles.values():
+        case = case.change(periodic="none")
+    return replace(session, case=case, guesses=guesses)
+
+
+def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
+    """Return the session with the guesses for these boundaries (default: all) taken as right."""
+    gone = set(session.guesses if names is None else names)
+    kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
+    return replace(session, guesses=kept)
+
+
+def set_case(session: Session, **values: Any) -> Session:
+    """Return the session with other settings of the case."""
+    return replace(session, case=session.case.change(**values))
+
+
+def add_motion(session: Session, motion: Motion) -> Session:
+    """Return the session with one more motion, performed last."""
+    return set_case(session, motions=(*session.case.motions, motion))
+
+
+def replace_motion(session: Session, index: int, motion: Motion) -> Session:
+    """Return the session with another motion at that place."""
+    motions = list(session.case.motions)
+    motions[index] = motion
+    return set_case(session, motions=tuple(motions))
+
+
+def remove_motion(session: Session, index: int) -> Session:
+    """Return the session without the motion at that place."""
+    motions = session.case.motions
+    return set_case(session, motions=motions[:index] + motions[index + 1 :])
+
+
+def move_motion(session: Session, index: int, by: int) -> Session:
+    """Return the session with a motion performed earlier (negative) or later."""
+    motions = list(session.case.motions)
+    motion = motions.pop(index)
+    motions.insert(max(0, index + by), motion)
+    return set_case(session, motions=tuple(motions))
+
+
+def set_view(session: Session, **values: Any) -> Session:
+    """Return the session looked at in another way."""
+    return replace(session, view=replace(session.view, **values))
+
+
+def select(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with these boundaries highlighted."""
+    return set_view(session, selected=tuple(names))
+
+
+def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
+    """Return the session with these boundaries shown or hidden."""
+    hidden = session.view.hidden
+    change = frozenset(names)
+    return set_view(session, hidden=hidden - change if shown else hidden | change)
+
+
+def isolate(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with only these boundaries shown."""
+    every = session.mesh.marker_names if session.mesh else ()
+    return set_view(session, hidden=frozenset(every) - frozenset(names))
+
+
+def show_frame(session: Session, index: int) -> Session:
+    """Return the session at another step, the nearest there is."""
+    return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
+
+
+def start_run(session: Session) -> Session:
+    """Return the session without steps: those of the last run go when a new one starts."""
+    session = replace(session, frames=session.frames[:1], ran=session.case, unsaved_mesh=False)
+    return show_frame(session, 0)
+
+
+def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
+    """Return the session with steps just computed; the last is shown."""
+    every = (*session.frames, *frames)
+    return show_frame(replace(session, frames=every, unsaved_mesh=True), len(every) - 1)
+
+
+def saved_case(session: Session, case: Case) -> Session:
+    """Return the session with ``case`` on disk."""
+    return replace(session, case=case, saved=case)
+
+
+def saved_mesh(session: Session) -> Session:
+    """Return the session with the deformed mesh on disk."""
+    return replace(session, unsaved_mesh=False)
+
+
+def fresh_view(session: Session, old: ViewState) -> Session:
+    """Return a session just opened with the taste of the one before: edges, legend, ghosts."""
+    kept = {
+        name: getattr(old, name)
+        for name in ("edges", "undeformed", "motion_ghost", "legend", "perspective")
+    }
+    return set_view(session, **kept)
+
+
+def is_missing(session: Session) -> tuple[Missing, ...]:
+    """Return what must be put right before a run, most urgent first; empty when ready."""
+    if session.mesh is None:
+        return (Missing("Open a mesh first.", "open"),)
+    case, found = session.case, []
+    moving = case.markers_with("moving")
+    if not moving:
+        found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))
+    given = {motion.marker for motion in case.motions}
+    found += [
+        Missing(f"“{name}” has no motion: add one.", "motion")
+        for name in moving
+        if name not in given and "" not in given
+    ]
+    for motion in case.motions:
+        if isinstance(motion, FromFile) and not motion.path.is_file():
+            text = f"The displacement file {motion.path} does not exist."
+            found.append(Missing(text, "motion"))
+    if case.periodic == "moving" and case.sliding == "none":
+        text = "Moving periodic vertices need sliding: choose pseudo or direct."
+        found.append(Missing(text, "method"))
+    if not found:
+        found = [Missing(text, "boundaries") for text in _problems(session)]
+    return tuple(found)
+
+
+def _problems(session: Session) -> list[str]:
+    """Return what the case itself finds wrong with the mesh."""
+    from slideviz.case.motion import check_case
+
+    assert session.mesh is not None
+    return [str(problem) for problem in check_case(session.case, session.mesh)]

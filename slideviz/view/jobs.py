@@ -1,0 +1,147 @@
+"""The long jobs of the window as plain functions: open, compute, save.
+
+Each gets ``report(item)``, which may be called from any thread, and ``stopped()``, and raises
+`slideviz.errors.Cancelled` soon after ``stopped()`` became true. Nothing here draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.case.model import Case
+from slideviz.errors import Cancelled, CaseError
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.quality import quality
+from slideviz.view.changes import open_mesh
+from slideviz.view.state import Frame, Session
+from slideviz.view.surfaces import Surface, find_surfaces
+
+Report = Callable[[object], None]
+Stopped = Callable[[], bool]
+
+CASE_SUFFIXES = (".cfg",)
+PHASES = {
+    "classify": "sorting nodes",
+    "solve": "solving",
+    "evaluate": "moving the nodes",
+    "project": "projecting onto the boundaries",
+    "quality": "quality",
+}
+"""Words for people for the phases of a run."""
+
+
+@dataclass(frozen=True)
+class Doing:
+    """What is being done, in words, and how far it is: 0 to 1, or None when nobody knows."""
+
+    text: str
+    fraction: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """The outcome of `open_file`: the session, and the boundaries ready to be drawn."""
+
+    session: Session
+    surfaces: tuple[Surface, ...]
+
+
+def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
+    """Return a mesh, or the case of a ``.cfg`` file with its mesh, ready to be shown.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be used; the message says what and where.
+    """
+    from slideviz.mesh.files import read
+
+    case, mesh_path = None, path
+    if path.suffix.lower() in CASE_SUFFIXES:
+        report(Doing(f"Reading {path.name}"))
+        case = Case.read(path)
+        if case.mesh_file is None:
+            raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
+        mesh_path, zone = case.mesh_file, case.zone if zone is None else zone
+    report(Doing(f"Reading {mesh_path.name}"))
+
+    def reading(fraction: float) -> None:
+        require_going(stopped)
+        report(Doing(f"Reading {mesh_path.name}", fraction))
+
+    mesh = read(mesh_path, zone=zone, progress=reading)
+    return prepare(mesh, mesh_path, case, report, stopped)
+
+
+def prepare(
+    mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
+) -> Opened:
+    """Return a mesh that was just read, ready to be shown: boundaries, pairs, quality."""
+    require_going(stopped)
+    report(Doing("Finding the boundaries"))
+    surfaces = find_surfaces(mesh)
+    require_going(stopped)
+    report(Doing("Looking for periodic boundaries"))
+    pairs = find_pairs(mesh) if mesh.markers else ()
+    require_going(stopped)
+    report(Doing("Measuring the cells"))
+    metric = case.quality_metric if case is not None else "knupp"
+    first = Frame(mesh, quality(mesh, metric=metric))
+    return Opened(open_mesh(first, path, pairs, case), surfaces)
+
+
+def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
+    """Deform the mesh; every step is reported as a `Frame`, what goes on as `Doing`."""
+    from slideviz.staircase import Progress, deform
+
+    def progress(now: Progress) -> None:
+        require_going(stopped)
+        phase = PHASES.get(now.phase, now.phase)
+        report(Doing(f"Step {now.step} of {now.total}: {phase}", overall(now)))
+
+    for step in deform(case, mesh, progress=progress):
+        report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
+        report(Frame(step.mesh, quality(step.mesh, mesh, case.quality_metric), step))
+        if step.index < step.total:
+            require_going(stopped)
+
+
+_STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
+
+
+def overall(now: object) -> float:
+    """Return how much of the whole run is done, 0 to 1, roughly: phases differ in length."""
+    step, total = getattr(now, "step", 1), getattr(now, "total", 1)
+    phase, fraction = getattr(now, "phase", ""), getattr(now, "fraction", 0.0)
+    start = _STARTS.get(phase, 0.9)
+    later = [value for value in _STARTS.values() if value > start]
+    inside = start + fraction * (min(later, default=0.95) - start)
+    return float((step - 1 + inside) / total)
+
+
+def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, _stopped: Stopped) -> Path:
+    """Write the mesh of a frame, with its quality where the format can hold it."""
+    from slideviz.mesh.files import write
+
+    report(Doing(f"Writing {path.name}"))
+    data = None
+    if path.suffix.lower() != ".su2":
+        measured = frame.quality
+        data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
+    write(path, frame.mesh, overwrite=overwrite, cell_data=data)
+    return path
+
+
+def require_going(stopped: Stopped) -> None:
+    """Raise if the job was asked to stop.
+
+    Raises
+    ------
+    Cancelled
+        It was.
+    """
+    if stopped():
+        raise Cancelled("stopped, as you asked")

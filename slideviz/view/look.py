@@ -1,0 +1,57 @@
+"""Colours: of roles (told apart by colour-blind people too), of light and dark views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slideviz.case.model import Role
+
+ROLE_COLOURS: dict[Role, str] = {
+    "moving": "#d55e00",
+    "fixed": "#7d8793",
+    "sliding": "#0072b2",
+    "periodic": "#009e73",
+    "internal": "#cc79a7",
+}
+"""Okabe and Ito's palette (2008), and a grey for what does nothing."""
+
+ROLE_MEANING: dict[Role, str] = {
+    "moving": "is moved by the motions you list",
+    "fixed": "stays where it is",
+    "sliding": "its nodes slide along the surface",
+    "periodic": "repeats another boundary",
+    "internal": "its nodes move freely with the cells inside",
+}
+
+COLOUR_MAP = "viridis"
+"""Perceptually even, and the same for colour-blind people and on paper."""
+
+INVERTED_COLOUR = "#e8112d"
+SELECTED_COLOUR = "#ffb000"
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of a view that belong together.
+
+    Attributes
+    ----------
+    name : str
+    background, background_top : str
+        Bottom and top of the background.
+    text, edge, cell, ghost : str
+        Letters, edges of cells, faces without a value, undeformed boundaries.
+    """
+
+    name: str
+    background: str
+    background_top: str
+    text: str
+    edge: str
+    cell: str
+    ghost: str
+
+
+LIGHT = Look("light", "#ffffff", "#e9edf2", "#20262e", "#5b6672", "#e3e8ee", "#4a5562")
+DARK = Look("dark", "#1b1e23", "#2c323a", "#e6eaf0", "#8b96a3", "#3c444e", "#aab4c0")
+PAPER = Look("paper", "#ffffff", "#ffffff", "#000000", "#3a3a3a", "#e3e8ee", "#777777")
