@@ -16,7 +16,7 @@ from slideviz.case.plan import Plan, make_plan
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.methods import METHODS
-from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
 
 ON_AXIS = 1e-9
 """Nodes nearer to the axis than this part of the reference radius stay on it."""
@@ -63,6 +63,8 @@ class Step:
         Spent in this step, by phase; ``classify`` only in the first.
     warnings : tuple of str
         What the user should know; those of all steps so far.
+    history : tuple of Cycle
+        Convergence of the greedy selection in this step; empty without data reduction.
     """
 
     index: int
@@ -73,6 +75,7 @@ class Step:
     node_counts: Mapping[str, int]
     seconds: Mapping[str, float]
     warnings: tuple[str, ...]
+    history: tuple[Cycle, ...] = ()
 
 
 def deform(
@@ -130,6 +133,7 @@ def deform(
             plan.classes.counts(),
             watch.seconds,
             tuple(warnings),
+            solution.history,
         )
 
 

@@ -23,10 +23,6 @@ from slideviz.mesh.atomic import atomic_write
 
 __all__ = ["describe_keys", "read_case", "set_key", "write_case"]
 
-REDUCTION_WARNING = (
-    "DATA_REDUCTION= YES: this version solves with all control nodes, exactly; "
-    "the tolerance is met with error 0"
-)
 _ROLE_OF = {key: role for role, key in ROLE_KEYS.items()}
 
 
@@ -47,7 +43,7 @@ def read_case(path: Path) -> Case:
         remarks += (
             f"{path}: MESH_OUT_FILENAME is MESH_FILENAME: the undeformed mesh would be overwritten",
         )
-    return _with_warning(case.change(source=path, warnings=warnings + remarks))
+    return case.change(source=path, warnings=warnings + remarks)
 
 
 def write_case(path: Path, case: Case) -> None:
@@ -102,7 +98,7 @@ def set_key(case: Case, key: str, value: str) -> Case:
     remark = row.kind.remark(value.strip())
     if remark:
         changed = changed.change(warnings=(*changed.warnings, f"{place}: {remark}"))
-    return _with_warning(changed)
+    return changed
 
 
 def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]]:
@@ -189,12 +185,6 @@ def _unknown(key: str) -> str:
 def _without_role(case: Case, role: str, names: tuple[str, ...]) -> Case:
     kept = {name: r for name, r in case.roles.items() if r != role and name not in names}
     return case.change(roles=kept)
-
-
-def _with_warning(case: Case) -> Case:
-    """Return the case with the warning about data reduction if, and only if, it asks for it."""
-    others = tuple(text for text in case.warnings if text != REDUCTION_WARNING)
-    return case.change(warnings=(*others, REDUCTION_WARNING) if case.reduction else others)
 
 
 def _with_paths(case: Case, change: Callable[[Path], Path]) -> Case:

@@ -91,7 +91,16 @@ def greedy(name: str, kind: Kind, field: str, meaning: str) -> Key:
     def get(case: Case) -> Any:
         return None if case.reduction is None else getattr(case.reduction, field)
 
-    return Key(name, REDUCTION, kind, meaning, put, get, kind.write(getattr(Reduction(), field)))
+    value = getattr(Reduction(), field)
+    default = _NO_DEFAULT if value is None else kind.write(value)
+    return Key(name, REDUCTION, kind, meaning, put, get, default)
+
+
+def put_double_edge(case: Case, wanted: bool) -> Case:
+    """Return the case that selects two nodes at a time, or one: RBF-SliDe's DOUBLE_EDGE."""
+    if case.reduction is None:
+        return case
+    return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
 
 
 def put_reduction(case: Case, wanted: bool) -> Case:

@@ -23,6 +23,7 @@ from slideviz.case.key import (
     greedy,
     put_boundaries,
     put_direction,
+    put_double_edge,
     put_file,
     put_motions,
     put_reduction,
@@ -143,6 +144,12 @@ _ROWS = (
         "tolerance",
         "Largest error left before the boundary is corrected, in the mesh's length unit.",
     ),
+    greedy(
+        "DATA_RED_RELATIVE",
+        real(0.0),
+        "relative",
+        "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
+    ),
     greedy("MULTILEVEL", YES_NO, "multilevel", "Select the control nodes in levels."),
     greedy(
         "MULTI_CRIT",
@@ -154,8 +161,23 @@ _ROWS = (
         "LVL_TOL_CRIT", real(0.0, 1.0), "level_tolerance", "Fall of the error that ends a level."
     ),
     greedy("LVL_SIZE", whole(1), "level_size", "Number of control nodes of a level."),
+    Key(
+        "DOUBLE_EDGE",
+        REDUCTION,
+        YES_NO,
+        "Select two nodes at a time, with opposite errors (YES), or one (NO); SELECTION says it "
+        "better.",
+        put_double_edge,
+        lambda _: None,
+    ),
     greedy(
-        "DOUBLE_EDGE", YES_NO, "double_edge", "Select two nodes at a time, with opposite errors."
+        "SELECTION",
+        choice({word: word for word in ("block", "double", "one")}),
+        "selection",
+        "Nodes taken in a cycle: a growing block (fastest), two with opposite errors, or one.",
+    ),
+    greedy(
+        "MAX_CONTROL_NODES", whole(1), "max_nodes", "Stop at so many control nodes in any case."
     ),
     greedy("GAMMA", real(0.0), "gamma", "Radius of the correction over the largest error."),
     setting(
@@ -182,6 +204,9 @@ _OURS = {
     "PERIODIC_ORIGIN",
     "FEATURE_ANGLE",
     "QUALITY_METRIC",
+    "SELECTION",
+    "MAX_CONTROL_NODES",
+    "DATA_RED_RELATIVE",
 }
 
 KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name not in _OURS) for row in _ROWS}

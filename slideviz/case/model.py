@@ -76,8 +76,13 @@ class Reduction:
     criterion : "size" or "tol"
         A level ends at ``level_size`` nodes, or when its error has shrunk by the factor
         ``level_tolerance``.
-    double_edge : bool
-        Select two nodes at a time, with errors in opposite directions.
+    selection : "block", "double" or "one"
+        Nodes taken in a cycle: a growing number of them; the one of largest error and the one
+        of largest error in an opposite direction; or the one of largest error.
+    relative : float or None
+        The tolerance as a part of the mesh's largest extent, instead of ``tolerance``.
+    max_nodes : int or None
+        Stop at so many control nodes, whatever the error.
     gamma : float
         The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
     """
@@ -87,7 +92,9 @@ class Reduction:
     criterion: Literal["size", "tol"] = "size"
     level_tolerance: float = 0.5
     level_size: int = 16
-    double_edge: bool = True
+    selection: Literal["block", "double", "one"] = "block"
+    relative: float | None = None
+    max_nodes: int | None = None
     gamma: float = 25.0
 
 

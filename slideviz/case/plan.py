@@ -138,7 +138,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
         periodic_displacement=free,
-        reduction=_reduction(case),
+        reduction=_reduction(case, mesh.extent),
         boundary=boundary,
         fans=fans,
         tracks=tracks,
@@ -188,7 +188,7 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     return lowest[label]
 
 
-def _reduction(case: Case) -> Reduction | None:
+def _reduction(case: Case, extent: float) -> Reduction | None:
     """Return the settings of the selection in the solver's terms."""
     given = case.reduction
     if given is None:
@@ -197,10 +197,11 @@ def _reduction(case: Case) -> Reduction | None:
     if given.multilevel:
         level = "size" if given.criterion == "size" else "ratio"
     return Reduction(
-        tolerance=given.tolerance,
-        pick="double" if given.double_edge else "one",
+        tolerance=given.relative * extent if given.relative else given.tolerance,
+        pick=given.selection,
         level=level,
         level_size=given.level_size,
         level_ratio=given.level_tolerance,
+        max_nodes=given.max_nodes,
         gamma=given.gamma,
     )

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write mesh, report, steps and picture."""
     from slideviz import quality, read, write
     from slideviz.cli import DONE, INVERTED
-    from slideviz.cli.report import run_report, save_json
+    from slideviz.cli.report import run_report, save_history, save_json
     from slideviz.errors import CaseError
 
     begin = time.perf_counter()
@@ -65,12 +65,15 @@ def run(arguments: argparse.Namespace) -> int:
         picture(last.mesh, arguments.picture, reference=mesh, quality=found)
     seconds["total"] = time.perf_counter() - begin
     report = run_report(case, steps, found, seconds)
+    if arguments.history:
+        save_history(arguments.history, report)
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")
     elif not arguments.quiet:
         files = {"mesh": output, "quality of each cell": qualities}
         files |= {"report": arguments.json, "picture": arguments.picture}
+        files["convergence"] = arguments.history
         _print_run(report, found, files)
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)

@@ -87,6 +87,9 @@ def _add_run(calls: argparse._SubParsersAction) -> None:
         help="change a key of the case for this run; may be repeated",
     )
     run.add_argument("--json", type=Path, metavar="FILE", help="report as JSON; - is the terminal")
+    run.add_argument(
+        "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
+    )
     run.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
     run.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
     run.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")

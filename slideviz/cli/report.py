@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,10 @@ from slideviz.staircase import Step
 LISTED = 100
 """Inverted cells named in a report."""
 
-PHASES = ("read", "classify", "select", "solve", "evaluate", "project", "quality", "write")
+PHASES = (
+    *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
+    *("quality", "write"),
+)
 
 
 def run_report(
@@ -48,6 +52,9 @@ def run_report(
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
         "warnings": list(last.warnings),
+        "convergence": [
+            {"step": step.index, **asdict(cycle)} for step in steps for cycle in step.history
+        ],
     }
 
 
@@ -116,6 +123,15 @@ def save_json(path: Path, report: Mapping[str, Any]) -> str | None:
     with atomic_write(path, CaseError) as file:
         file.write(text.encode())
     return None
+
+
+def save_history(path: Path, report: Mapping[str, Any]) -> None:
+    """Write the convergence of the data reduction, a row for each cycle."""
+    columns = ("step", "cycle", "level", "error", "control_nodes", "seconds")
+    rows = [",".join(columns)]
+    rows += [",".join(repr(row[name]) for name in columns) for row in report["convergence"]]
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(rows) + "\n").encode())
 
 
 def table(rows: Sequence[Sequence[object]], indent: int = 2) -> str:

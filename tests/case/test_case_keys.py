@@ -260,12 +260,17 @@ class TestSetKey:
         case = set_key(case, "DEFORMATION_FILENAME", "NONE")
         assert case.motions == (Translate("A", (2.0, 0.0)),)
 
-    def test_data_reduction_comes_and_goes_with_its_warning(self):
-        case = set_key(set_key(Case(warnings=("other",)), "DATA_REDUCTION", "YES"), "GAMMA", "3")
+    def test_data_reduction_comes_and_goes(self):
+        case = set_key(set_key(Case(), "DATA_REDUCTION", "YES"), "GAMMA", "3")
         assert case.reduction == Reduction(gamma=3.0)
         assert set_key(case, "DATA_REDUCTION", "YES").reduction == case.reduction
-        assert [text[:10] for text in case.warnings] == ["other", "DATA_REDUC"]
-        assert set_key(case, "DATA_REDUCTION", "NO") == Case(warnings=("other",))
+        assert set_key(case, "DATA_REDUCTION", "NO") == Case()
+
+    @pytest.mark.parametrize(("word", "selection"), [("YES", "double"), ("NO", "one")])
+    def test_double_edge_is_a_selection(self, word, selection):
+        case = set_key(set_key(Case(), "DATA_REDUCTION", "YES"), "DOUBLE_EDGE", word)
+        assert case.reduction == Reduction(selection=selection)
+        assert set_key(case, "SELECTION", "block").reduction == Reduction()
 
     def test_remark(self):
         case = set_key(Case(), "MARKER_PERIODIC", "(A, B, 0,0,0, 0,0,0, 0,1,0)")

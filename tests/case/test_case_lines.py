@@ -53,12 +53,8 @@ def test_the_example_of_rbf_slide_reads_unchanged(read, tmp_path):
     assert (case.direction, case.steps, case.influence_factor) == (1, 1, 2.5)
     assert case.reduction is not None
     assert (case.reduction.tolerance, case.reduction.level_size) == (1e-3, 16)
-    assert (case.reduction.double_edge, case.reduction.multilevel) == (True, False)
-    (warning,) = case.warnings
-    assert warning == (
-        "DATA_REDUCTION= YES: this version solves with all control nodes, exactly; "
-        "the tolerance is met with error 0"
-    )
+    assert (case.reduction.selection, case.reduction.multilevel) == ("double", False)
+    assert case.warnings == ()
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

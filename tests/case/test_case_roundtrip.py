@@ -61,7 +61,9 @@ reductions = st.builds(
     st.sampled_from(["size", "tol"]),
     st.floats(0, 1, exclude_min=True, exclude_max=True),
     whole,
-    st.booleans(),
+    st.sampled_from(["block", "double", "one"]),
+    st.none() | positive,
+    st.none() | whole,
     positive,
 )
 
