@@ -18,7 +18,7 @@ from slideviz.mesh.su2 import read_su2
 from slideviz.mesh.su2_scan import Progress
 from slideviz.mesh.su2_write import su2_blocks
 
-_READ_BYTES = 1 << 24
+_READ_BYTES = 1 << 22
 _READING = 0.1
 """Fraction of the time for reading that getting the bytes takes."""
 _SNIFFED_BYTES = 1 << 16

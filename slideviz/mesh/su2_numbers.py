@@ -80,7 +80,7 @@ def _blame_word(lines: Lines, rows: IntArray, kind: type) -> None:
         for word in lines.line(row).split():
             found = _parse(word, kind)
             if found is None or len(found) != 1:
-                raise lines.error(row, f"{show(word)!r} stands where {what} should be; correct it")
+                raise lines.error(row, f"'{show(word)}' stands where {what} should be; correct it")
 
 
 def parse_cells(lines: Lines, rows: IntArray, dim: int, n_points: int, progress: Progress) -> Cells:

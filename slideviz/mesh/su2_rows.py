@@ -63,7 +63,7 @@ class Rows:
             word = self.lines.line(int(texts[0])).split()[0]
             raise self.lines.error(
                 int(texts[0]),
-                f"{show(word)!r} stands where one of the {count} {what} should be ({section.key} "
+                f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
                 f"on line {section.line + 1}); correct it",
             )
         if len(rows) < count:

@@ -43,8 +43,8 @@ def find_sections(lines: Lines) -> list[Section]:
         key, _, value = lines.line(index).partition(b"=")
         if _KEY.fullmatch(key.strip()):
             heads.append((key.strip().decode().upper(), value.strip(), index))
-    stops = [line for _, _, line in heads[1:]] + [len(lines)]
-    return [Section(*head, stop) for head, stop in zip(heads, stops, strict=True)]
+    stops = [line for _, _, line in heads] + [len(lines)]
+    return [Section(*head, stop) for head, stop in zip(heads, stops[1:], strict=True)]
 
 
 def find_bounds(lines: Lines, sections: list[Section], number: int | None) -> Bounds:
