@@ -62,6 +62,14 @@ def test_ideal_cells_have_quality_one(vtk, metric):
     assert found.status[0] == VALID
 
 
+@pytest.mark.parametrize("vtk", TYPES)
+def test_rounding_lifts_no_ideal_cell_above_one(vtk):
+    ideal = np.array(oracle.IDEAL[vtk], float)
+    found = quality(soup(vtk, [ideal @ rotation(ideal.shape[1], seed) for seed in range(200)]))
+    assert found.skew.max() == 1
+    assert found.histogram()[0].sum() == 200
+
+
 @pytest.mark.parametrize("metric", ["knupp", "rbf-slide"])
 @pytest.mark.parametrize("vtk", TYPES)
 def test_random_cells_agree_with_the_literal_formulas(vtk, metric):
