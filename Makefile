@@ -1,0 +1,45 @@
+# `make help` lists what there is. Needs Python 3.11 or newer; everything goes into .venv.
+
+SHELL := bash
+BIN := .venv/bin
+PYTEST := $(BIN)/python -m pytest
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-all lint format bench shots clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
+		do printf '  make %-10s %s\n' "$$name" "$$text"; done
+
+setup: ## make .venv/bin/slideviz and all it needs (does nothing when it is there)
+	@tools/setup.sh
+
+demo: setup ## deform a blade passage into demo/ and open it (WINDOW=no: do not open it)
+	@tools/demo.sh
+
+test: setup ## fast tests (ARGS="-k name": only some)
+	$(PYTEST) -m "not slow" --ignore=tests/benchmarks $(ARGS)
+
+test-all: setup ## all tests, slow reproductions too
+	$(PYTEST) --ignore=tests/benchmarks $(ARGS)
+
+lint: setup ## style, types, and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: setup ## let ruff put right what it can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: setup ## measure the speed (needs a quiet machine)
+	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)
+
+shots: setup ## draw the pictures in screenshots/ again
+	$(BIN)/slideviz shots
+
+clean: ## remove what was built, the virtual environment and demo/ included
+	rm -rf .venv demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
+		.import_linter_cache
+	find slideviz tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# Deforms the sample passage in two ways into demo/, and opens the better one if there is a screen.
+#
+# WINDOW=no leaves the window closed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+slideviz=.venv/bin/slideviz
+case=demo/passage/passage.cfg
+
+mkdir -p demo
+# Only what this script wrote: someone may keep other things in demo/.
+rm -rf demo/passage
+"$slideviz" sample passage -o demo/passage
+
+printf '\n== all outer boundaries held fixed ==\n'
+"$slideviz" run "$case" --set SLIDING_MODE=none --set PERIODIC_MODE=none \
+    -o demo/passage_fixed.su2 --picture demo/passage_fixed.png
+
+printf '\n== inflow and outflow slide, periodic sides move along ==\n'
+"$slideviz" run "$case" -o demo/passage_sliding.su2 --picture demo/passage_sliding.png \
+    --json demo/passage_sliding.json
+"$slideviz" quality demo/passage_sliding.su2 --reference demo/passage/mesh.su2
+
+printf '\nwritten:\n'
+ls -1 demo/*.su2 demo/*.png demo/*.json "$case"
+if [ "${WINDOW:-yes}" = no ]; then
+    printf '\nthe window: %s %s\n' "$slideviz" "$case"
+elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+    printf '\nopening the window; close it to end\n'
+    "$slideviz" "$case"
+else
+    printf '\nno screen here; where there is one: %s %s\n' "$slideviz" "$case"
+fi

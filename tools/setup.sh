@@ -1,0 +1,114 @@
+#!/usr/bin/env bash
+# Makes .venv/bin/slideviz, with everything to run and test it. Does nothing where all is there.
+#
+# PYTHON=/path/to/python chooses the interpreter; SYSTEM_PACKAGES=no leaves apt alone.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+VENV=.venv
+STAMP=$VENV/.installed
+# What the Qt and VTK wheels expect of the system, a screen that is not there (Xvfb) for the
+# tests of the window, and a font.
+PACKAGES=(
+    xvfb xauth xdotool fonts-dejavu-core
+    libgl1 libegl1 libglx-mesa0 libopengl0 libglib2.0-0 libdbus-1-3 libfontconfig1 libxrender1
+    libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
+    libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xfixes0
+)
+
+say() { printf 'setup: %s\n' "$*"; }
+fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
+
+has_apt() { [ "${SYSTEM_PACKAGES:-yes}" != no ] && command -v apt-get dpkg-query >/dev/null; }
+is_root() { [ "$(id -u)" -eq 0 ]; }
+
+installed() {
+    # Newer releases of Debian call some libraries NAMEt64.
+    dpkg-query -W -f '${db:Status-Status}\n' "$1" "$1t64" 2>/dev/null | grep -qx installed
+}
+
+apt_install() {
+    say "installing with apt: $*"
+    export DEBIAN_FRONTEND=noninteractive
+    # A fresh machine has no package lists, and an old one has lists of files long gone.
+    apt-get update -qq </dev/null &&
+        apt-get install -y -qq --no-install-recommends "$@" </dev/null >/dev/null
+}
+
+install_system_packages() {
+    has_apt || return 0
+    local missing=() name
+    for name in "${PACKAGES[@]}"; do
+        installed "$name" || missing+=("$name")
+    done
+    [ ${#missing[@]} -eq 0 ] && return 0
+    if is_root; then
+        apt_install "${missing[@]}" || fail "apt could not install: ${missing[*]}"
+    else
+        say "the window and its tests need system packages; without them the rest works. Run:"
+        say "    sudo apt-get install ${missing[*]}"
+    fi
+}
+
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3.11 python3.12 python3.13 python3}; do
+        if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            command -v "$candidate"
+            return 0
+        fi
+    done
+    return 1
+}
+
+choose_python() {
+    python=$(find_python) && return 0
+    [ -z "${PYTHON:-}" ] || fail "PYTHON=$PYTHON is not Python 3.11 or newer"
+    if has_apt && is_root; then
+        apt_install python3 python3-venv || fail "apt could not install python3 and python3-venv"
+        python=$(find_python) && return 0
+    fi
+    fail "Python 3.11 or newer is needed; install it, or name it: make setup PYTHON=/path/to/python"
+}
+
+# Debian keeps the part that makes virtual environments in a package of its own.
+require_venv_module() {
+    "$python" -c 'import ensurepip, venv' 2>/dev/null && return 0
+    local package
+    package=$("$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')
+    if has_apt && is_root; then
+        apt_install "$package" || fail "apt could not install $package"
+        "$python" -c 'import ensurepip, venv' 2>/dev/null && return 0
+    fi
+    fail "$python cannot make virtual environments. Run: sudo apt-get install $package"
+}
+
+make_venv() {
+    # A venv breaks when its interpreter is removed or its folder is moved.
+    if [ -x $VENV/bin/python ] && $VENV/bin/python -m pip --version >/dev/null 2>&1; then
+        return 0
+    fi
+    choose_python
+    require_venv_module
+    say "making $VENV with $("$python" --version)"
+    "$python" -m venv --clear $VENV
+}
+
+# All that decides what pip would install, and where.
+fingerprint() { { pwd -P; $VENV/bin/python --version; cat pyproject.toml; } | sha256sum; }
+
+install_slideviz() {
+    if [ -x $VENV/bin/slideviz ] && [ "$(cat $STAMP 2>/dev/null)" = "$(fingerprint)" ]; then
+        return 0
+    fi
+    say "installing slideviz and what it needs into $VENV (a few minutes the first time)"
+    rm -f $STAMP
+    $VENV/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test,dev]' \
+        </dev/null || fail "pip could not install slideviz; its message is above"
+    fingerprint >$STAMP
+}
+
+install_system_packages
+make_venv
+install_slideviz
+say "ready: $VENV/bin/slideviz"
