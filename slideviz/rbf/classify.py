@@ -148,8 +148,10 @@ def _slide_rows(
             continue
         local = chosen[start:stop]
         labels = _cluster(normals[local], fan_role[local], merge)
-        cluster[start:stop] = labels
-        if _rank(normals[local], labels) >= normals.shape[1]:
+        rank = _rank(normals[local], labels)
+        # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
+        cluster[start:stop] = labels if rank > 1 else 0
+        if rank >= normals.shape[1]:
             full.append(node[start])
     return np.stack([chosen, cluster], axis=1), np.array(full, np.int64)
 

@@ -163,11 +163,9 @@ def find_tracks(
     fan_facet[fans.fan] = fans.facet
     row_label = labels[fan_facet[classes.row_fan]]
     row_node = classes.cluster_node[classes.row_cluster]
-    label_of = np.full(len(coords), -1, np.int64)
-    label_of[row_node] = row_label
-    for label in np.unique(label_of[on_surface]):
-        facets = boundary.facets[labels == label]
-        of_node[on_surface[label_of[on_surface] == label]] = len(tracks)
+    for nodes, chosen in _by_surfaces(on_surface, row_node, row_label):
+        facets = boundary.facets[np.isin(labels, chosen)]
+        of_node[nodes] = len(tracks)
         corners = _simplices(coords, facets)
         curved |= _bends(facet_vectors(coords, facets))
         tracks.append(Track(_continued(corners, shift)))
@@ -195,6 +193,26 @@ def _surface_labels(
         (role[a] == role[b]) & (along > np.cos(np.radians(angle_deg * MERGE_FRACTION))),
     )
     return _components(len(boundary.facets), a[smooth], b[smooth])
+
+
+def _by_surfaces(
+    wanted: IntArray, row_node: IntArray, row_label: IntArray
+) -> list[tuple[IntArray, IntArray]]:
+    """Return nodes (m,) that slide on the same surfaces, and the labels of these (k,).
+
+    Most slide on one. Where surfaces of two roles meet in one plane it is both of them.
+    """
+    rows = np.isin(row_node, wanted)
+    pairs = np.unique(np.stack([row_node[rows], row_label[rows]], axis=1), axis=0)
+    several = np.bincount(pairs[:, 0], minlength=1)[pairs[:, 0]] > 1
+    single, more = pairs[~several], pairs[several]
+    groups = {(int(label),): single[single[:, 1] == label, 0] for label in np.unique(single[:, 1])}
+    together: dict[tuple[int, ...], list[int]] = {}
+    for node in np.unique(more[:, 0]):
+        key = tuple(int(label) for label in more[more[:, 0] == node, 1])
+        together.setdefault(key, []).append(int(node))
+    found = [*groups.items(), *((key, np.array(nodes)) for key, nodes in together.items())]
+    return [(nodes, np.array(key)) for key, nodes in found]
 
 
 def _components(count: int, a: IntArray, b: IntArray) -> IntArray:

@@ -1,0 +1,179 @@
+"""Closest points: against brute force, and the laws of a projection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slideviz.mesh.topology import find_boundary, find_fans
+from slideviz.rbf import projection as module
+from slideviz.rbf.classify import classify
+from slideviz.rbf.projection import Track, find_tracks
+from tests import builders
+from tests.oracles import geometry
+
+SEEDS = st.integers(0, 10_000)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS, flat=st.sampled_from([1.0, 1e-3]))
+def test_the_closest_point_of_a_triangle(seed, flat):
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(3, 3)) * [1, flat, 1]
+    x = rng.normal(size=3) * 2
+    found = Track(corners[None]).closest(x[None])[0]
+    expected = geometry.closest_on_triangle(x, corners)
+    assert np.linalg.norm(found - x) <= np.linalg.norm(expected - x) + 1e-9
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=SEEDS, dim=st.sampled_from([2, 3]))
+def test_the_closest_point_of_a_segment(seed, dim):
+    rng = np.random.default_rng(seed)
+    ends, x = rng.normal(size=(2, dim)), rng.normal(size=dim) * 2
+    found = Track(ends[None]).closest(x[None])[0]
+    np.testing.assert_allclose(found, geometry.closest_on_segment(x, ends), atol=1e-7)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=SEEDS, count=st.integers(1, 60), first=st.integers(1, 9), c=st.sampled_from([2, 3]))
+def test_no_simplex_of_a_track_is_nearer(seed, count, first, c):
+    """Simplices of very different size, so that the nearest centre is often the wrong one."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-3, 0.5, (count, 1, 1))
+    corners = rng.normal(size=(count, 1, 3)) + size * rng.normal(size=(count, c, 3))
+    x = rng.normal(size=(10, 3)) * 2
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "FIRST_TRY", first)
+        found = Track(corners).closest(x)
+    each = np.stack([Track(s[None]).closest(x) for s in corners])
+    gaps = np.linalg.norm(each - x, axis=2).min(axis=0)
+    np.testing.assert_allclose(np.linalg.norm(found - x, axis=1), gaps, atol=1e-12)
+
+
+def test_degenerate_simplices_do_no_harm():
+    point = np.tile([1.0, 2.0, 3.0], (1, 3, 1))
+    np.testing.assert_allclose(Track(point).closest(np.zeros((1, 3))), [[1, 2, 3]])
+    line = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
+    np.testing.assert_allclose(Track(line).closest(np.array([[1.5, 1, 0]])), [[1.5, 0, 0]])
+    dot = np.array([[[1.0, 1.0], [1.0, 1.0]]])
+    np.testing.assert_allclose(Track(dot).closest(np.array([[0.0, 0.0]])), [[1, 1]])
+
+
+def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
+    boundary = find_boundary(mesh)
+    fans = find_fans(boundary, mesh.points)
+    classes = classify(boundary, fans, mesh.points, roles, method, 40.0)
+    return classes, find_tracks(boundary, fans, classes, mesh.points, (roles, 40.0, shift))
+
+
+CASES = {
+    "square": (lambda: builders.square(8), ("x_m", "x_p", "y_m", "y_p"), "BLOCK"),
+    "cube": (lambda: builders.cube(6), ("x_m", "x_p", "y_m", "y_p", "z_m", "z_p"), "BLOCK"),
+    "tets": (lambda: builders.cube(4, "simplex"), ("x_m", "y_m", "z_m", "z_p"), "BLOCK"),
+    "circle": (lambda: builders.annulus(far_parts=2), ("far0", "far1"), "wall"),
+    "passage": (builders.passage, ("hub", "shroud", "inflow", "outflow", "per1", "per2"), "blade"),
+    "sphere": (lambda: builders.sphere_in_box(5), ("sphere", "x_p", "y_p"), "x_m"),
+}
+
+
+@pytest.fixture(params=CASES, scope="module")
+def sliding_case(request):
+    build, sliding, moving = CASES[request.param]
+    mesh = build()
+    roles = dict.fromkeys(sliding, "sliding") | {moving: "moving"}
+    return mesh, *tracks_of(mesh, roles)
+
+
+def test_every_sliding_node_has_a_track_that_goes_through_it(sliding_case):
+    mesh, classes, tracks = sliding_case
+    assert np.all(tracks.of_node[classes.sliding] >= 0)
+    for node in classes.sliding:
+        at = tracks.tracks[tracks.of_node[node]].closest(mesh.points[node][None])[0]
+        np.testing.assert_allclose(at, mesh.points[node], atol=1e-14)
+
+
+def test_the_tracks_of_edges_are_curves(sliding_case):
+    _, classes, tracks = sliding_case
+    for node in classes.edge:
+        assert tracks.tracks[tracks.of_node[node]].corners.shape[1] == 2
+    for node in classes.surface:
+        assert tracks.tracks[tracks.of_node[node]].corners.shape[1] == 3
+
+
+def test_projection_is_idempotent_and_stays_on_the_track(sliding_case):
+    mesh, classes, tracks = sliding_case
+    rng = np.random.default_rng(0)
+    nodes = classes.sliding
+    free = rng.normal(size=(len(nodes), mesh.dim)) * 0.3 * mesh.extent
+    once = tracks.project(mesh.points, nodes, free)
+    twice = tracks.project(mesh.points, nodes, once)
+    np.testing.assert_allclose(twice, once, atol=1e-13)
+    for index in np.unique(tracks.of_node[nodes]):
+        rows = tracks.of_node[nodes] == index
+        at = (mesh.points[nodes] + once)[rows]
+        back = tracks.tracks[index].closest(at)
+        np.testing.assert_allclose(back, at, atol=1e-13)
+        low, high = (f(tracks.tracks[index].corners, axis=(0, 1)) for f in (np.min, np.max))
+        assert np.all(at >= low - 1e-13)
+        assert np.all(at <= high + 1e-13)
+
+
+def test_a_zero_displacement_stays_zero_to_the_bit(sliding_case):
+    mesh, classes, tracks = sliding_case
+    nodes = classes.sliding
+    assert not tracks.project(mesh.points, nodes, np.zeros((len(nodes), mesh.dim))).any()
+
+
+def test_a_node_that_would_pass_the_corner_stays_at_it():
+    mesh = builders.square(8)
+    roles = dict.fromkeys(("x_m", "x_p", "y_m", "y_p"), "sliding") | {"BLOCK": "moving"}
+    _, tracks = tracks_of(mesh, roles)
+    node = int(np.argmin(np.linalg.norm(mesh.points - [0.875, 0.0], axis=1)))
+    moved = tracks.project(mesh.points, np.array([node]), np.array([[0.7, 0.4]]))
+    np.testing.assert_allclose(mesh.points[node] + moved[0], [1.0, 0.0], atol=1e-15)
+
+
+def test_flat_and_curved_are_told_apart():
+    for name, curved in (("square", False), ("cube", False), ("circle", True), ("passage", True)):
+        build, sliding, moving = CASES[name]
+        roles = dict.fromkeys(sliding, "sliding") | {moving: "moving"}
+        assert tracks_of(build(), roles)[1].curved is curved
+
+
+def test_a_track_goes_on_beyond_a_periodic_boundary():
+    mesh = builders.square(8)
+    roles = dict.fromkeys(("x_m", "x_p"), "sliding") | dict.fromkeys(("y_m", "y_p"), "periodic")
+    roles |= {"BLOCK": "moving"}
+    _, tracks = tracks_of(mesh, roles, ("ds", "moving"), np.array([0.0, 1.0]))
+    node = int(np.argmin(np.linalg.norm(mesh.points - [0.0, 1.0], axis=1)))
+    moved = tracks.project(mesh.points, np.array([node]), np.array([[0.1, 0.3]]))
+    np.testing.assert_allclose(moved, [[0.0, 0.3]], atol=1e-15)
+
+
+def test_no_sliding_no_tracks():
+    mesh = builders.square(6)
+    _, tracks = tracks_of(mesh, {"BLOCK": "moving"})
+    assert tracks.tracks == ()
+    assert not tracks.curved
+    assert np.all(tracks.of_node == -1)
+
+
+@pytest.mark.parametrize("second", ["sliding", "internal"])
+def test_a_node_between_two_roles_in_one_plane_slides_on_both(second):
+    mesh = builders.grid(
+        (8, 8),
+        rules=[
+            ("low1", lambda p: bool(np.all(p[:, 1] == 0) and p[:, 0].max() <= 4)),
+            ("low2", lambda p: bool(np.all(p[:, 1] == 0))),
+            ("top", lambda p: bool(np.all(p[:, 1] == 8))),
+        ],
+    )
+    _, tracks = tracks_of(mesh, {"low1": "sliding", "low2": second, "top": "moving"})
+    node = int(np.argmin(np.linalg.norm(mesh.points - [0.5, 0.0], axis=1)))
+    for shift in (-0.2, 0.2):
+        moved = tracks.project(mesh.points, np.array([node]), np.array([[shift, 0.1]]))
+        np.testing.assert_allclose(moved, [[shift, 0.0]], atol=1e-15)
