@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,6 +21,7 @@ for _row in ELEMENTS.values():
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 # VTK's quadratic and higher-order elements, and SU2's own identifiers: 100 more per degree.
 _HIGH_ORDER = (*range(21, 38), *range(60, 82))
+_LONE_SIGN = re.compile(rb"[+-](?![0-9])")
 _EXTRA_POINT_WORDS = 2
 """After the coordinates: the index, and in partitioned files the global index."""
 
@@ -29,6 +31,9 @@ def _parse(text: bytes, kind: type) -> NDArray | None:
 
     The conversion of floats is that of Python: correctly rounded.
     """
+    # NumPy takes a lone sign for 0, or joins it to the next word.
+    if kind is np.int64 and (b"-" in text or b"+" in text) and _LONE_SIGN.search(text):
+        return None
     try:
         return np.fromstring(text, kind, sep=" ")
     except ValueError:

@@ -130,6 +130,8 @@ FAULTS = {
     "fraction as node": ("5 1 2 5 1", "5 1 2.5 5 1", 4, "'2.5' stands where a whole number should"),
     "text as node": ("5 1 2 5 1", "5 1 x 5 1", 4, "'x' stands where a whole number should be"),
     "two in one word": ("5 1 2 5 1", "5 1-2 5 1", 4, "'1-2' stands where a whole number should be"),
+    "lone sign": ("5 1 2 5 1", "5 1 - 5 1", 4, "'-' stands where a whole number should be"),
+    "sign at the end": ("3 3 4\n", "3 3 +\n", 20, r"'\+' stands where a whole number should be"),
     "text as type": ("5 1 2 5 1", "tri 1 2 5 1", 4, r"'tri' stands where one of the 3 elements sh"),
     "text as point": ("1.1 0.3 1", "x 0.3 1", 8, r"'x' stands where one of the 6 points should be"),
     "nan first": ("1.1 0.3 1", "nan 0.3 1", 8, "'nan' stands where one of the 6 points should be"),
@@ -368,7 +370,7 @@ def test_cut_off_anywhere(name):
         assert [len(m.cells) for m in mesh.markers] == [len(m.cells) for m in whole.markers]
         assert mesh.points.tolist() == whole.points.tolist()
         assert mesh.cells.same_as(whole.cells)
-    assert refused > len(raw) / 2
+    assert refused > 200
 
 
 edits = st.lists(
