@@ -24,7 +24,7 @@ is_root() { [ "$(id -u)" -eq 0 ]; }
 
 installed() {
     # Newer releases of Debian call some libraries NAMEt64.
-    dpkg-query -W -f '${db:Status-Status}\n' "$1" "$1t64" 2>/dev/null | grep -qx installed
+    grep -qx installed <<<"$(dpkg-query -W -f '${db:Status-Status}\n' "$1" "$1t64" 2>/dev/null)"
 }
 
 apt_install() {
