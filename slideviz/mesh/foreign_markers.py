@@ -28,6 +28,8 @@ _TAGS = {
     "netgen:index": "index",
     "gmsh:geometrical": "geometrical",
 }
+# The numbers that a table of names in the file is about.
+_NAMED = ("marker", "gmsh:physical", "cell_tags", "netgen:index")
 # Here 0 means that the element is in no group.
 _ZERO_IS_NONE = ("marker", "gmsh:physical", "cell_tags")
 
@@ -85,7 +87,7 @@ def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
         values = _numbers(data, key, sides)
         if values is None:
             continue
-        names = _names(data, mesh.dim - 1) if key in _TAGS else {}
+        names = _names(data, mesh.dim - 1) if key in _NAMED else {}
         groups: Groups = {}
         # By size, for MED counts downward from -1.
         for number in sorted(np.unique(np.concatenate(values)).tolist(), key=abs):
