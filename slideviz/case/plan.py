@@ -10,9 +10,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from slideviz.case.clash import clash, jump
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
-from slideviz.errors import DeformError
+from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, find_fans
@@ -94,11 +95,13 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     CaseError
         The case does not fit the mesh.
     MeshError
-        Periodic markers do not match, or a marker element is no side of a cell.
+        Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
+        not finite.
     DeformError
         Nothing is known: no node has a prescribed displacement.
     """
     require_valid(case, mesh)
+    _require_finite(mesh)
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs = _pairs(case, mesh)
@@ -147,6 +150,17 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     )
 
 
+def _require_finite(mesh: Mesh) -> None:
+    """Raise MeshError when a coordinate is NaN or infinite."""
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        where = ", ".join(f"{v:.6g}" for v in mesh.points[bad[0]])
+        raise MeshError(
+            f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
+            f"({len(bad)} nodes are not), so correct the mesh"
+        )
+
+
 def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
     """Return the periodic pairs; none are looked for when periodicity is not asked for.
 
@@ -164,6 +178,10 @@ def _prescribed(
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
     """Return the known nodes, their displacement in the frame, and warnings."""
     moved = displacements(case, mesh)
+    problem = clash(case, mesh, moved.nodes, moved.vectors)
+    if problem:
+        raise CaseError(f"{mesh.name}: {problem}")
+    remark = jump(case, mesh, moved.nodes, moved.vectors)
     known = np.concatenate([classes.moving, classes.fixed])
     if not len(known):
         raise DeformError(
@@ -172,7 +190,7 @@ def _prescribed(
     target = np.zeros((len(known), mesh.dim))
     row = np.searchsorted(classes.moving, moved.nodes)
     target[row] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    return known, target, moved.warnings
+    return known, target, (*moved.warnings, *((remark,) if remark else ()))
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:

@@ -9,92 +9,16 @@ node never leaves its curve or surface however many steps are made.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, facet_vectors, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
-
-FIRST_TRY = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """One curve or surface on which nodes slide.
-
-    Attributes
-    ----------
-    corners : (s, c, d) float64
-        Simplices in the working frame: segments (c = 2) or triangles (c = 3).
-    """
-
-    corners: FloatArray
-    tree: cKDTree = field(init=False, repr=False)
-    reach: float = field(init=False)
-
-    def __post_init__(self) -> None:
-        centre = self.corners.mean(axis=1)
-        span = np.linalg.norm(self.corners - centre[:, None], axis=2)
-        object.__setattr__(self, "tree", cKDTree(centre))
-        object.__setattr__(self, "reach", float(span.max()))
-
-    def closest(self, x: FloatArray) -> FloatArray:
-        """Return the closest point of the track for each x, (m, d).
-
-        The nearest centres are tried first; a point is settled when every simplex further away
-        must be farther than the best one found.
-        """
-        out = np.empty_like(x)
-        open_, tried = np.arange(len(x)), min(FIRST_TRY, len(self.corners))
-        while len(open_):
-            near = self.tree.query(x[open_], k=list(range(1, tried + 1)))
-            distance, index = (np.asarray(found) for found in near)
-            points = _closest_on_simplices(x[open_][:, None, :], self.corners[index])
-            gaps = np.linalg.norm(points - x[open_][:, None, :], axis=2)
-            best = np.argmin(gaps, axis=1)
-            rows = np.arange(len(open_))
-            out[open_] = points[rows, best]
-            if tried == len(self.corners):
-                break
-            open_ = open_[gaps[rows, best] > distance[:, -1] - self.reach]
-            tried = min(4 * tried, len(self.corners))
-        return out
-
-
-def _closest_on_simplices(x: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the closest point to x (m, 1, d) on each simplex (m, k, c, d): (m, k, d)."""
-    if corners.shape[2] == 2:
-        return _closest_on_segments(x, corners[:, :, 0], corners[:, :, 1])
-    a, b, c = (corners[:, :, i] for i in range(3))
-    u, v, w = b - a, c - a, x - a
-    uu, uv, vv = _dot(u, u), _dot(u, v), _dot(v, v)
-    wu, wv = _dot(w, u), _dot(w, v)
-    area = uu * vv - uv * uv
-    safe = np.where(area > 0, area, 1.0)
-    s, t = (vv * wu - uv * wv) / safe, (uu * wv - uv * wu) / safe
-    inside = (area > 0) & (s >= 0) & (t >= 0) & (s + t <= 1)
-    result = a + s[..., None] * u + t[..., None] * v
-    sides = np.stack([_closest_on_segments(x, *ends) for ends in ((a, b), (b, c), (c, a))])
-    nearest = np.argmin(np.linalg.norm(sides - x, axis=3), axis=0)
-    border = np.take_along_axis(sides, nearest[None, :, :, None], axis=0)[0]
-    return np.where(inside[..., None], result, border)
-
-
-def _closest_on_segments(x: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the closest points to x on segments from a to b, all (m, k, d)."""
-    u = b - a
-    length = _dot(u, u)
-    t = np.clip(_dot(x - a, u) / np.where(length > 0, length, 1.0), 0.0, 1.0)
-    return a + t[..., None] * u
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.einsum("mkd,mkd->mk", a, np.broadcast_to(b, a.shape))
+from slideviz.rbf.closest import ClosestPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +27,8 @@ class Tracks:
 
     Attributes
     ----------
-    tracks : tuple of Track
+    tracks : tuple of ClosestPoints
+        The curves and surfaces on which nodes slide.
     of_node : (n,) int64
         Index of the node's track; -1 for nodes that do not slide.
     curved : bool
@@ -111,7 +36,7 @@ class Tracks:
         projection does more than removing the normal component.
     """
 
-    tracks: tuple[Track, ...]
+    tracks: tuple[ClosestPoints, ...]
     of_node: IntArray
     curved: bool
 
@@ -132,7 +57,7 @@ class Tracks:
         for index in np.unique(label[moved]):
             rows = np.flatnonzero(moved & (label == index))
             start = coords[nodes[rows]]
-            out[rows] = self.tracks[index].closest(start + free[rows]) - start
+            out[rows] = self.tracks[index].query(start + free[rows]) - start
         return out
 
 
@@ -155,7 +80,7 @@ def find_tracks(
     """
     roles, angle_deg, shift = settings
     of_node = np.full(len(coords), -1, np.int64)
-    tracks: list[Track] = []
+    tracks: list[ClosestPoints] = []
     curved = False
     labels = _surface_labels(boundary, coords, roles, angle_deg)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
@@ -168,13 +93,13 @@ def find_tracks(
         of_node[nodes] = len(tracks)
         corners = _simplices(coords, facets)
         curved |= _bends(facet_vectors(coords, facets))
-        tracks.append(Track(_continued(corners, shift)))
+        tracks.append(ClosestPoints(_continued(corners, shift)))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(tracks)
             corners = coords[ends]
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
-            tracks.append(Track(_continued(corners, shift)))
+            tracks.append(ClosestPoints(_continued(corners, shift)))
     return Tracks(tuple(tracks), of_node, bool(curved))
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from slideviz.mesh.topology import find_boundary, find_fans
 from slideviz.rbf import projection as module
 from slideviz.rbf.classify import classify
-from slideviz.rbf.projection import Track, find_tracks
+from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.projection import find_tracks
 from tests import builders
 from tests.oracles import geometry
 
@@ -23,7 +24,7 @@ def test_the_closest_point_of_a_triangle(seed, flat):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(3, 3)) * [1, flat, 1]
     x = rng.normal(size=3) * 2
-    found = Track(corners[None]).closest(x[None])[0]
+    found = ClosestPoints(corners[None]).query(x[None])[0]
     expected = geometry.closest_on_triangle(x, corners)
     assert np.linalg.norm(found - x) <= np.linalg.norm(expected - x) + 1e-9
     np.testing.assert_allclose(found, expected, atol=1e-6)
@@ -34,7 +35,7 @@ def test_the_closest_point_of_a_triangle(seed, flat):
 def test_the_closest_point_of_a_segment(seed, dim):
     rng = np.random.default_rng(seed)
     ends, x = rng.normal(size=(2, dim)), rng.normal(size=dim) * 2
-    found = Track(ends[None]).closest(x[None])[0]
+    found = ClosestPoints(ends[None]).query(x[None])[0]
     np.testing.assert_allclose(found, geometry.closest_on_segment(x, ends), atol=1e-7)
 
 
@@ -48,19 +49,19 @@ def test_no_simplex_of_a_track_is_nearer(seed, count, first, c):
     x = rng.normal(size=(10, 3)) * 2
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "FIRST_TRY", first)
-        found = Track(corners).closest(x)
-    each = np.stack([Track(s[None]).closest(x) for s in corners])
+        found = ClosestPoints(corners).query(x)
+    each = np.stack([ClosestPoints(s[None]).query(x) for s in corners])
     gaps = np.linalg.norm(each - x, axis=2).min(axis=0)
     np.testing.assert_allclose(np.linalg.norm(found - x, axis=1), gaps, atol=1e-12)
 
 
 def test_degenerate_simplices_do_no_harm():
     point = np.tile([1.0, 2.0, 3.0], (1, 3, 1))
-    np.testing.assert_allclose(Track(point).closest(np.zeros((1, 3))), [[1, 2, 3]])
+    np.testing.assert_allclose(ClosestPoints(point).query(np.zeros((1, 3))), [[1, 2, 3]])
     line = np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    np.testing.assert_allclose(Track(line).closest(np.array([[1.5, 1, 0]])), [[1.5, 0, 0]])
+    np.testing.assert_allclose(ClosestPoints(line).query(np.array([[1.5, 1, 0]])), [[1.5, 0, 0]])
     dot = np.array([[[1.0, 1.0], [1.0, 1.0]]])
-    np.testing.assert_allclose(Track(dot).closest(np.array([[0.0, 0.0]])), [[1, 1]])
+    np.testing.assert_allclose(ClosestPoints(dot).query(np.array([[0.0, 0.0]])), [[1, 1]])
 
 
 def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
@@ -92,7 +93,7 @@ def test_every_sliding_node_has_a_track_that_goes_through_it(sliding_case):
     mesh, classes, tracks = sliding_case
     assert np.all(tracks.of_node[classes.sliding] >= 0)
     for node in classes.sliding:
-        at = tracks.tracks[tracks.of_node[node]].closest(mesh.points[node][None])[0]
+        at = tracks.tracks[tracks.of_node[node]].query(mesh.points[node][None])[0]
         np.testing.assert_allclose(at, mesh.points[node], atol=1e-14)
 
 
@@ -115,7 +116,7 @@ def test_projection_is_idempotent_and_stays_on_the_track(sliding_case):
     for index in np.unique(tracks.of_node[nodes]):
         rows = tracks.of_node[nodes] == index
         at = (mesh.points[nodes] + once)[rows]
-        back = tracks.tracks[index].closest(at)
+        back = tracks.tracks[index].query(at)
         np.testing.assert_allclose(back, at, atol=1e-13)
         low, high = (f(tracks.tracks[index].corners, axis=(0, 1)) for f in (np.min, np.max))
         assert np.all(at >= low - 1e-13)

@@ -1,0 +1,170 @@
+"""Closest points on triangles and segments, by a tree of bounding boxes.
+
+Boundary layers make facets a thousand times longer than wide, so the nearest centres say little
+about the nearest facets; boxes do not mind. Segments are triangles with their last corner
+repeated, and two dimensions are three with z = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.compiled import one_at_a_time
+
+LEAF = 4
+_OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
+
+
+@njit(**_OPTIONS)
+def _build(low, high, order, bounds):  # type: ignore[no-untyped-def]
+    """Sort ``order`` (n,) into the leaves of a balanced tree and fill ``bounds`` (m, 6).
+
+    Node k has the children 2 k + 1 and 2 k + 2; the range of a node follows from halving its
+    parent's, so no ranges are stored.
+    """
+    nodes = bounds.shape[0]
+    starts = np.zeros(nodes, np.int64)
+    stops = np.zeros(nodes, np.int64)
+    stops[0] = len(order)
+    for k in range(nodes):
+        a, b = starts[k], stops[k]
+        for axis in range(3):
+            bounds[k, axis] = np.inf
+            bounds[k, 3 + axis] = -np.inf
+            for i in range(a, b):
+                bounds[k, axis] = min(bounds[k, axis], low[order[i], axis])
+                bounds[k, 3 + axis] = max(bounds[k, 3 + axis], high[order[i], axis])
+        if 2 * k + 2 >= nodes:
+            continue
+        axis = np.argmax(bounds[k, 3:] - bounds[k, :3])
+        part = order[a:b].copy()
+        middle = low[part, axis] + high[part, axis]
+        order[a:b] = part[np.argsort(middle, kind="mergesort")]
+        half = a + (b - a + 1) // 2
+        starts[2 * k + 1], stops[2 * k + 1] = a, half
+        starts[2 * k + 2], stops[2 * k + 2] = half, b
+
+
+@njit(inline="always", **_OPTIONS)
+def _box_gap(bounds, k, x):  # type: ignore[no-untyped-def]
+    """Return the squared distance from x to box k."""
+    total = 0.0
+    for axis in range(3):
+        gap = max(bounds[k, axis] - x[axis], x[axis] - bounds[k, 3 + axis], 0.0)
+        total += gap * gap
+    return total
+
+
+@njit(**_OPTIONS)
+def _on_segment(x, a, b, out):  # type: ignore[no-untyped-def]
+    """Write the closest point of a segment to ``out``; returns the squared distance."""
+    length = 0.0
+    along = 0.0
+    for i in range(3):
+        length += (b[i] - a[i]) * (b[i] - a[i])
+        along += (x[i] - a[i]) * (b[i] - a[i])
+    t = 0.0 if length <= 0.0 else min(max(along / length, 0.0), 1.0)
+    gap = 0.0
+    for i in range(3):
+        out[i] = a[i] + t * (b[i] - a[i])
+        gap += (x[i] - out[i]) ** 2
+    return gap
+
+
+@njit(**_OPTIONS)
+def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
+    """Write the closest point of a triangle to ``out``; returns the squared distance."""
+    uu, uv, vv, wu, wv = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        u, v, w = b[i] - a[i], c[i] - a[i], x[i] - a[i]
+        uu += u * u
+        uv += u * v
+        vv += v * v
+        wu += w * u
+        wv += w * v
+    area = uu * vv - uv * uv
+    if area > 0.0:
+        s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+        if s >= 0.0 and t >= 0.0 and s + t <= 1.0:
+            gap = 0.0
+            for i in range(3):
+                out[i] = a[i] + s * (b[i] - a[i]) + t * (c[i] - a[i])
+                gap += (x[i] - out[i]) ** 2
+            return gap
+    best = _on_segment(x, a, b, out)
+    for side in range(2):
+        gap = _on_segment(x, b, c, trial) if side == 0 else _on_segment(x, c, a, trial)
+        if gap < best:
+            best = gap
+            out[:] = trial
+    return best
+
+
+@njit(parallel=True, **_OPTIONS)
+def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
+    """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3)."""
+    nodes = bounds.shape[0]
+    inner = nodes // 2
+    for i in prange(len(x)):
+        stack = np.empty(64, np.int64)
+        first = np.empty(64, np.int64)
+        last = np.empty(64, np.int64)
+        point, trial = np.empty(3), np.empty(3)
+        best, top = np.inf, 1
+        stack[0], first[0], last[0] = 0, 0, len(order)
+        while top > 0:
+            top -= 1
+            k, a, b = stack[top], first[top], last[top]
+            if _box_gap(bounds, k, x[i]) >= best:
+                continue
+            if k >= inner:
+                for j in range(a, b):
+                    t = corners[order[j]]
+                    gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
+                    if gap < best:
+                        best = gap
+                        out[i] = point
+                continue
+            half = a + (b - a + 1) // 2
+            left, right = 2 * k + 1, 2 * k + 2
+            # The nearer child is put on top, to be looked at first.
+            if _box_gap(bounds, left, x[i]) < _box_gap(bounds, right, x[i]):
+                stack[top], first[top], last[top] = right, half, b
+                stack[top + 1], first[top + 1], last[top + 1] = left, a, half
+            else:
+                stack[top], first[top], last[top] = left, a, half
+                stack[top + 1], first[top + 1], last[top + 1] = right, half, b
+            top += 2
+
+
+class ClosestPoints:
+    """A tree over simplices, for queries of closest points."""
+
+    def __init__(self, corners: FloatArray) -> None:
+        """Build the tree.
+
+        Parameters
+        ----------
+        corners : (n, c, d)
+            Segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
+        """
+        n, count, dim = corners.shape
+        self._corners: FloatArray = np.zeros((n, 3, 3))
+        self._corners[:, :count, :dim] = corners
+        self._corners[:, count:] = self._corners[:, count - 1 : count]
+        depth = max(0, int(np.ceil(np.log2(max(1, n / LEAF)))))
+        self._bounds: FloatArray = np.empty((2 ** (depth + 1) - 1, 6))
+        self._order: IntArray = np.arange(n)
+        _build(self._corners.min(axis=1), self._corners.max(axis=1), self._order, self._bounds)
+
+    def query(self, x: FloatArray) -> FloatArray:
+        """Return the closest point on the simplices for each x, (m, d)."""
+        dim = x.shape[1]
+        targets = np.zeros((len(x), 3))
+        targets[:, :dim] = x
+        out = np.empty_like(targets)
+        with one_at_a_time(50 * len(x)):
+            _query(targets, self._corners, self._order, self._bounds, out)
+        return out[:, :dim]
