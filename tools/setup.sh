@@ -84,8 +84,10 @@ require_venv_module() {
 }
 
 make_venv() {
-    # A venv breaks when its interpreter is removed or its folder is moved.
-    if [ -x $VENV/bin/python ] && $VENV/bin/python -m pip --version >/dev/null 2>&1; then
+    # A venv breaks when its interpreter is removed or the project's folder is moved.
+    if grep -qsF "$(pwd -P)/$VENV/bin" $VENV/bin/pip &&
+        $VENV/bin/python -c 'import pip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null
+    then
         return 0
     fi
     choose_python
@@ -94,8 +96,8 @@ make_venv() {
     "$python" -m venv --clear $VENV
 }
 
-# All that decides what pip would install, and where.
-fingerprint() { { pwd -P; $VENV/bin/python --version; cat pyproject.toml; } | sha256sum; }
+# All that decides what pip would install.
+fingerprint() { { $VENV/bin/python --version; cat pyproject.toml; } | sha256sum; }
 
 install_slideviz() {
     if [ -x $VENV/bin/slideviz ] && [ "$(cat $STAMP 2>/dev/null)" = "$(fingerprint)" ]; then
