@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from slideviz.case.clash import clash, jump
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
-from slideviz.errors import CaseError, DeformError
+from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, find_fans

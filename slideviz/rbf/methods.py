@@ -26,6 +26,7 @@ from slideviz.rbf.problem import (
     Solution,
     Watch,
     full_rows,
+    merge,
     sliding_rows,
 )
 
@@ -57,8 +58,11 @@ def pseudo_sliding(problem: Problem, watch: Watch) -> Solution:
     for level in (problem.edge, problem.surface):
         if len(level):
             slid = _slide(problem, watch, fit, level)
+            # A node that coincides with one of an earlier level is in the system already.
+            new = ~np.isin(problem.same_as[level], problem.same_as[nodes])
             nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
-            fit.add(full_rows(problem, level, slid))
+            merge(problem, nodes, values)
+            fit.add(full_rows(problem, level[new], slid[new]))
     return _finish(problem, watch, fit, nodes, values)
 
 
