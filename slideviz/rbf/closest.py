@@ -140,7 +140,13 @@ def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
 
 
 class ClosestPoints:
-    """A tree over simplices, for queries of closest points."""
+    """A tree over simplices, for queries of closest points.
+
+    Attributes
+    ----------
+    corners : (n, c, d) float64
+        The simplices.
+    """
 
     def __init__(self, corners: FloatArray) -> None:
         """Build the tree.
@@ -150,6 +156,7 @@ class ClosestPoints:
         corners : (n, c, d)
             Segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
         """
+        self.corners = corners
         n, count, dim = corners.shape
         self._corners: FloatArray = np.zeros((n, 3, 3))
         self._corners[:, :count, :dim] = corners
