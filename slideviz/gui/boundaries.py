@@ -60,6 +60,8 @@ class BoundariesPanel(QWidget):
         header.setSectionResizeMode(ROLE, QHeaderView.ResizeMode.Fixed)
         header.resizeSection(ROLE, 136)
         header.setHighlightSections(False)
+        name = table.horizontalHeaderItem(NAME)
+        name.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from qtpy.QtWidgets import QFormLayout, QLabel, QSpinBox, QVBoxLayout, QWidget
 
 from slideviz.gui.fields import Choice, NumberField, VectorField, angle_limit, positive
+from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
 from slideviz.view.state import Session
 from slideviz.view.store import Store
@@ -186,14 +190,30 @@ def _kinds(session: Session) -> set[str]:
     return {pair.kind for pair in session.pairs if {pair.first, pair.second} <= names}
 
 
+def period_text(pair: Pair) -> str:
+    """Return the period of a pair in a few words: λ or θ, and along or about what."""
+    if pair.kind == "rotational":
+        return f"θ = {math.degrees(pair.period):.6g}° about {axis_text(pair.axis)}"
+    return f"λ = {pair.period:.6g} along {axis_text(pair.vector / pair.period)}"
+
+
+def axis_text(direction: Sequence[float]) -> str:
+    """Return a direction as x, y or z where it is one, else its components."""
+    whole = (*direction, 0.0)[:3]
+    for axis, name in AXES.items():
+        if abs(abs(sum(a * b for a, b in zip(axis, whole, strict=True))) - 1.0) < 1e-6:
+            return name
+    return f"({', '.join(f'{v:.4g}' for v in direction)})"
+
+
 def found_text(session: Session) -> str:
     """Return the period of the periodic boundaries that matched, in words."""
     names = session.case.markers_with("periodic")
-    lines = []
-    for pair in session.pairs:
-        if pair.first in names and pair.second in names:
-            sign = "θ" if pair.kind == "rotational" else "λ"
-            lines.append(f"Found: {pair.first} → {pair.second}, {sign} = {pair.describe()}")
+    lines = [
+        f"Found: {pair.first} → {pair.second}, {period_text(pair)}"
+        for pair in session.pairs
+        if pair.first in names and pair.second in names
+    ]
     if not lines and len(names) >= 2 and session.mesh is not None:
         lines.append("No match found yet between the periodic boundaries; the run will try.")
     return "\n".join(lines)

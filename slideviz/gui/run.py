@@ -52,6 +52,9 @@ class RunPanel(QWidget):
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(6)
+        policy = self.bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(policy)
         layout.addWidget(self.bar)
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
@@ -65,6 +68,7 @@ class RunPanel(QWidget):
             self._missing = is_missing(session)
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
+        self.bar.setVisible(bool(self._busy))
         self.run.setEnabled(not self._missing)
         if self._busy:
             return

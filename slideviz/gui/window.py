@@ -125,6 +125,9 @@ class MainWindow(QMainWindow):
         }
         self.tabifyDockWidget(self.docks["motion"], self.docks["method"])
         self.docks["motion"].raise_()
+        for name in ("motion", "method", "run"):
+            # The tabs, and the button, name them already; the height is needed.
+            self.docks[name].setTitleBarWidget(QWidget())
         self.docks["log"].hide()
         self.setCorner(Qt.Corner.BottomLeftCorner, left)
 

@@ -1,12 +1,40 @@
-"""What the colours mean: the roles, or the colour bar."""
+"""What the colours mean: the roles, or the colour bar, in a strip at the right of the view."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Role
 from slideviz.view.look import ROLE_COLOURS, Look
+
+STRIP = 104
+"""Pixels at the right edge that are kept free of the mesh, at normal letter size."""
+
+_VTK_FONT_FILE = 4
+
+
+@lru_cache(maxsize=1)
+def _font_file() -> str:
+    """Return a font with all signs we need; VTK's own has no Greek and looks coarse."""
+    import matplotlib as mpl
+
+    return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
+
+
+def set_letters(text: Any, look: Look, size: float) -> None:
+    """Give a vtkTextProperty our font, the look's colour, and a size in pixels."""
+    import pyvista as pv
+
+    text.SetFontFamily(_VTK_FONT_FILE)
+    text.SetFontFile(_font_file())
+    text.SetFontSize(round(size))
+    text.SetColor(*pv.Color(look.text).float_rgb)
+    text.SetBold(False)
+    text.SetItalic(False)
+    text.SetShadow(False)
 
 
 def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
@@ -15,19 +43,25 @@ def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale:
         return
     width, height = plotter.window_size
     # The legend's box is given in parts of the view; its letters follow from the box.
-    high = min(0.4, 24 * font_scale * len(roles) / max(height, 1))
-    wide = min(0.4, 110 * font_scale / max(width, 1))
+    high = min(0.6, 25 * font_scale * len(roles) / max(height, 1))
+    wide = min(0.4, 96 * font_scale / max(width, 1))
     legend = plotter.add_legend(
-        [[role, ROLE_COLOURS[role]] for role in roles],
+        [[role, look.text] for role in roles],
         bcolor=look.background,
-        background_opacity=0.75,
+        background_opacity=0.0,
         border=False,
         size=(wide, high),
         loc="upper right",
         face="rectangle",
-        font_family="arial",
     )
-    legend.GetEntryTextProperty().SetColor(*_rgb(look.text))
+    for index, role in enumerate(roles):
+        import pyvista as pv
+
+        legend.SetEntryColor(index, *pv.Color(ROLE_COLOURS[role]).float_rgb)
+    set_letters(legend.GetEntryTextProperty(), look, 14 * font_scale)
+    legend.GetPositionCoordinate().SetValue(
+        1.0 - wide - 4 * font_scale / max(width, 1), 1.0 - high - 12 * font_scale / max(height, 1)
+    )
 
 
 def add_colour_bar(
@@ -35,6 +69,7 @@ def add_colour_bar(
 ) -> None:
     """Draw the colour bar of 0 to 1 at the right edge, with ``inverted`` below when there are."""
     look, font_scale = style
+    width = plotter.window_size[0]
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
@@ -43,21 +78,18 @@ def add_colour_bar(
         vertical=True,
         interactive=False,
         color=look.text,
-        title_font_size=int(17 * font_scale),
-        label_font_size=int(15 * font_scale),
-        font_family="arial",
-        below_label="inverted" if inverted else None,
-        position_x=0.885,
-        position_y=0.12,
-        width=0.085,
-        height=0.76,
-        unconstrained_font_size=True,
+        position_x=1.0 - (STRIP - 14) * font_scale / max(width, 1),
+        position_y=0.16,
+        width=(STRIP - 20) * font_scale / max(width, 1),
+        height=0.68,
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    import pyvista as pv
-
-    return pv.Color(colour).float_rgb
+    set_letters(bar.GetTitleTextProperty(), look, 14 * font_scale)
+    set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
+    set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
+    bar.SetBarRatio(0.24)
+    bar.SetVerticalTitleSeparation(round(8 * font_scale))
+    bar.SetDrawBelowRangeSwatch(inverted)
+    bar.SetDrawAnnotations(inverted)
+    bar.SetBelowRangeAnnotation("inverted" if inverted else "")

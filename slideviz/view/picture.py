@@ -17,7 +17,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.quality import quality as measure
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
-from slideviz.view.legend import add_colour_bar
+from slideviz.view.legend import STRIP, add_colour_bar
 from slideviz.view.look import PAPER, Look
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface
@@ -207,7 +207,10 @@ def _aim(plotter: Any, shape: Any, towards: FloatArray, up: FloatArray) -> None:
     camera.position = centre + towards * max(shape.length, 1e-300)
     camera.up = up
     camera.parallel_projection = True
-    plotter.renderer.ResetCameraScreenSpace(0.84)
+    width, height = plotter.window_size
+    strip = STRIP * _font_scale((width, height))
+    camera.SetWindowCenter(strip / width, 0.06)
+    plotter.renderer.ResetCameraScreenSpace(0.8)
     plotter.renderer.ResetCameraClippingRange()
 
 

@@ -15,10 +15,13 @@ from slideviz.case.model import ROLES
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors, pick
 from slideviz.view.actors import LIFT, VALUES, Drawn
-from slideviz.view.legend import add_colour_bar, add_role_legend
+from slideviz.view.legend import STRIP, add_colour_bar, add_role_legend
 from slideviz.view.look import LIGHT, ROLE_COLOURS, SELECTED_COLOUR, Look
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.surfaces import Surface
+
+FILL = 0.92
+"""How much of the free height or width a mesh takes."""
 
 SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "+x": ((1, 0, 0), (0, 0, 1)),
@@ -297,21 +300,50 @@ class Scene:
         camera.up, camera.view_angle = theirs.up, theirs.view_angle
         camera.parallel_projection = theirs.parallel_projection
         camera.parallel_scale = theirs.parallel_scale
+        camera.SetWindowCenter(*theirs.GetWindowCenter())
         self.plotter.renderer.ResetCameraClippingRange()
 
     def fit(self) -> None:
-        """Make everything fill the view, from the present side."""
-        self.plotter.renderer.ResetCameraScreenSpace(0.86)
+        """Make everything fill the view, from the present side, beside the legend's strip."""
+        width, height = self.plotter.window_size
+        strip = min(STRIP * self.font_scale, 0.4 * width)
+        camera = self.plotter.camera
+        # The camera keeps its centre, which the mouse turns about; only the picture shifts.
+        camera.SetWindowCenter(strip / width, 0.0)
+        shapes = [one.shape for one in self.drawn.values()]
+        shapes += [self._cells] if self._cells is not None else []
+        if not shapes:
+            return
+        points = np.concatenate([np.asarray(shape.points) for shape in shapes])
+        up = np.array(camera.up)
+        right = np.cross(camera.direction, up)
+        up = np.cross(right, camera.direction)
+        axes = np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), camera.direction])
+        low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+        centre, extent = axes.T @ ((low + high) / 2.0), high - low
+        free = max(width - strip, 1.0)
+        half = max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
+        away = max(np.linalg.norm(extent), half)
+        if not camera.parallel_projection:
+            away = half / np.tan(np.radians(camera.view_angle / 2.0)) + extent[2] / 2.0
+        camera.focal_point = centre
+        camera.position = centre - axes[2] * away
+        camera.parallel_scale = half
         self.plotter.renderer.ResetCameraClippingRange()
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
-        """Enlarge by ``factor`` with the point under pixel (x, y) staying there (parallel only)."""
+        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
         camera = self.plotter.camera
-        width, height = self.plotter.render_window.GetSize()
+        if not camera.parallel_projection:
+            camera.Dolly(factor)
+            self.plotter.renderer.ResetCameraClippingRange()
+            return
+        width, height = self.plotter.window_size
         right = np.cross(camera.direction, camera.up)
-        # Pixels from the middle, in the world's length unit at the present scale.
+        middle = width / 2.0 * (1.0 - camera.GetWindowCenter()[0])
+        # Pixels from the camera's centre, in the world's length unit at the present scale.
         unit = 2.0 * camera.parallel_scale / height
-        offset = ((x - width / 2) * right + (y - height / 2) * np.asarray(camera.up)) * unit
+        offset = ((x - middle) * right + (y - height / 2) * np.asarray(camera.up)) * unit
         shift = offset * (1.0 - 1.0 / factor)
         camera.focal_point = np.asarray(camera.focal_point) + shift
         camera.position = np.asarray(camera.position) + shift
