@@ -20,6 +20,7 @@ from slideviz.rbf.evaluate import evaluate
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import (
+    AGREE,
     Cycle,
     Problem,
     Rows,
@@ -69,28 +70,38 @@ def pseudo_sliding(problem: Problem, watch: Watch) -> Solution:
 def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     """Let sliding nodes move within their boundary by the system itself (section 2.4.1).
 
-    On curved boundaries the slid nodes are projected, and interpolated like known ones.
+    Where the boundary is curved, or a node slid past the end of its piece, the slid nodes are
+    projected, and interpolated like known ones.
     """
     if not len(problem.normal_nodes):
         return regular(problem, watch)
     fit = _fit(problem, watch)
     fit.add(sliding_rows(problem))
     sliding = np.concatenate([problem.edge, problem.surface])
-    if problem.curved:
-        slid = _slide(problem, watch, fit, sliding)
-        second = _fit(problem, watch, fit.history)
-        nodes = np.concatenate([problem.known, sliding])
-        values = np.concatenate([problem.values, slid])
-        second.add(full_rows(problem, nodes, values))
-        return _finish(problem, watch, second, nodes, values)
+    nodes = np.concatenate([problem.known, sliding])
     free = _at(problem, watch, fit, sliding)
+    if not problem.curved:
+        free = _within(problem, sliding, free)
+    with watch.phase("project"):
+        slid = problem.project(sliding, free)
+    gap = np.abs(slid - free).max(initial=0.0)
+    if not problem.curved and gap <= AGREE * problem.basis.radius:
+        return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, free]))
+    values = np.concatenate([problem.values, slid])
+    second = _fit(problem, watch, fit.history)
+    second.add(full_rows(problem, nodes, values))
+    return _finish(problem, watch, second, nodes, values)
+
+
+def _within(problem: Problem, sliding: IntArray, free: FloatArray) -> FloatArray:
+    """Return the displacements (m, d) without what rounding left along the normals."""
     row = np.empty(len(problem.features[0]), np.int64)
     row[sliding] = np.arange(len(sliding))
     at = row[problem.normal_nodes]
     off = np.einsum("qd,qd->q", free[at], problem.normals)
-    np.subtract.at(free, at, off[:, None] * problem.normals)
-    nodes = np.concatenate([problem.known, sliding])
-    return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, free]))
+    within = free.copy()
+    np.subtract.at(within, at, off[:, None] * problem.normals)
+    return within
 
 
 METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
