@@ -20,6 +20,7 @@ class ViewSignals(QObject):
     clicked = Signal(QPoint, Qt.KeyboardModifier)
     menu_wanted = Signal(QPoint)
     zoomed = Signal(QPoint, float)
+    resized = Signal()
 
 
 class View3D(QtInteractor):
@@ -86,6 +87,11 @@ class View3D(QtInteractor):
         if steps:
             self.told.zoomed.emit(event.position().toPoint(), 1.2**steps)
         event.accept()
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        if hasattr(self, "told"):
+            self.told.resized.emit()
 
     def to_pixels(self, where: QPoint) -> tuple[float, float]:
         """Return a position in the widget as VTK counts it: device pixels from the lower left."""

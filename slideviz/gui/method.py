@@ -78,7 +78,7 @@ class MethodPanel(QWidget):
         self.found.setProperty("hint", True)
         self.steps = QSpinBox()
         self.steps.setRange(1, MAX_STEPS)
-        self.steps.setKeyboardTracking(True)
+        self.steps.setMinimumHeight(self.sliding.sizeHint().height())
         self.influence_factor = NumberField(2.5, positive)
         self.feature_angle_deg = NumberField(40.0, angle_limit)
         self.quality_metric = Choice({"knupp": "Knupp", "rbf-slide": "as RBF-SliDe"})

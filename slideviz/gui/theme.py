@@ -60,7 +60,6 @@ QStatusBar::item {{ border: none; }}
 QMainWindow::separator {{ width: 5px; height: 5px; background: {window}; }}
 QToolTip {{ padding: 4px; border: none; }}
 QListWidget#motions::item {{ padding: 3px 2px; }}
-QSpinBox {{ padding: 2px; }}
 QLabel[hint="true"] {{ color: {soft}; }}
 QLabel[bad="true"] {{ color: {bad}; }}
 QLineEdit[bad="true"] {{ border: 1.5px solid {bad}; border-radius: 2px; padding: 2px; }}

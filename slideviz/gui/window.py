@@ -154,6 +154,7 @@ class MainWindow(QMainWindow):
         self.run_panel.place_wanted.connect(self.lead_to)
         self.view.told.clicked.connect(self._view_clicked)
         self.view.told.menu_wanted.connect(self._view_menu)
+        self.view.told.resized.connect(self.scene.resized)
         self.view.told.zoomed.connect(self._view_zoomed)
         self.start.open_wanted.connect(self.files.ask_and_open)
         self.start.file_wanted.connect(self.files.open_path)

@@ -39,29 +39,32 @@ def set_letters(text: Any, look: Look, size: float) -> None:
 
 def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
     """Write the roles in use into the upper right corner, each with its colour."""
-    if not roles:
-        return
-    width, height = plotter.window_size
-    # The legend's box is given in parts of the view; its letters follow from the box.
-    high = min(0.6, 25 * font_scale * len(roles) / max(height, 1))
-    wide = min(0.4, 96 * font_scale / max(width, 1))
-    legend = plotter.add_legend(
-        [[role, look.text] for role in roles],
-        bcolor=look.background,
-        background_opacity=0.0,
-        border=False,
-        size=(wide, high),
-        loc="upper right",
-        face="rectangle",
-    )
-    for index, role in enumerate(roles):
-        import pyvista as pv
+    import pyvista as pv
 
-        legend.SetEntryColor(index, *pv.Color(ROLE_COLOURS[role]).float_rgb)
-    set_letters(legend.GetEntryTextProperty(), look, 14 * font_scale)
-    legend.GetPositionCoordinate().SetValue(
-        1.0 - wide - 4 * font_scale / max(width, 1), 1.0 - high - 12 * font_scale / max(height, 1)
-    )
+    width, height = plotter.window_size
+    for row, role in enumerate(roles):
+        top = 1.0 - (14 + 24 * (row + 1)) * font_scale / max(height, 1)
+        for sign, colour, right in (
+            ("\u25a0", ROLE_COLOURS[role], STRIP - 8),
+            (role, look.text, STRIP - 28),
+        ):
+            text = pv.Text(sign)
+            text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+            text.GetPositionCoordinate().SetValue(1.0 - right * font_scale / max(width, 1), top)
+            set_letters(text.prop, look, (20 if colour != look.text else 14) * font_scale)
+            text.prop.color = colour
+            text.prop.SetVerticalJustificationToCentered()
+            name = f"legend:{role}:{sign}"
+            plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
+
+
+def clear_legend(plotter: Any) -> None:
+    """Remove the legend of roles and the colour bar."""
+    for name in list(plotter.actors):
+        if name.startswith("legend:"):
+            plotter.remove_actor(name, reset_camera=False, render=False)
+    for name in list(plotter.scalar_bars.keys()):
+        plotter.remove_scalar_bar(name, render=False)
 
 
 def add_colour_bar(

@@ -13,11 +13,11 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.quality import quality as measure
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
-from slideviz.view.legend import STRIP, add_colour_bar
+from slideviz.view.legend import STRIP, add_colour_bar, set_letters
 from slideviz.view.look import PAPER, Look
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from slideviz.view.scene import Scene
 
 SIZE = (1600, 1000)
-_NORMAL_HEIGHT = 720
+_NORMAL_HEIGHT = 620
 """A picture this high has letters of normal size."""
 
 
@@ -153,8 +153,8 @@ def _add_cells(plotter: Any, shape: Any, flat: bool) -> Any:
         edge_color=PAPER.edge,
         edge_opacity=0.6,
         lighting=not flat,
-        ambient=0.45,
-        diffuse=0.6,
+        ambient=0.65,
+        diffuse=0.4,
         copy_mesh=False,
     )
     # Edges as thin as they can be: boundary layers would turn black otherwise.
@@ -166,38 +166,58 @@ def _add_title(plotter: Any, mesh: Mesh, found: Quality, scale: float) -> None:
     text = f"{Path(mesh.name).name}: min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
         text += f", {found.inverted} of {len(found)} cells inverted"
-    plotter.add_text(
-        text, position="upper_edge", font_size=int(10 * scale), color=PAPER.text, font="arial"
-    )
+    import pyvista as pv
+
+    title = pv.Text(text)
+    set_letters(title.prop, PAPER, 16 * scale)
+    title.prop.SetJustificationToCentered()
+    title.prop.SetVerticalJustificationToCentered()
+    title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+    title.GetPositionCoordinate().SetValue(0.5, 1.0 - 20 * scale / plotter.window_size[1])
+    plotter.add_actor(title, name="title", reset_camera=False, render=False)
 
 
 def _half(shape: Any, mesh: Mesh, reference: Mesh | None) -> tuple[Any, FloatArray, FloatArray]:
     """Return the cells behind a plane, the direction to the eye, and what is up."""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    centre, across = (low + high) / 2.0, int(np.argmin(high - low))
+    base = mesh
     if reference is not None and reference.points.shape == mesh.points.shape:
-        shift = mesh.points - reference.points
-        weight = np.linalg.norm(shift, axis=1)
-        if weight.max() > 0:
-            # Only what moved nearly as far as anything: the rest of the mesh follows weakly.
-            strong = weight > 0.7 * weight.max()
-            centre = mesh.points[strong].mean(axis=0)
-            # Cut along the motion, and of the two such planes across the longer side.
-            along = np.abs(shift[strong]).mean(axis=0) / np.abs(shift[strong]).mean(axis=0).max()
-            candidates = np.flatnonzero(along < 0.5)
-            if len(candidates):
-                across = int(candidates[np.argmax((high - low)[candidates])])
-            else:
-                across = int(np.argmin(along))
+        base = reference
+    low, extent = base.points.min(axis=0), np.ptp(base.points, axis=0)
+    centre, across = low + extent / 2.0, int(np.argmin(extent))
+    shift = mesh.points - base.points
+    length = np.linalg.norm(shift, axis=1)
+    if length.max() > 0:
+        strong = _moved_body(base, length)
+        centre = base.points[strong].mean(axis=0)
+        along = np.abs(shift[strong]).mean(axis=0)
+        # Cut along the motion, and of such planes the one across the longest side.
+        free = along < 0.5 * along.max()
+        across = int(np.argmax(np.where(free, extent, -1.0))) if free.any() else int(along.argmin())
+    # By where the cells were: what lay in one layer of a structured mesh stays together.
+    middle = volume(base).cell_centers().points[:, across]
+    behind = np.flatnonzero(middle <= centre[across] + 1e-3 * extent[across])
+    half = shape.extract_cells(behind) if len(behind) else shape
     normal = np.zeros(3)
     normal[across] = 1.0
-    half = shape.clip(normal=normal, origin=centre, crinkle=True)
-    if half.n_cells == 0:
-        half = shape
     up = np.array([0.0, 1.0, 0.0]) if across == 2 else np.array([0.0, 0.0, 1.0])
-    side = np.cross(up, normal)
-    towards = normal + 0.45 * side + 0.35 * up
-    return half, towards, up
+    return half, normal + 0.4 * np.cross(up, normal) + 0.3 * up, up
+
+
+def _moved_body(base: Mesh, length: FloatArray) -> IntArray:
+    """Return the nodes of the boundary to cut through: of those inside, what moved most.
+
+    A blade or a block lies inside the mesh's box in two directions or three; the outer
+    boundaries, which may slide further than it, in none.
+    """
+    low, high = base.points.min(axis=0), base.points.max(axis=0)
+
+    def rank(nodes: IntArray) -> tuple[bool, float]:
+        at = base.points[nodes]
+        inside = (at.min(axis=0) > low) & (at.max(axis=0) < high)
+        return int(inside.sum()) >= 2, float(length[nodes].mean())
+
+    every = [marker.nodes for marker in base.markers if len(marker.nodes)]
+    return max(every, key=rank, default=np.flatnonzero(length > 0.7 * length.max()))
 
 
 def _aim(plotter: Any, shape: Any, towards: FloatArray, up: FloatArray) -> None:

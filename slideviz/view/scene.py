@@ -15,7 +15,7 @@ from slideviz.case.model import ROLES
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors, pick
 from slideviz.view.actors import LIFT, VALUES, Drawn
-from slideviz.view.legend import STRIP, add_colour_bar, add_role_legend
+from slideviz.view.legend import STRIP, add_colour_bar, add_role_legend, clear_legend
 from slideviz.view.look import LIGHT, ROLE_COLOURS, SELECTED_COLOUR, Look
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.surfaces import Surface
@@ -84,10 +84,8 @@ class Scene:
 
     def clear(self) -> None:
         """Remove everything."""
+        clear_legend(self.plotter)
         self.plotter.clear_actors()
-        for name in list(self.plotter.scalar_bars.keys()):
-            self.plotter.remove_scalar_bar(name, render=False)
-        self.plotter.remove_legend(render=False)
         self.drawn, self._ghosts = {}, {}
         self._cells = self._cells_actor = None
         self._session = Session()
@@ -126,7 +124,7 @@ class Scene:
         band.prop.opacity = 1.0
         band.visibility = False
         if not flat:
-            actor.prop.ambient, actor.prop.diffuse = 0.35, 0.7
+            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.45
             # Lines on a face flicker unless they are drawn a little nearer.
             band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
         return Drawn(surface, shape, rim, actor, band)
@@ -206,11 +204,19 @@ class Scene:
         prop.edge_color = self.look.edge
         prop.edge_opacity = 0.55
 
+    def resized(self) -> None:
+        """Put the legend where it belongs in a view of another size."""
+        width = self.plotter.window_size[0]
+        self.plotter.camera.SetWindowCenter(self._strip() / max(width, 1), 0.0)
+        self._draw_legend(self._session)
+
+    def _strip(self) -> float:
+        """Return how many pixels at the right are the legend's."""
+        return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
+
     def _draw_legend(self, session: Session) -> None:
         what = session.view.colour_by
-        self.plotter.remove_legend(render=False)
-        for name in list(self.plotter.scalar_bars.keys()):
-            self.plotter.remove_scalar_bar(name, render=False)
+        clear_legend(self.plotter)
         if not session.view.legend or session.mesh is None:
             return
         if what == "role":
@@ -306,7 +312,7 @@ class Scene:
     def fit(self) -> None:
         """Make everything fill the view, from the present side, beside the legend's strip."""
         width, height = self.plotter.window_size
-        strip = min(STRIP * self.font_scale, 0.4 * width)
+        strip = self._strip()
         camera = self.plotter.camera
         # The camera keeps its centre, which the mouse turns about; only the picture shifts.
         camera.SetWindowCenter(strip / width, 0.0)
