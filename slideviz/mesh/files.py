@@ -53,9 +53,9 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
             raise path_error(
                 path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
             )
-        from slideviz.mesh.foreign import read_foreign
+        from slideviz.mesh.apart import read_apart
 
-        return read_foreign(path, tick)
+        return read_apart(path, tick)
     except MemoryError as problem:
         raise path_error(
             path, "there is not enough memory to read it; use a machine with more"

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from slideviz.mesh.model import IntArray, Mesh
 
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
+_BLOCK_BYTES = 3 << 18
+"""A multiple of 3, so that the encoded blocks join."""
 # VTK counts the nodes of a prism so that its first triangle faces outward.
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
@@ -83,5 +85,7 @@ def _array(name: str, values: NDArray) -> Iterator[bytes]:
         f'<DataArray type="{_TYPES[kind]}" Name={quoteattr(name)}{width} format="binary">'
     ).encode()
     little = np.ascontiguousarray(values, dtype=f"<{kind}" if kind != "u1" else "u1")
-    yield b64encode(np.array([little.nbytes], "<u8").tobytes() + little.tobytes())
+    content = np.array([little.nbytes], "<u8").tobytes() + little.tobytes()
+    for begin in range(0, len(content), _BLOCK_BYTES):
+        yield b64encode(content[begin : begin + _BLOCK_BYTES])
     yield b"</DataArray>\n"

@@ -16,6 +16,7 @@ import slideviz
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.files import read, write
+from slideviz.mesh.foreign import read_foreign
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.outer import outer_facets
 
@@ -103,6 +104,12 @@ ABAQUS = """\
 *NSET, NSET=SPOT
 3
 """
+
+
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch):
+    """Read in this process, where it is quick and can be patched; test_apart.py does the rest."""
+    monkeypatch.setattr("slideviz.mesh.apart.read_apart", read_foreign)
 
 
 @pytest.fixture(scope="module")
