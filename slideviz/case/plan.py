@@ -26,9 +26,6 @@ from slideviz.rbf.projection import Tracks, find_tracks
 COINCIDENT = 1e-12
 """Nodes nearer than this part of the mesh's extent are one control node."""
 
-COINCIDENT_IMAGE = 1e-9
-"""The same for nodes one period apart; the period is known to the digits of the file only."""
-
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -135,13 +132,15 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     return Plan(
         frame=frame,
         basis=Basis(
-            case.influence_factor * mesh.extent, frame.period if frame.cylindrical else 0.0
+            case.influence_factor * mesh.extent,
+            frame.period if frame.cylindrical else 0.0,
+            case.kernel,
         ),
         coords=coords,
         classes=classes,
         known=known,
         target=target,
-        same_as=_coinciding(boundary.nodes, coords, mesh.extent, (images, frame.shift())),
+        same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
         periodic_displacement=free,
         reduction=_reduction(case, mesh.extent),
@@ -196,29 +195,13 @@ def _prescribed(
     return known, target, (*moved.warnings, *((remark,) if remark else ()))
 
 
-def _coinciding(
-    boundary_nodes: IntArray,
-    coords: FloatArray,
-    extent: float,
-    periodicity: tuple[IntArray, FloatArray],
-) -> IntArray:
-    """Return for each node the lowest node that coincides with it, (n,).
-
-    Besides the matched ``images`` (p, 2) of the periodic markers these are all boundary nodes a
-    ``shift`` (d,) of one period apart: meshes with a halo layer have them beyond the markers.
-    """
-    images, shift = periodicity
-    tree = cKDTree(coords[boundary_nodes])
-    twins = tree.query_pairs(COINCIDENT * extent, output_type="ndarray").reshape(-1, 2)
-    links = [boundary_nodes[twins], images]
-    if np.any(shift):
-        reach = COINCIDENT_IMAGE * extent
-        gap, other = tree.query(coords[boundary_nodes] + shift, distance_upper_bound=reach)
-        near = np.isfinite(np.asarray(gap))
-        links.append(np.stack([boundary_nodes[near], boundary_nodes[np.asarray(other)[near]]], 1))
-    table = np.concatenate(links)
-    count = len(coords)
-    graph = coo_array((np.ones(len(table), np.int8), tuple(table.T)), shape=(count, count))
+def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
+    """Return for each node the lowest node that coincides with it, (n,)."""
+    tree = cKDTree(mesh.points[boundary_nodes])
+    twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
+    links = np.concatenate([twins.reshape(-1, 2), images])
+    count = len(mesh.points)
+    graph = coo_array((np.ones(len(links), np.int8), tuple(links.T)), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     lowest = np.full(label.max() + 1, count, np.int64)
     np.minimum.at(lowest, label, np.arange(count))
