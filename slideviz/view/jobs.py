@@ -97,10 +97,15 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
     """Deform the mesh; every step is reported as a `Frame`, what goes on as `Doing`."""
     from slideviz.staircase import Progress, deform
 
+    furthest = 0.0
+
     def progress(now: Progress) -> None:
+        nonlocal furthest
         require_going(stopped)
+        # Sliding solves more than once in a step; a bar that runs back would look broken.
+        furthest = max(furthest, overall(now))
         phase = PHASES.get(now.phase, now.phase)
-        report(Doing(f"Step {now.step} of {now.total}: {phase}", overall(now)))
+        report(Doing(f"Step {now.step} of {now.total}: {phase}", furthest))
 
     for step in deform(case, mesh, progress=progress):
         report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))

@@ -124,7 +124,7 @@ class Scene:
         band.prop.opacity = 1.0
         band.visibility = False
         if not flat:
-            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.45
+            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
             # Lines on a face flicker unless they are drawn a little nearer.
             band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
         return Drawn(surface, shape, rim, actor, band)

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from slideviz.case.samples import sample
+from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.quality import quality
+from slideviz.view.changes import open_mesh
+from slideviz.view.state import Frame
+
+
+def square_mesh(n=4):
+    """n x n unit quadrilaterals, with a boundary on each side."""
+    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0))
+    ids = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    quads = np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], -1).reshape(-1, 4)
+
+    def line(name, nodes):
+        return Marker(name, Cells.from_blocks([(3, np.stack([nodes[:-1], nodes[1:]], 1))]))
+
+    markers = (
+        line("bottom", ids[0]),
+        line("right", ids[:, -1]),
+        line("top", ids[-1][::-1]),
+        line("left", ids[::-1, 0]),
+    )
+    points = np.stack([x.ravel(), y.ravel()], 1)
+    return Mesh(points, Cells.from_blocks([(9, quads)]), markers, name="square")
+
+
+@pytest.fixture
+def square():
+    return square_mesh()
+
+
+@pytest.fixture
+def session(square):
+    return open_mesh(Frame(square, quality(square)), None)
+
+
+@pytest.fixture(scope="session")
+def cube():
+    return sample("hexahedron", size=8).mesh
+
+
+@pytest.fixture(scope="session")
+def passage():
+    return sample("passage", size=12)

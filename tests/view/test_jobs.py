@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+
+from slideviz import read
+from slideviz.case.model import Case, FromFile, Translate
+from slideviz.case.samples import write_sample
+from slideviz.errors import Cancelled, CaseError, MeshError
+from slideviz.view import jobs
+from slideviz.view.ghosts import Ghosts
+from slideviz.view.state import Frame
+
+
+def never():
+    return False
+
+
+def test_opening_a_case_gives_mesh_roles_pairs_and_quality(tmp_path):
+    write_sample("passage", tmp_path, size=12)
+    heard = []
+    opened = jobs.open_file(tmp_path / "passage.cfg", None, heard.append, never)
+    session = opened.session
+    assert session.role("airfoil") == "moving"
+    assert session.path == session.case.mesh_file
+    assert {session.pairs[0].first, session.pairs[0].second} == {"periodic_1", "periodic_2"}
+    assert len(session.frame.quality) == len(session.mesh.cells)
+    assert {one.name for one in opened.surfaces} == set(session.mesh.marker_names)
+    fractions = [doing.fraction for doing in heard if doing.fraction is not None]
+    assert fractions == sorted(fractions)
+    assert fractions
+
+
+def test_opening_can_be_stopped(tmp_path):
+    write_sample("passage", tmp_path, size=12)
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs.open_file(tmp_path / "mesh.su2", None, lambda _: None, lambda: True)
+
+
+def test_a_case_without_a_mesh_is_refused(tmp_path):
+    file = tmp_path / "a.cfg"
+    Case(roles={"a": "moving"}, motions=(Translate("a", (1.0, 0.0)),)).write(file)
+    with pytest.raises(CaseError, match="MESH_FILENAME"):
+        jobs.open_file(file, None, lambda _: None, never)
+
+
+def test_computing_reports_every_step_with_its_quality(tmp_path):
+    write_sample("passage", tmp_path, size=12)
+    case = Case.read(tmp_path / "passage.cfg").change(steps=3)
+    mesh, heard = read(case.mesh_file), []
+    jobs.compute(case, mesh, heard.append, never)
+    frames = [item for item in heard if isinstance(item, Frame)]
+    assert [frame.step.index for frame in frames] == [1, 2, 3]
+    assert frames[-1].quality.min < 1.0
+    fractions = [item.fraction for item in heard if isinstance(item, jobs.Doing)]
+    assert all(0.0 <= fraction <= 1.0 for fraction in fractions)
+    assert fractions == sorted(fractions)
+
+
+def test_computing_stops_when_asked_and_keeps_what_was_reported(tmp_path):
+    write_sample("passage", tmp_path, size=12)
+    case = Case.read(tmp_path / "passage.cfg").change(steps=50)
+    frames = []
+
+    def report(item):
+        if isinstance(item, Frame):
+            frames.append(item)
+
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs.compute(case, read(case.mesh_file), report, lambda: len(frames) >= 2)
+    assert len(frames) == 2
+
+
+def test_a_mesh_is_saved_with_quality_where_there_is_room(tmp_path, passage):
+    import meshio
+
+    opened = jobs.prepare(passage.mesh, None, passage.case, lambda _: None, never)
+    frame = opened.session.frame
+    jobs.save_mesh(tmp_path / "a.su2", frame, False, lambda _: None, never)
+    jobs.save_mesh(tmp_path / "a.vtu", frame, False, lambda _: None, never)
+    assert np.array_equal(read(tmp_path / "a.su2").points, passage.mesh.points)
+    stored = np.concatenate(meshio.read(tmp_path / "a.vtu").cell_data["size_skew"])
+    # The lines of the boundaries are in the file, too, and have no quality.
+    stored = stored[np.isfinite(stored)]
+    assert np.allclose(np.sort(stored), np.sort(frame.quality.values))
+
+
+def test_a_broken_file_is_one_error(tmp_path):
+    file = tmp_path / "bad.su2"
+    file.write_text("NDIME= 2\nNELEM= many\n")
+    with pytest.raises(MeshError, match=r"bad\.su2:2"):
+        jobs.open_file(file, None, lambda _: None, never)
+
+
+def test_ghosts_are_where_the_motions_lead(passage):
+    mesh = passage.mesh
+    nodes = mesh.marker("airfoil").nodes
+    case = Case(roles={"airfoil": "moving"}, motions=(Translate("airfoil", (0.5, 0.25)),))
+    moved = Ghosts(mesh).moved(case)
+    assert np.allclose(moved["airfoil"], mesh.points[nodes] + [0.5, 0.25])
+
+
+def test_ghosts_read_displacement_files_again_when_they_change(tmp_path, passage):
+    import os
+
+    mesh, file = passage.mesh, tmp_path / "d.txt"
+    node = int(mesh.marker("airfoil").nodes[0])
+    case = Case(roles={"airfoil": "moving"}, motions=(FromFile(file, "airfoil"),))
+    ghosts = Ghosts(mesh)
+    assert np.allclose(ghosts.moved(case)["airfoil"][0], mesh.points[node]), "no file yet"
+    for stamp, by in ((1_000, 0.5), (2_000, 0.75)):
+        file.write_text(f"{node} {by} 0.0\n")
+        os.utime(file, (stamp, stamp))
+        assert np.allclose(ghosts.moved(case)["airfoil"][0], mesh.points[node] + [by, 0.0])
+    file.write_text("nonsense\n")
+    os.utime(file, (3_000, 3_000))
+    assert np.allclose(ghosts.moved(case)["airfoil"][0], mesh.points[node])
+
+
+def test_the_view_needs_no_qt():
+    import subprocess
+    import sys
+
+    code = (
+        "import sys, slideviz.view.scene, slideviz.view.picture, slideviz.view.jobs, "
+        "slideviz.view.changes, slideviz.view.ghosts\n"
+        "bad = [m for m in sys.modules if m.split('.')[0] in ('qtpy', 'PySide6', 'pyvistaqt')]\n"
+        "sys.exit(str(bad) if bad else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,250 @@
+"""Scenes judged by meaning: which colours are where, not by golden pictures."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
+from slideviz.view.pick import to_display
+from slideviz.view.scene import Scene
+from slideviz.view.state import Frame
+from slideviz.view.surfaces import facet_connectivity, find_surfaces
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=[420, 300])
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def scene(plotter):
+    return Scene(plotter)
+
+
+def image(scene):
+    scene.plotter.render()
+    return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
+
+
+def count(picture, colour, within=14):
+    """Return how many pixels have about that colour."""
+    rgb = np.array(pv.Color(colour).int_rgb)
+    return int((np.abs(picture[..., :3] - rgb).max(axis=2) <= within).sum())
+
+
+def pixel(scene, point):
+    """Return the colour at a point of the mesh."""
+    picture = image(scene)
+    x, y = to_display(scene.plotter, np.array([point], float))[0]
+    return picture[picture.shape[0] - 1 - int(y), int(x)]
+
+
+def opened(scene, session):
+    scene.open(session, find_surfaces(session.mesh))
+    return session
+
+
+def test_roles_have_their_colours(scene, session):
+    session = opened(scene, changes.set_role(session, ("left",), "moving"))
+    before = count(image(scene), ROLE_COLOURS["moving"])
+    assert before > 200
+    scene.update(changes.set_role(session, ("left",), "sliding"))
+    after = image(scene)
+    assert count(after, ROLE_COLOURS["moving"]) == 0
+    assert count(after, ROLE_COLOURS["sliding"]) > 200
+
+
+def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
+    points = session.mesh.points.copy()
+    points[12] += 0.45
+    mesh = session.mesh.with_points(points)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
+    session = changes.add_frames(session, [frame])
+    scene.update(session)
+    table = pv.LookupTable(COLOUR_MAP, scalar_range=(0.0, 1.0))
+    for cell, middle in ((0, (0.3, 0.3, 0)), (10, (2.75, 2.75, 0)), (5, (1.5, 1.5, 0))):
+        value = float(frame.quality.values[cell])
+        wanted = np.array(table.map_value(value)[:3]) * 255
+        assert np.abs(pixel(scene, middle)[:3] - wanted).max() < 12, (cell, value)
+
+
+def test_an_inverted_cell_has_its_own_colour(scene, session):
+    points = session.mesh.points.copy()
+    points[12] += 3.0
+    mesh = session.mesh.with_points(points)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    assert frame.quality.inverted
+    session = changes.set_view(opened(scene, session), colour_by="skew", edges=False)
+    scene.update(session)
+    assert count(image(scene), INVERTED_COLOUR) == 0
+    scene.update(changes.add_frames(session, [frame]))
+    assert count(image(scene), INVERTED_COLOUR) > 50
+
+
+def test_steps_move_the_points_in_place(scene, session):
+    session = opened(scene, session)
+    shape = scene.drawn["top"].shape
+    mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
+    session = changes.add_frames(session, [Frame(mesh, quality(mesh, session.mesh))])
+    scene.update(session)
+    assert scene.drawn["top"].shape is shape
+    assert np.allclose(np.asarray(shape.points)[:, 1], 2.0)
+    scene.update(changes.show_frame(session, 0))
+    assert np.allclose(np.asarray(shape.points)[:, 1], 4.0)
+
+
+def test_hidden_boundaries_are_not_drawn_and_not_picked(scene, session):
+    session = opened(scene, changes.set_role(session, ("left",), "moving"))
+    x, y = to_display(scene.plotter, np.array([[0.0, 1.5, 0.0]]))[0]
+    assert scene.pick(x, y) == "left"
+    scene.update(changes.show(session, ("left",), False))
+    # The legend still names the role, so that some of its colour remains.
+    assert count(image(scene), ROLE_COLOURS["moving"]) < 250
+    assert scene.pick(x, y) is None
+
+
+def test_a_click_finds_the_nearest_boundary_of_a_2d_mesh(scene, session):
+    opened(scene, session)
+    for name, point in (("bottom", (1.7, 0)), ("top", (3, 4)), ("right", (4, 2.2))):
+        x, y = to_display(scene.plotter, np.array([[*point, 0.0]]))[0]
+        assert scene.pick(x + 3, y + 3) == name
+    x, y = to_display(scene.plotter, np.array([[2.0, 2.0, 0.0]]))[0]
+    assert scene.pick(x, y) is None
+
+
+def test_a_click_finds_the_front_boundary_of_a_3d_mesh(scene, cube):
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    opened(scene, session)
+    for side, name in (("+x", "RIGHT"), ("-x", "LEFT"), ("+y", "UPPER"), ("-z", "FRONT")):
+        scene.look_from(side)
+        scene.plotter.render()
+        x, y = to_display(scene.plotter, np.array([cube.points.mean(axis=0)]))[0]
+        assert scene.pick(x, y) == name, side
+    scene.update(changes.show(session, ("FRONT",), False))
+    assert scene.pick(x, y) in ("BLOCK", "BACK")
+    assert scene.pick(2, 2) is None
+
+
+def test_selected_boundaries_are_highlighted(scene, session):
+    session = opened(scene, session)
+    before = image(scene)
+    scene.update(changes.select(session, ("top",)))
+    changed = np.abs(image(scene) - before).max(axis=2) > 30
+    rows = np.flatnonzero(changed.any(axis=1))
+    assert rows.max() < 100, "only near the upper side"
+    assert changed.sum() > 300
+
+
+def test_the_motion_ghost_is_where_the_motion_leads(scene, session):
+    session = opened(scene, changes.set_role(session, ("left",), "moving"))
+    one = scene.drawn["left"]
+    scene.set_motion_ghosts({"left": session.mesh.points[one.surface.nodes] + [2.0, 0.0]})
+    scene.update(changes.set_view(session, edges=False))
+    red, _, blue = pixel(scene, (2.0, 1.5, 0.0))[:3]
+    assert red > blue + 40, "the ghost is orange"
+    scene.update(changes.set_view(session, motion_ghost=False, edges=False))
+    red, _, blue = pixel(scene, (2.0, 1.5, 0.0))[:3]
+    assert abs(red - blue) < 25
+    scene.set_motion_ghosts({})
+    assert "motion:left" not in scene.plotter.actors
+
+
+def test_the_undeformed_ghost_stays_where_the_boundary_was(scene, session):
+    session = opened(scene, changes.set_role(session, ("top",), "moving"))
+    mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
+    session = changes.add_frames(session, [Frame(mesh, quality(mesh, session.mesh))])
+    scene.update(session)
+    plain = pixel(scene, (2.0, 4.0, 0.0))
+    scene.update(changes.set_view(session, undeformed=True))
+    assert np.abs(pixel(scene, (2.0, 4.0, 0.0)) - plain).max() > 40
+
+
+def test_edges_can_be_switched_off(scene, session):
+    session = opened(scene, session)
+    with_edges = image(scene)
+    scene.update(changes.set_view(session, edges=False))
+    assert count(image(scene), LIGHT.cell, 3) > count(with_edges, LIGHT.cell, 3) + 500
+
+
+def test_the_mesh_stays_out_of_the_strip_of_the_legend(scene, session):
+    opened(scene, session)
+    seen = to_display(scene.plotter, np.asarray(scene.drawn["right"].shape.points))
+    assert seen[:, 0].max() < 420 - 100
+    assert seen[:, 0].max() > 150
+
+
+def test_zooming_keeps_the_point_under_the_mouse(scene, session):
+    opened(scene, session)
+    corner = np.array([[0.0, 4.0, 0.0]])
+    x, y = to_display(scene.plotter, corner)[0]
+    before = to_display(scene.plotter, np.array([[4.0, 4.0, 0.0]]))[0, 0] - x
+    scene.zoom_at(x, y, 1.5)
+    assert np.allclose(to_display(scene.plotter, corner)[0], (x, y), atol=0.6)
+    after = to_display(scene.plotter, np.array([[4.0, 4.0, 0.0]]))[0, 0] - x
+    assert after == pytest.approx(1.5 * before, rel=1e-3)
+
+
+def test_perspective_is_for_3d_only(scene, session, cube):
+    opened(scene, changes.set_view(session, perspective=True))
+    assert scene.plotter.camera.parallel_projection
+    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    opened(scene, solid)
+    assert scene.plotter.camera.parallel_projection
+    scene.update(changes.set_view(solid, perspective=True))
+    assert not scene.plotter.camera.parallel_projection
+
+
+def test_the_legend_says_roles_or_shows_the_bar(scene, session):
+    session = opened(scene, session)
+    assert any(name.startswith("legend:fixed") for name in scene.plotter.actors)
+    scene.update(changes.set_view(session, colour_by="size"))
+    assert list(scene.plotter.scalar_bars.keys()) == ["size"]
+    assert not any(name.startswith("legend:") for name in scene.plotter.actors)
+    scene.update(changes.set_view(session, legend=False, colour_by="size"))
+    assert not list(scene.plotter.scalar_bars.keys())
+
+
+def test_another_mesh_replaces_all_actors(scene, session, cube):
+    opened(scene, session)
+    opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    assert set(scene.drawn) == set(cube.marker_names)
+    assert "marker:left" not in scene.plotter.actors
+    scene.clear()
+    assert not scene.drawn
+    assert not [name for name in scene.plotter.actors if name.startswith("marker:")]
+
+
+def test_the_look_changes_the_background(scene, session):
+    opened(scene, session)
+    scene.set_look(DARK)
+    assert image(scene)[-3, 3].max() < 60
+
+
+def test_a_3d_mesh_without_boundaries_shows_its_outside(scene, cube):
+    from dataclasses import replace
+
+    bare = replace(cube, markers=())
+    scene.open(changes.open_mesh(Frame(bare, quality(bare)), None), find_surfaces(bare))
+    picture = image(scene)
+    assert np.abs(picture[150, 160] - picture[-3, 3]).max() > 10
+
+
+def test_surfaces_know_their_cells_and_rims(cube):
+    surfaces = {one.name: one for one in find_surfaces(cube)}
+    right = surfaces["RIGHT"]
+    assert len(right.facets) == len(cube.marker("RIGHT").cells)
+    assert len(right.rim) == 4 * 8
+    centres = cube.points[cube.cells.by_type[12][1][right.owner]].mean(axis=1)
+    assert np.all(centres[:, 0] > 1.0 - 1.0 / 8)
+    assert len(surfaces["BLOCK"].rim) == 0
+
+
+def test_triangles_and_quadrilaterals_become_vtk_faces():
+    flat = facet_connectivity(np.array([[0, 1, 2, 2], [1, 2, 3, 4]]))
+    assert flat.tolist() == [3, 0, 1, 2, 4, 1, 2, 3, 4]
+    assert facet_connectivity(np.array([[5, 6]])).tolist() == [2, 5, 6]

@@ -1,0 +1,186 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slideviz.case.model import Case, FromFile, Rotate, Translate
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.state import Frame, Session, essence
+from slideviz.view.store import Store
+
+
+def moved(session, by=0.25):
+    points = session.mesh.points.copy()
+    points[12] += by
+    mesh = session.mesh.with_points(points)
+    return Frame(mesh, quality(mesh, session.mesh))
+
+
+def test_a_mesh_opens_with_guessed_roles_for_every_boundary(session):
+    assert dict(session.case.roles) == dict.fromkeys(session.mesh.marker_names, "fixed")
+    assert not session.unsaved_case
+    assert session.frame is session.frames[0]
+
+
+def test_a_case_opens_with_its_roles_and_no_guesses(square):
+    case = Case(roles={"left": "sliding"})
+    session = changes.open_mesh(Frame(square, quality(square)), Path("a.su2"), (), case)
+    assert session.role("left") == "sliding"
+    assert session.role("top") == "fixed"
+    assert not session.guesses
+    assert session.case.mesh_file == Path("a.su2")
+    assert not session.unsaved_case
+
+
+def test_a_role_for_several_confirms_their_guesses_and_leaves_the_others(session):
+    assert set(session.guesses) == {"bottom", "right", "top", "left"}
+    new = changes.set_role(session, ("left", "right"), "moving")
+    assert new.case.markers_with("moving") == ("right", "left")
+    assert set(new.guesses) == {"bottom", "top"}
+    assert new.unsaved_case
+    assert session.role("left") == "fixed", "the old state is a value and stays"
+
+
+def test_confirming_keeps_the_roles(session):
+    new = changes.confirm(session)
+    assert not new.guesses
+    assert new.case == session.case
+
+
+def test_motions_of_a_boundary_that_no_longer_moves_go(session):
+    session = changes.set_role(session, ("left", "top"), "moving")
+    session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
+    session = changes.add_motion(session, Translate("top", (0.0, 1.0)))
+    session = changes.set_role(session, ("left",), "fixed")
+    assert [motion.marker for motion in session.case.motions] == ["top"]
+
+
+def test_periodicity_ends_with_the_last_periodic_boundary(session):
+    session = changes.set_role(session, ("left", "right"), "periodic")
+    session = changes.set_case(session, periodic="moving")
+    session = changes.set_role(session, ("left",), "fixed")
+    assert session.case.periodic == "moving"
+    assert changes.set_role(session, ("right",), "fixed").case.periodic == "none"
+
+
+def test_motions_are_added_replaced_moved_and_removed_in_order(session):
+    a, b, c = (Translate("left", (float(i), 0.0)) for i in range(3))
+    for motion in (a, b):
+        session = changes.add_motion(session, motion)
+    session = changes.replace_motion(session, 1, c)
+    assert session.case.motions == (a, c)
+    session = changes.move_motion(session, 1, -1)
+    assert session.case.motions == (c, a)
+    assert changes.move_motion(session, 0, -1).case.motions == (c, a)
+    assert changes.remove_motion(session, 0).case.motions == (a,)
+
+
+def test_hide_show_isolate(session):
+    assert changes.show(session, ("left",), False).view.hidden == {"left"}
+    only = changes.isolate(session, ("left",))
+    assert only.view.hidden == {"bottom", "right", "top"}
+    assert changes.show(only, session.mesh.marker_names).view.hidden == frozenset()
+
+
+def test_frames_are_kept_shown_and_limited(session):
+    session = changes.start_run(changes.add_frames(session, [moved(session)]))
+    assert len(session.frames) == 1
+    session = changes.add_frames(session, [moved(session), moved(session, 0.3)])
+    assert session.view.frame == 2
+    assert session.deformed is session.frames[2]
+    assert session.unsaved_mesh
+    assert changes.show_frame(session, 99).view.frame == 2
+    assert changes.show_frame(session, -3).view.frame == 0
+    assert not changes.saved_mesh(session).unsaved_mesh
+
+
+def test_other_settings_make_the_steps_outdated_but_file_names_do_not(session):
+    session = changes.add_frames(changes.start_run(session), [moved(session)])
+    assert not session.outdated
+    assert not changes.set_case(session, mesh_out=Path("x.su2")).outdated
+    assert changes.set_case(session, steps=7).outdated
+    assert changes.set_role(session, ("top",), "sliding").outdated
+
+
+def test_essence_takes_unnamed_boundaries_as_fixed():
+    assert essence(Case(roles={"a": "fixed", "b": "moving"})) == essence(
+        Case(roles={"b": "moving"})
+    )
+
+
+def test_what_is_missing_is_told_in_the_order_of_work(session):
+    def first(state):
+        found = changes.is_missing(state)
+        return (found[0].text, found[0].place) if found else None
+
+    assert first(Session()) == ("Open a mesh first.", "open")
+    assert first(session) == ("No boundary moves: give one the role “moving”.", "boundaries")
+    session = changes.set_role(session, ("left",), "moving")
+    assert first(session) == ("“left” has no motion: add one.", "motion")
+    wrong = changes.add_motion(session, FromFile(Path("/no/such/file.txt")))
+    assert "does not exist" in first(wrong)[0]
+    session = changes.add_motion(session, Rotate("left", 3.0))
+    assert first(session) is None
+    session = changes.set_role(session, ("bottom", "top"), "periodic")
+    session = changes.set_case(session, periodic="moving")
+    assert first(session)[1] == "method"
+    assert first(changes.set_case(session, sliding="ps")) is None
+
+
+def test_what_the_case_finds_wrong_is_passed_on(session):
+    session = changes.set_role(session, ("left",), "moving")
+    session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
+    (missing,) = changes.is_missing(changes.set_case(session, steps=0))
+    assert "0" in missing.text
+
+
+@pytest.mark.parametrize(
+    ("what", "name"), [("size", "size"), ("skew", "skew"), ("size_skew", "values")]
+)
+def test_frame_values_are_those_asked_for(session, what, name):
+    frame = moved(session)
+    assert frame.values(what) is getattr(frame.quality, name)
+
+
+def test_store_tells_everybody_of_one_change_before_the_next():
+    store, heard = Store(), []
+    one, two = replace(store.session, path=Path("1")), replace(store.session, path=Path("2"))
+
+    def first(old, new):
+        heard.append(("first", new.path))
+        if new is one:
+            store.put(two)
+
+    store.listen(first)
+    store.listen(lambda old, new: heard.append(("second", new.path)))
+    store.put(one)
+    p1, p2 = Path("1"), Path("2")
+    assert heard == [("first", p1), ("second", p1), ("first", p2), ("second", p2)]
+    assert store.session is two
+
+
+def test_store_works_again_after_a_listener_failed():
+    store, heard = Store(), []
+
+    def bad(old, new):
+        if not heard:
+            raise ValueError("once")
+
+    store.listen(bad)
+    with pytest.raises(ValueError, match="once"):
+        store.put(replace(store.session, path=Path("1")))
+    store.listen(lambda old, new: heard.append(new))
+    heard.append(None)
+    store.put(replace(store.session, path=Path("2")))
+    assert heard[-1].path == Path("2")
+
+
+def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
+    old = replace(session.view, edges=False, hidden=frozenset({"gone"}), selected=("gone",))
+    new = changes.fresh_view(session, old)
+    assert not new.view.edges
+    assert new.view.hidden == frozenset()
+    assert new.view.selected == ()
+    assert np.array_equal(new.mesh.points, session.mesh.points)
