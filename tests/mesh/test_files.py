@@ -238,7 +238,7 @@ LINES = ("line", np.array([[0, 1], [1, 2], [2, 3], [3, 0]]))
 
 
 def test_numbers_under_any_name_are_groups(tmp_path):
-    data = {"ids": [[7], [1, 2, 3, 4]], "Patch": [[0], [5, 5, 0, 5]], "x": [[0.5], [1.0] * 4]}
+    data = {"x": [[0.5], [1.0] * 4], "ids": [[7], [1, 2, 3, 4]], "Patch": [[0], [5, 5, 0, 5]]}
     mesh = read(foreign(tmp_path / "a.vtu", [QUAD, LINES], cell_data=data))
     assert sizes(mesh) == {"Patch_0": 1, "Patch_5": 3}
 
@@ -289,6 +289,11 @@ def test_rough_surface_is_not_cut_to_pieces(tmp_path):
     assert len(read(tmp_path / "few.vtu").markers) == 40
     write(tmp_path / "many.vtu", with_teeth(box(30, 30)))
     assert sizes(read(tmp_path / "many.vtu")) == {"boundary": 120}
+
+
+def test_cells_that_lie_on_each_other_have_no_boundary(tmp_path):
+    path = foreign(tmp_path / "a.vtu", [("quad", np.array([[0, 1, 2, 3], [0, 1, 2, 3]]))])
+    assert read(path).markers == ()
 
 
 @pytest.mark.parametrize("text", [SQUARE, SOLID])

@@ -155,6 +155,13 @@ def test_other_cells_and_points_are_written_anew(tmp_path):
     assert_same(read(tmp_path / "out.su2"), changed)
 
 
+def test_other_cells_on_the_same_points_are_written_anew(tmp_path):
+    mesh = read(save(tmp_path, SQUARE))
+    changed = replace(mesh, cells=Cells.from_blocks([(9, [[0, 1, 4, 3], [1, 2, 5, 4]])]))
+    write(tmp_path / "out.su2", changed)
+    assert_same(read(tmp_path / "out.su2"), changed)
+
+
 def test_equal_cells_and_markers_are_no_change(tmp_path):
     path = save(tmp_path, MESSY)
     mesh = read(path)
