@@ -215,21 +215,21 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         act.setToolTip(ROLE_MEANING[role])
         act.setCheckable(True)
         act.setChecked(roles == {role})
-        act.triggered.connect(partial(_later, store, changes.set_role, names, role))
+        act.triggered.connect(_later(store, changes.set_role, names, role))
         menu.addAction(act)
     menu.addSeparator()
     if any(name in store.session.guesses for name in names):
         keep = menu.addAction(icon("check"), "Keep the guess")
-        keep.triggered.connect(partial(_later, store, changes.confirm, names))
+        keep.triggered.connect(_later(store, changes.confirm, names))
     for text, function, values in (
         ("Hide", changes.show, (names, False)),
         ("Show only this" if len(names) == 1 else "Show only these", changes.isolate, (names,)),
         ("Show all", changes.show, (store.session.mesh.marker_names,)),
     ):
-        menu.addAction(text).triggered.connect(partial(_later, store, function, *values))
+        menu.addAction(text).triggered.connect(_later(store, function, *values))
     return menu
 
 
-def _later(store: Store, function, *values) -> None:
-    # The last argument is Qt's "checked", which none of the functions wants.
-    store.change(function, *values[:-1])
+def _later(store: Store, function, *values):
+    """Return a slot that makes this change, whatever Qt tells it."""
+    return lambda *_: store.change(function, *values)

@@ -1,0 +1,163 @@
+import os
+import shutil
+
+import pytest
+
+if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
+    collect_ignore_glob = ["test_*.py"]
+else:
+    from qtpy.QtCore import QSettings, Qt
+    from qtpy.QtTest import QTest
+
+    from slideviz.case.samples import write_sample
+    from slideviz.gui import dialogs
+    from slideviz.gui.window import MainWindow
+    from slideviz.view.pick import to_display
+
+
+@pytest.fixture(autouse=True)
+def no_questions(monkeypatch):
+    """A question nobody expects fails the test instead of waiting for ever."""
+
+    def unexpected(*values):
+        raise AssertionError(f"unexpected question: {values[1:]}")
+
+    for name in ("ask_open", "ask_save", "ask_unsaved", "ask_overwrite_input"):
+        monkeypatch.setattr(dialogs, name, unexpected)
+
+
+@pytest.fixture
+def answers(monkeypatch):
+    """Answer a question: ``answers("ask_save", path)``."""
+
+    def answer(name, value):
+        asked = []
+
+        def reply(*values):
+            asked.append(values[1:])
+            return value
+
+        monkeypatch.setattr(dialogs, name, reply)
+        return asked
+
+    return answer
+
+
+@pytest.fixture
+def settings(tmp_path):
+    return QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+
+
+@pytest.fixture
+def window(qtbot, settings, monkeypatch):
+    made = MainWindow(settings, multi_samples=0)
+
+    def close(window):
+        # Whatever a test leaves unsaved is of no interest.
+        monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+        window.close()
+
+    qtbot.addWidget(made, before_close_func=close)
+    with qtbot.waitExposed(made):
+        made.show()
+    return made
+
+
+@pytest.fixture(scope="session")
+def sample_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("samples")
+    write_sample("passage", folder / "passage", size=12)
+    write_sample("hexahedron", folder / "hexahedron", size=6)
+    return folder
+
+
+@pytest.fixture
+def passage_file(sample_folder, tmp_path):
+    """A mesh of its own for each test, in a folder that may be written to."""
+    return shutil.copy(sample_folder / "passage" / "mesh.su2", tmp_path / "passage.su2")
+
+
+class Driver:
+    """Does with a window what a user does."""
+
+    def __init__(self, window, qtbot):
+        self.window, self.qtbot = window, qtbot
+
+    @property
+    def session(self):
+        return self.window.store.session
+
+    def settle(self, timeout=60_000):
+        """Wait until no job runs."""
+        self.qtbot.waitUntil(lambda: not self.window.runner.busy, timeout=timeout)
+
+    def open(self, path):
+        self.window.files.open_path(path)
+        self.settle()
+        return self.session
+
+    def click_view(self, point, button=None, modifier=None):
+        """Click where a point of the mesh is seen."""
+        view = self.window.view
+        view.snapshot()
+        at = list(point) + [0.0] * (3 - len(point))
+        x, y = to_display(view, [at])[0] / view.devicePixelRatioF()
+        where = view.rect().topLeft()
+        where.setX(round(x))
+        where.setY(round(view.height() - 1 - y))
+        QTest.mouseClick(
+            view,
+            button or Qt.MouseButton.LeftButton,
+            modifier or Qt.KeyboardModifier.NoModifier,
+            where,
+        )
+
+    def click(self, widget):
+        QTest.mouseClick(widget, Qt.MouseButton.LeftButton)
+
+    def row(self, name):
+        return self.session.mesh.marker_names.index(name)
+
+    def click_row(self, name, modifier=None):
+        table = self.window.boundaries.table
+        where = table.visualItemRect(table.item(self.row(name), 1)).center()
+        QTest.mouseClick(
+            table.viewport(),
+            Qt.MouseButton.LeftButton,
+            modifier or Qt.KeyboardModifier.NoModifier,
+            where,
+        )
+
+    def choose(self, choice, value):
+        """Choose from a drop-down as with the keyboard: open it, go there, Enter."""
+        index = choice.findData(value)
+        assert index >= 0, value
+        choice.showPopup()
+        self.qtbot.waitUntil(lambda: choice.view().isVisible())
+        choice.view().setCurrentIndex(choice.model().index(index, choice.modelColumn()))
+        QTest.keyClick(choice.view(), Qt.Key.Key_Return)
+
+    def role(self, name, role):
+        self.choose(self.window.boundaries.table.cellWidget(self.row(name), 2), role)
+
+    def type(self, field, text):
+        """Replace the text of a field by typing."""
+        QTest.mouseDClick(field, Qt.MouseButton.LeftButton)
+        field.selectAll()
+        QTest.keyClicks(field, text)
+        QTest.keyClick(field, Qt.Key.Key_Tab)
+
+    def add_motion(self, kind):
+        """Choose from the menu of the button “Add motion”, with the keyboard."""
+        panel = self.window.motions
+        action = panel.add_actions[kind]
+        menu = panel.add.menu()
+        menu.popup(panel.add.mapToGlobal(panel.add.rect().bottomLeft()))
+        self.qtbot.waitUntil(menu.isVisible)
+        menu.setActiveAction(action)
+        QTest.keyClick(menu, Qt.Key.Key_Return)
+
+
+@pytest.fixture
+def driver(window, qtbot):
+    return Driver(window, qtbot)

@@ -1,0 +1,666 @@
+"""The window, driven by mouse and keyboard under a virtual screen."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from qtpy.QtGui import QDragEnterEvent, QDropEvent
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QMenu
+
+from slideviz import Case, read
+from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.view import changes, jobs
+
+
+@pytest.fixture
+def opened(driver, passage_file):
+    driver.open(passage_file)
+    return driver
+
+
+@pytest.fixture
+def ready(driver, sample_folder):
+    """The case of the passage, which can run."""
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    return driver
+
+
+def colours(window):
+    picture = window.view.snapshot().astype(int)
+    return {tuple(rgb) for rgb in picture[::3, ::3].reshape(-1, 3)}
+
+
+# Opening ----------------------------------------------------------------------------------
+
+
+def test_it_starts_with_a_page_that_offers_to_open_and_the_samples(window):
+    assert window.start.isVisible()
+    assert set(window.start.sample_buttons) == set(window.files.samples)
+    assert not window.run_panel.run.isEnabled()
+    assert "Open a mesh" in window.run_panel.text.text()
+
+
+def test_a_mesh_opens_with_rows_roles_and_guesses(opened):
+    window, session = opened.window, opened.session
+    table = window.boundaries.table
+    assert [table.item(row, 0).text() for row in range(5)] == list(session.mesh.marker_names)
+    choice = table.cellWidget(opened.row("airfoil"), 2)
+    assert choice.currentText() == "moving ?"
+    assert choice.font().italic()
+    assert "guess" in choice.toolTip()
+    assert not window.start.isVisible()
+    assert window.windowTitle() == "passage.su2 – slideviz"
+    assert len(colours(window)) > 20
+
+
+def test_keep_all_confirms_the_guesses(opened):
+    opened.click(opened.window.boundaries.keep)
+    choice = opened.window.boundaries.table.cellWidget(0, 2)
+    assert not opened.session.guesses
+    assert "?" not in choice.currentText()
+    assert not choice.font().italic()
+    assert not opened.window.boundaries.keep.isVisible()
+
+
+def test_open_from_the_menu(driver, answers, passage_file):
+    answers("ask_open", Path(passage_file))
+    driver.window.actions_.by_name["open"].trigger()
+    driver.settle()
+    assert driver.session.path == Path(passage_file)
+
+
+def test_a_case_opens_with_mesh_roles_motions_and_settings(ready):
+    case = ready.session.case
+    assert case.motions
+    assert ready.window.motions.list.count() == len(case.motions)
+    assert ready.window.method.sliding.currentData() == case.sliding
+    assert ready.window.method.steps.value() == case.steps
+    assert not ready.session.guesses
+    assert ready.window.run_panel.run.isEnabled()
+
+
+def test_files_are_remembered_and_the_newest_is_first(opened, sample_folder):
+    second = sample_folder / "hexahedron" / "mesh.su2"
+    opened.open(second)
+    recent = opened.window.files.recent()
+    assert recent[0] == second
+    assert len(recent) == 2
+    opened.open(opened.window.files.recent()[1])
+    assert len(opened.window.files.recent()) == 2
+
+
+def test_dropping_a_file_opens_it(driver, passage_file):
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(passage_file))])
+    buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    action = Qt.DropAction.CopyAction
+    enter = QDragEnterEvent(QPoint(500, 300), action, data, buttons, keys)
+    QApplication.sendEvent(driver.window, enter)
+    assert enter.isAccepted()
+    QApplication.sendEvent(
+        driver.window, QDropEvent(QPointF(500, 300), action, data, buttons, keys)
+    )
+    driver.qtbot.waitUntil(lambda: driver.session.mesh is not None, timeout=20_000)
+    assert driver.session.path == Path(passage_file)
+    assert not driver.window.view.acceptDrops(), "the view would read the file in its own way"
+
+
+def test_a_broken_file_is_told_and_the_window_goes_on(opened, tmp_path):
+    before = opened.session.mesh
+    bad = tmp_path / "bad.su2"
+    bad.write_text("NDIME= 2\nNELEM= 1\n5 0 1 oops\n")
+    opened.open(bad)
+    banner = opened.window.banner
+    assert banner.isVisible()
+    assert "bad.su2:3" in banner.text.text()
+    assert opened.session.mesh is before
+    opened.open(opened.session.path)
+    assert not banner.isVisible()
+
+
+def test_an_unexpected_error_has_details_to_copy(opened, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("strange")
+
+    monkeypatch.setattr(jobs, "open_file", broken)
+    opened.open(opened.session.path)
+    banner = opened.window.banner
+    assert "ZeroDivisionError" in banner.text.text()
+    opened.click(banner.details)
+    assert "def broken" not in banner.text.text()
+    opened.click(banner.dialog.copy)
+    assert "Traceback" in QApplication.clipboard().text()
+    assert "strange" in QApplication.clipboard().text()
+    banner.dialog.close()
+
+
+def test_zones_can_be_chosen(driver, tmp_path, passage_file):
+    one = Path(passage_file).read_text()
+    both = tmp_path / "two.su2"
+    two = one.replace("airfoil", "vane")
+    both.write_text(f"NZONE= 2\nIZONE= 1\n{one}\nIZONE= 2\n{two}\n")
+    driver.open(both)
+    bar = driver.window.actions_
+    assert bar.zone_shown.isVisible()
+    assert "airfoil" in driver.session.mesh.marker_names
+    driver.choose(bar.zone, 2)
+    driver.settle()
+    assert "vane" in driver.session.mesh.marker_names
+    driver.open(passage_file)
+    assert not bar.zone_shown.isVisible()
+
+
+# Boundaries -------------------------------------------------------------------------------
+
+
+def test_a_role_is_chosen_in_the_table_and_shown_in_the_view(opened):
+    opened.role("inflow", "internal")
+    assert opened.session.role("inflow") == "internal"
+    assert (0xCC, 0x79, 0xA7) in colours(opened.window)
+
+
+def test_a_role_goes_to_all_selected_rows(opened):
+    opened.click_row("inflow")
+    opened.click_row("outflow", Qt.KeyboardModifier.ControlModifier)
+    assert set(opened.session.view.selected) == {"inflow", "outflow"}
+    opened.role("outflow", "fixed")
+    assert opened.session.role("inflow") == opened.session.role("outflow") == "fixed"
+    assert opened.session.role("airfoil") == "moving"
+
+
+def test_a_click_in_the_view_selects_the_row_and_a_drag_does_not(opened):
+    window, mesh = opened.window, opened.session.mesh
+    nodes = mesh.marker("outflow").cells.connectivity.reshape(-1, 2)
+    opened.click_view(mesh.points[nodes[len(nodes) // 2]].mean(axis=0))
+    assert opened.session.view.selected == ("outflow",)
+    assert window.boundaries.selected() == ("outflow",)
+    airfoil = mesh.points[mesh.marker("airfoil").nodes[0]]
+    opened.click_view(airfoil, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert set(window.boundaries.selected()) == {"outflow", "airfoil"}
+    view = window.view
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(9, 9))
+    QTest.mouseMove(view, QPoint(90, 60))
+    QTest.mouseRelease(
+        view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(90, 60)
+    )
+    assert set(window.boundaries.selected()) == {"outflow", "airfoil"}
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, QPoint(4, 4))
+    assert window.boundaries.selected() == ()
+
+
+def test_a_click_in_a_3d_view_selects_the_face_in_front(driver, sample_folder):
+    driver.open(sample_folder / "hexahedron" / "mesh.su2")
+    driver.window.look_from("+x")
+    driver.click_view((1.0, 0.5, 0.5))
+    assert driver.window.boundaries.selected() == ("RIGHT",)
+
+
+def test_the_right_button_assigns_a_role_and_isolates(opened):
+    window, mesh = opened.window, opened.session.mesh
+    nodes = mesh.marker("inflow").cells.connectivity.reshape(-1, 2)
+    middle = mesh.points[nodes[len(nodes) // 2]].mean(axis=0)
+
+    def menu():
+        return next(m for m in window.findChildren(QMenu) if m.isVisible())
+
+    def trigger(text):
+        opened.click_view(middle, button=Qt.MouseButton.RightButton)
+        opened.qtbot.waitUntil(lambda: any(m.isVisible() for m in window.findChildren(QMenu)))
+        found = menu()
+        found.setActiveAction(next(act for act in found.actions() if act.text() == text))
+        QTest.keyClick(found, Qt.Key.Key_Return)
+
+    trigger("Fixed")
+    assert opened.session.role("inflow") == "fixed"
+    assert opened.session.view.selected == ("inflow",)
+    trigger("Show only this")
+    assert opened.session.view.hidden == set(mesh.marker_names) - {"inflow"}
+    window.actions_.by_name["show_all"].trigger()
+    assert not opened.session.view.hidden
+    trigger("Hide")
+    assert opened.session.view.hidden == {"inflow"}
+
+
+def test_the_check_mark_hides_a_boundary(opened):
+    item = opened.window.boundaries.table.item(opened.row("airfoil"), 0)
+    item.setCheckState(Qt.CheckState.Unchecked)
+    assert opened.session.view.hidden == {"airfoil"}
+    assert not opened.window.scene.drawn["airfoil"].actor.visibility
+
+
+# Motions ----------------------------------------------------------------------------------
+
+
+def ghost(driver):
+    return driver.window.scene.motion_ghosts["airfoil"]
+
+
+def test_a_translation_is_typed_and_its_ghost_moves_at_once(opened):
+    opened.add_motion(Translate)
+    editor = opened.window.motions.editor
+    opened.type(editor.vector.fields[0], "0.1")
+    opened.type(editor.vector.fields[1], "-2e-2")
+    assert opened.session.case.motions == (Translate("airfoil", (0.1, -0.02)),)
+    nodes = opened.session.mesh.marker("airfoil").nodes
+    assert np.allclose(ghost(opened), opened.session.mesh.points[nodes] + [0.1, -0.02])
+
+
+def test_a_rotation_about_the_centroid_and_about_a_point(opened):
+    opened.add_motion(Rotate)
+    editor = opened.window.motions.editor
+    opened.type(editor.angle, "90")
+    assert opened.session.case.motions[0] == Rotate("airfoil", 90.0)
+    nodes = opened.session.mesh.marker("airfoil").nodes
+    start = opened.session.mesh.points[nodes]
+    assert np.allclose(ghost(opened).mean(axis=0), start.mean(axis=0))
+    opened.choose(editor.about, "point")
+    assert np.allclose(opened.session.case.motions[0].point, start.mean(axis=0))
+    opened.type(editor.point.fields[0], "0")
+    opened.type(editor.point.fields[1], "0")
+    assert opened.session.case.motions[0].point == (0.0, 0.0)
+    assert np.allclose(ghost(opened), np.stack([-start[:, 1], start[:, 0]], 1))
+    assert not editor.axis.isVisible(), "a 2D mesh has but one axis"
+
+
+def test_a_3d_rotation_has_an_axis(driver, sample_folder):
+    driver.open(sample_folder / "hexahedron" / "mesh.su2")
+    driver.role("BLOCK", "moving")
+    driver.add_motion(Rotate)
+    editor = driver.window.motions.editor
+    assert editor.axis.isVisible()
+    driver.type(editor.angle, "10")
+    driver.type(editor.axis.fields[0], "1")
+    driver.type(editor.axis.fields[2], "0")
+    assert driver.session.case.motions == (Rotate("BLOCK", 10.0, "centroid", (1.0, 0.0, 0.0)),)
+    driver.type(editor.axis.fields[0], "0")
+    assert driver.session.case.motions[0].axis == (1.0, 0.0, 0.0), "an axis has a direction"
+
+
+def test_a_scaling(opened):
+    opened.add_motion(Scale)
+    editor = opened.window.motions.editor
+    opened.type(editor.factors.fields[0], "1.5")
+    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
+    field = editor.factors.fields[1]
+    field.selectAll()
+    QTest.keyClicks(field, "0")
+    assert field.property("bad")
+    assert "flatten" in field.toolTip()
+    assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
+
+
+def test_a_displacement_file(opened, tmp_path):
+    node = int(opened.session.mesh.marker("airfoil").nodes[0])
+    file = tmp_path / "d.txt"
+    file.write_text(f"{node} 0.5 0.25\n")
+    opened.add_motion(FromFile)
+    opened.type(opened.window.motions.editor.path, str(file))
+    assert opened.session.case.motions == (FromFile(file, "airfoil"),)
+    assert np.allclose(ghost(opened)[0] - opened.session.mesh.points[node], [0.5, 0.25])
+    opened.type(opened.window.motions.editor.path, str(file) + "x")
+    assert "does not exist" in opened.window.run_panel.text.text()
+
+
+def test_motions_are_reordered_changed_and_removed(opened):
+    panel = opened.window.motions
+    opened.add_motion(Translate)
+    opened.add_motion(Rotate)
+    assert panel.list.currentRow() == 1
+    opened.click(panel.up)
+    assert [type(motion) for motion in opened.session.case.motions] == [Rotate, Translate]
+    assert panel.list.currentRow() == 0
+    opened.choose(panel.editor.kind, Scale)
+    assert [type(motion) for motion in opened.session.case.motions] == [Scale, Translate]
+    opened.click(panel.remove)
+    assert [type(motion) for motion in opened.session.case.motions] == [Translate]
+    opened.click(panel.remove)
+    assert not opened.session.case.motions
+    assert not panel.editor.isVisible()
+
+
+def test_what_is_typed_is_checked_at_once(opened):
+    opened.add_motion(Translate)
+    field = opened.window.motions.editor.vector.fields[0]
+    field.selectAll()
+    QTest.keyClicks(field, "1.5x")
+    assert field.property("bad")
+    assert "not a number" in field.toolTip()
+    assert opened.session.case.motions[0].vector == (1.5, 0.0), "the last valid value counts"
+    QTest.keyClick(field, Qt.Key.Key_Tab)
+    assert field.text() == "1.5"
+    assert not field.property("bad")
+
+
+def test_without_a_moving_boundary_motions_say_why_not(opened):
+    opened.role("airfoil", "fixed")
+    panel = opened.window.motions
+    assert not panel.add.isEnabled()
+    assert "moving" in panel.hint.text()
+    assert "moving" in panel.add.toolTip()
+
+
+# Method -----------------------------------------------------------------------------------
+
+
+def test_settings_reach_the_case(opened):
+    method = opened.window.method
+    opened.choose(method.sliding, "ds")
+    opened.choose(method.periodic, "moving")
+    opened.choose(method.periodic_type, "translational")
+    opened.choose(method.quality_metric, "rbf-slide")
+    method.steps.selectAll()
+    QTest.keyClicks(method.steps, "12")
+    opened.window.docks["method"].raise_()
+    opened.type(method.influence_factor, "3.5")
+    opened.type(method.feature_angle_deg, "35")
+    case = opened.session.case
+    assert (case.sliding, case.periodic, case.periodic_type) == ("ds", "moving", "translational")
+    assert (case.steps, case.influence_factor, case.feature_angle_deg) == (12, 3.5, 35.0)
+    assert case.quality_metric == "rbf-slide"
+    assert "λ =" in method.found.text()
+
+
+def test_what_is_not_available_says_why(opened):
+    method = opened.window.method
+    for name in ("periodic_1", "periodic_2", "inflow", "outflow"):
+        opened.role(name, "fixed")
+    assert not method.periodic.isEnabled()
+    assert "no boundary has the role" in method.periodic.toolTip()
+    assert not method.sliding.isEnabled()
+    assert "Periodicity: no boundary" in method.reason.text()
+    opened.role("periodic_1", "periodic")
+    assert method.periodic.isEnabled()
+    assert "Whether" not in method.periodic.toolTip()
+
+
+def test_impossible_numbers_are_marked_and_not_taken(opened):
+    field = opened.window.method.influence_factor
+    opened.window.docks["method"].raise_()
+    field.selectAll()
+    QTest.keyClicks(field, "-1")
+    assert field.property("bad")
+    assert "greater than 0" in field.toolTip()
+    assert opened.session.case.influence_factor == 2.5
+
+
+# Running ----------------------------------------------------------------------------------
+
+
+def test_what_is_missing_leads_to_its_panel(opened):
+    panel = opened.window.run_panel
+    assert "airfoil” has no motion" in panel.text.text()
+    assert not panel.run.isEnabled()
+    opened.window.docks["method"].raise_()
+    opened.qtbot.waitUntil(lambda: not opened.window.motions.isVisible())
+    panel.text.linkActivated.emit("motion")
+    opened.qtbot.waitUntil(opened.window.motions.isVisible)
+
+
+def run(driver, steps=3):
+    driver.window.store.change(changes.set_case, steps=steps)
+    driver.click(driver.window.run_panel.run)
+    driver.settle()
+
+
+def test_a_run_shows_its_steps_and_the_quality(ready):
+    run(ready)
+    session, window = ready.session, ready.window
+    assert len(session.frames) == 4
+    assert session.view.frame == 3
+    assert session.view.colour_by == "size_skew"
+    assert window.player.step_text.text() == "Step 3 of 3"
+    quality = session.deformed.quality
+    text = window.player.result.text()
+    assert f"{quality.min:.4f}" in text
+    assert f"{quality.mean:.4f}" in text
+    assert "inverted <b>0</b>" in text
+    assert window.windowTitle().startswith("*")
+    assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
+
+
+def test_the_slider_the_buttons_and_the_keys_show_steps(ready):
+    run(ready)
+    player, window = ready.window.player, ready.window
+    shown = window.scene.drawn["airfoil"].shape
+    nodes = ready.session.mesh.marker("airfoil").nodes
+    for step, go in (
+        (1, lambda: player.slider.setValue(1)),
+        (2, lambda: ready.click(player.buttons["next"])),
+        (0, lambda: ready.click(player.buttons["first"])),
+        (3, lambda: ready.click(player.buttons["last"])),
+        (2, lambda: ready.click(player.buttons["previous"])),
+        (0, lambda: QTest.keyClick(window, Qt.Key.Key_Home)),
+    ):
+        go()
+        assert ready.session.view.frame == step
+        wanted = ready.session.frames[step].mesh.points[nodes]
+        assert np.allclose(np.asarray(shown.points)[:, :2], wanted)
+        assert player.slider.value() == step
+
+
+def test_playing_ends_at_the_last_step(ready):
+    run(ready)
+    player = ready.window.player
+    player._timer.setInterval(5)
+    ready.click(player.buttons["play"])
+    assert ready.session.view.frame == 0
+    ready.qtbot.waitUntil(lambda: ready.session.view.frame == 3)
+    ready.qtbot.waitUntil(lambda: not player._timer.isActive())
+
+
+def test_cancel_keeps_the_steps_that_are_done(ready):
+    window = ready.window
+    window.store.change(changes.set_case, steps=2000)
+    ready.click(window.run_panel.run)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 3, timeout=60_000)
+    assert window.run_panel.cancel.isVisible()
+    assert not window.run_panel.run.isVisible()
+    ready.click(window.run_panel.cancel)
+    ready.settle(5_000)
+    count = len(ready.session.frames)
+    assert 3 < count < 2000
+    assert ready.session.deformed.step.index == count - 1
+    assert window.run_panel.run.isVisible()
+    assert "kept" in window.statusBar().currentMessage()
+    assert ready.session.unsaved_mesh
+
+
+def test_a_run_that_fails_says_why_and_leaves_the_window_usable(ready, monkeypatch):
+    from slideviz.errors import DeformError
+
+    def broken(*_):
+        raise DeformError("the system is singular; use another radius")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(jobs, "compute", broken)
+        ready.click(ready.window.run_panel.run)
+        ready.settle()
+    assert "singular" in ready.window.banner.text.text()
+    assert ready.window.run_panel.run.isEnabled()
+    run(ready, 1)
+    assert len(ready.session.frames) == 2
+
+
+def test_changed_settings_are_told(ready):
+    run(ready, 1)
+    assert ready.window.run_panel.text.text() == "Done."
+    ready.window.store.change(changes.set_case, steps=4)
+    assert "changed" in ready.window.run_panel.text.text()
+
+
+def test_opening_while_running_cancels_the_run(ready, passage_file, answers):
+    answers("ask_unsaved", "discard")
+    ready.window.store.change(changes.set_case, steps=2000)
+    ready.click(ready.window.run_panel.run)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1, timeout=60_000)
+    ready.window.files.open_path(Path(passage_file))
+    ready.qtbot.waitUntil(lambda: ready.session.path == Path(passage_file), timeout=20_000)
+    ready.settle()
+    assert len(ready.session.frames) == 1
+
+
+def test_closing_while_running_ends_the_run(ready, answers):
+    asked = answers("ask_unsaved", "discard")
+    ready.window.store.change(changes.set_case, steps=2000)
+    ready.click(ready.window.run_panel.run)
+    ready.qtbot.waitUntil(lambda: len(ready.session.frames) > 1, timeout=60_000)
+    assert ready.window.close()
+    assert len(asked) == 1
+    assert not ready.window.isVisible()
+    assert ready.window.runner._pool._shutdown
+
+
+# Saving -----------------------------------------------------------------------------------
+
+
+def test_the_mesh_is_saved(ready, answers, tmp_path):
+    run(ready)
+    asked = answers("ask_save", tmp_path / "out.su2")
+    ready.window.actions_.by_name["save_mesh"].trigger()
+    ready.settle()
+    assert asked[0][1].name == "mesh_deformed.su2"
+    saved = read(tmp_path / "out.su2")
+    assert np.array_equal(saved.points, ready.session.deformed.mesh.points)
+    assert not ready.session.unsaved_mesh
+
+
+def test_the_step_that_is_shown_is_the_one_saved(ready, answers, tmp_path):
+    run(ready)
+    ready.window.player.go(1)
+    asked = answers("ask_save", tmp_path / "out.vtu")
+    ready.window.actions_.by_name["save_mesh"].trigger()
+    ready.settle()
+    assert asked[0][1].name == "mesh_step1.su2"
+    assert (tmp_path / "out.vtu").stat().st_size > 1000
+    assert ready.session.unsaved_mesh, "the last step is not on disk"
+
+
+@pytest.mark.parametrize("sure", [False, True])
+def test_the_input_is_replaced_only_when_confirmed(opened, answers, passage_file, sure):
+    before = Path(passage_file).read_bytes()
+    opened.add_motion(Translate)
+    opened.type(opened.window.motions.editor.vector.fields[0], "0.01")
+    run(opened, 1)
+    answers("ask_save", Path(passage_file))
+    asked = answers("ask_overwrite_input", sure)
+    opened.window.actions_.by_name["save_mesh"].trigger()
+    opened.settle()
+    assert len(asked) == 1
+    assert (Path(passage_file).read_bytes() != before) == sure
+
+
+def test_a_case_is_saved_and_means_the_same(opened, answers, tmp_path):
+    opened.add_motion(Rotate)
+    opened.type(opened.window.motions.editor.angle, "4")
+    opened.choose(opened.window.method.sliding, "ps")
+    assert opened.window.windowTitle().startswith("*")
+    answers("ask_save", tmp_path / "a.cfg")
+    opened.window.actions_.by_name["save_case"].trigger()
+    assert opened.window.windowTitle() == "a.cfg – slideviz"
+    case = Case.read(tmp_path / "a.cfg")
+    assert case.motions == (Rotate("airfoil", 4.0),)
+    assert case.sliding == "ps"
+    assert case.periodic == "periodic"
+    opened.open(tmp_path / "a.cfg")
+    assert opened.session.case.motions == case.motions
+    assert not opened.session.unsaved_case
+
+
+def test_a_case_that_cannot_be_written_is_told(opened, answers, tmp_path):
+    answers("ask_save", tmp_path / "no" / "a.cfg")
+    opened.window.actions_.by_name["save_case"].trigger()
+    assert "a.cfg" in opened.window.banner.text.text()
+
+
+def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
+    from PIL import Image
+
+    from slideviz.gui import dialogs
+
+    def accept(dialog):
+        dialog.choice.setCurrentText("1280 × 800")
+        dialog.transparent.setChecked(True)
+        return dialog.DialogCode.Accepted
+
+    monkeypatch.setattr(dialogs.PictureDialog, "exec", accept)
+    answers("ask_save", tmp_path / "a.png")
+    opened.window.actions_.by_name["save_picture"].trigger()
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.size == (1280, 800)
+        assert image.mode == "RGBA"
+        assert image.getpixel((1, 1))[3] == 0
+        orange = sum(n for n, c in image.getcolors(2**24) if c[:3] == (0xD5, 0x5E, 0))
+    assert orange > 500
+    before = opened.window.view.snapshot()
+    assert before.std() > 5, "the view still works"
+
+
+@pytest.mark.parametrize("answer", ["cancel", "discard", "save"])
+def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, answer):
+    opened.role("airfoil", "fixed")
+    asked = answers("ask_unsaved", answer)
+    answers("ask_save", tmp_path / "a.cfg")
+    closed = opened.window.close()
+    assert closed == (answer != "cancel")
+    assert "case has changes" in asked[0][0]
+    assert (tmp_path / "a.cfg").exists() == (answer == "save")
+
+
+def test_nothing_is_asked_when_nothing_changed(opened):
+    assert opened.window.close()
+
+
+# View -------------------------------------------------------------------------------------
+
+
+def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar(opened):
+    bar = opened.window.actions_
+    opened.choose(bar.colour, "skew")
+    assert opened.session.view.colour_by == "skew"
+    for name in ("edges", "undeformed", "motion_ghost", "legend"):
+        before = getattr(opened.session.view, name)
+        bar.by_name[name].trigger()
+        assert getattr(opened.session.view, name) is not before
+    assert not bar.by_name["perspective"].isEnabled(), "2D has none"
+
+
+def test_the_wheel_zooms_about_the_mouse_and_f_shows_all_again(opened):
+    window = opened.window
+    scale = window.view.camera.parallel_scale
+    window.view.told.zoomed.emit(QPoint(100, 100), 1.5)
+    assert window.view.camera.parallel_scale == pytest.approx(scale / 1.5)
+    QTest.keyClick(window, Qt.Key.Key_F)
+    assert window.view.camera.parallel_scale == pytest.approx(scale)
+
+
+def test_keys_of_vtk_do_nothing(opened):
+    before = opened.window.view.snapshot()
+    for key in (Qt.Key.Key_W, Qt.Key.Key_S, Qt.Key.Key_R):
+        QTest.keyClick(opened.window.view, key)
+    assert np.array_equal(opened.window.view.snapshot(), before)
+
+
+def test_themes_change_the_view_and_are_remembered(opened, settings):
+    opened.window.set_theme("light")
+    light = opened.window.view.snapshot()[-5, 5].mean()
+    opened.window.actions_.by_name["theme_dark"].trigger()
+    assert opened.window.view.snapshot()[-5, 5].mean() < light - 100
+    assert settings.value("theme") == "dark"
+
+
+def test_all_panels_fit_1280_x_800(ready):
+    window = ready.window
+    window.resize(1280, 800)
+    ready.qtbot.wait(50)
+    assert (window.width(), window.height()) == (1280, 800)
+    for name in ("motion", "method"):
+        window.docks[name].raise_()
+        ready.qtbot.waitUntil(window.docks[name].widget().isVisible)
+        panel = window.docks[name].widget()
+        assert panel.height() >= panel.minimumSizeHint().height()
+        assert panel.width() >= panel.minimumSizeHint().width()
+    bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
+    assert bottom < 800
+    assert window.run_panel.run.isVisible()
