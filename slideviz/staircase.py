@@ -57,6 +57,8 @@ class Step:
     max_error : float
         Largest misfit at nodes of known displacement before they are set exactly, in the mesh's
         length unit.
+    condition : float
+        Estimated condition number of the interpolation system.
     node_counts : Mapping of str to int
         ``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``.
     seconds : Mapping of str to float
@@ -72,6 +74,7 @@ class Step:
     mesh: Mesh
     control_nodes: int
     max_error: float
+    condition: float
     node_counts: Mapping[str, int]
     seconds: Mapping[str, float]
     warnings: tuple[str, ...]
@@ -130,6 +133,7 @@ def deform(
             mesh.with_points(points),
             solution.control_nodes,
             solution.max_error,
+            solution.condition,
             plan.classes.counts(),
             watch.seconds,
             tuple(warnings),

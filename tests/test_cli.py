@@ -221,7 +221,12 @@ def test_a_pipe_that_closes_is_no_error(square):
 
 def test_interrupt_leaves_nothing_half_written(square):
     argv = [sys.executable, "-m", "slideviz", "run", str(square / "square.cfg")]
-    child = subprocess.Popen([*argv, "--set", "STEPS=100000"], stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen(
+        [*argv, "--set", "STEPS=100000"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     time.sleep(4)
     child.send_signal(signal.SIGINT)
     _, err = child.communicate(timeout=60)

@@ -33,6 +33,7 @@ from slideviz.case.key import (
 from slideviz.case.model import PERIODIC_MODES, SLIDING
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, real, whole
+from slideviz.rbf.kernels import KERNELS
 
 _ROWS = (
     setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
@@ -121,6 +122,13 @@ _ROWS = (
         "influence_factor",
         "Support radius of the radial function over the largest extent of the mesh.",
     ),
+    setting(
+        "RBF_KERNEL",
+        METHOD,
+        choice({name: name for name in KERNELS}),
+        "kernel",
+        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
+    ),
     setting("CURVED", METHOD, YES_NO, "curved", "Bring slid nodes back onto curved boundaries."),
     setting(
         "FEATURE_ANGLE",
@@ -204,6 +212,7 @@ _OURS = {
     "PERIODIC_ORIGIN",
     "FEATURE_ANGLE",
     "QUALITY_METRIC",
+    "RBF_KERNEL",
     "SELECTION",
     "MAX_CONTROL_NODES",
     "DATA_RED_RELATIVE",

@@ -124,6 +124,7 @@ class Case:
     curved: bool = False
     steps: int = 1
     influence_factor: float = 2.5
+    kernel: str = "wendland-c2"
     reduction: Reduction | None = None
     quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
     generate_quality: bool = True

@@ -21,7 +21,9 @@ def run(argv: Sequence[str]) -> int:
 
     try:
         arguments = parse(argv)
-        return int(arguments.command(arguments))
+        code = int(arguments.command(arguments))
+        sys.stdout.flush()  # here, where a reader that is gone can still be handled
+        return code
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):

@@ -48,6 +48,7 @@ def run_report(
             "inverted_cells": inverted_cells(quality),
         },
         "control_nodes": [step.control_nodes for step in steps],
+        "condition": [step.condition for step in steps],
         "max_error": max(step.max_error for step in steps),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),

@@ -38,9 +38,9 @@ def _build(low, high, order, bounds):  # type: ignore[no-untyped-def]
                 bounds[k, 3 + axis] = max(bounds[k, 3 + axis], high[order[i], axis])
         if 2 * k + 2 >= nodes:
             continue
-        axis = np.argmax(bounds[k, 3:] - bounds[k, :3])
+        longest = np.argmax(bounds[k, 3:] - bounds[k, :3])
         part = order[a:b].copy()
-        middle = low[part, axis] + high[part, axis]
+        middle = low[part, longest] + high[part, longest]
         order[a:b] = part[np.argsort(middle, kind="mergesort")]
         half = a + (b - a + 1) // 2
         starts[2 * k + 1], stops[2 * k + 1] = a, half

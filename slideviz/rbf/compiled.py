@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from numba import get_num_threads, njit, prange, set_num_threads
 
+from slideviz.rbf.kernels import SHAPE
+
 LOCK = threading.Lock()
 
 SMALL = 2_000_000
@@ -122,29 +124,124 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
         out[0, i], out[1, i], out[2, i] = s0, s1, s2
 
 
+_A2 = SHAPE * SHAPE
+BLOCK = 256
+TARGETS_PER_TASK = 64
+
+
+@njit(**OPTIONS)
+def _apply(kind, q, count):  # type: ignore[no-untyped-def]
+    """Replace xi by phi(xi) in the first ``count`` entries of q, for any kernel but the first."""
+    if kind == 1:
+        for j in range(count):
+            u = max(1.0 - q[j], 0.0)
+            q[j] = u * u
+    elif kind == 2:
+        for j in range(count):
+            u = max(1.0 - q[j], 0.0)
+            q[j] = u**6 * ((35.0 / 3.0 * q[j] + 6.0) * q[j] + 1.0)
+    elif kind == 3:
+        for j in range(count):
+            u = max(1.0 - q[j], 0.0)
+            q[j] = u**8 * (((32.0 * q[j] + 25.0) * q[j] + 8.0) * q[j] + 1.0)
+    elif kind == 4:
+        for j in range(count):
+            q[j] = max(1.0 - q[j], 0.0) ** 5
+    elif kind <= 7:
+        for j in range(count):
+            x = min(max(q[j], 1e-300), 1.0)
+            a, b, log = x * x, x * x * x, np.log(x)
+            if kind == 5:
+                q[j] = 1.0 + 80.0 / 3.0 * a - 40.0 * b + 15.0 * a * a - 8.0 / 3.0 * a * b
+                q[j] += 20.0 * a * log
+            elif kind == 6:
+                q[j] = 1.0 - 30.0 * a - 10.0 * b + 45.0 * a * a - 6.0 * a * b - 60.0 * b * log
+            else:
+                q[j] = 1.0 - 20.0 * a + 80.0 * b - 45.0 * a * a - 16.0 * a * b + 60.0 * a * a * log
+    elif kind == 8:
+        for j in range(count):
+            q[j] = q[j] * q[j] * np.log(max(q[j], 1e-300))
+    elif kind == 9:
+        for j in range(count):
+            q[j] = np.sqrt(_A2 + q[j] * q[j])
+    elif kind == 10:
+        for j in range(count):
+            q[j] = SHAPE / np.sqrt(_A2 + q[j] * q[j])
+    elif kind == 11:
+        for j in range(count):
+            q[j] = 1.0 + q[j] * q[j]
+    elif kind == 12:
+        for j in range(count):
+            q[j] = 1.0 / (1.0 + q[j] * q[j])
+    else:
+        for j in range(count):
+            q[j] = np.exp(-q[j] * q[j])
+
+
+@njit(**OPTIONS)
+def _distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-def]
+    """Write xi of one target x (4,) to ``count`` controls from ``start`` on."""
+    c0, c1 = c[0, start : start + count], c[1, start : start + count]
+    c2, c3 = c[2, start : start + count], c[3, start : start + count]
+    x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
+    if half > 0.0:
+        for j in range(count):
+            d0, d3 = x0 - c0[j], x3 - c3[j]
+            chord = 2.0 * x0 * c0[j] * _half_chord(half * (x1 * c2[j] - x2 * c1[j]))
+            q[j] = np.sqrt(d0 * d0 + chord + d3 * d3) * scale
+    else:
+        for j in range(count):
+            d0, d1, d2, d3 = x0 - c0[j], x1 - c1[j], x2 - c2[j], x3 - c3[j]
+            q[j] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3) * scale
+
+
 @njit(parallel=True, **OPTIONS)
-def fill_matrix(x, c, across, along, half, scale, out):  # type: ignore[no-untyped-def]
+def sum_any(x, c, w, half, scale, kind, out):  # type: ignore[no-untyped-def]
+    """Write s for any kernel and four features.
+
+    Control nodes are walked in blocks that stay in the first-level cache: distances go to a
+    small buffer, the function is applied to the buffer, and it is summed up. So the choice of
+    distance and function costs one branch for each block, not for each pair.
+    """
+    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
+    for task in prange(tasks):
+        q = np.empty(BLOCK)
+        first = task * TARGETS_PER_TASK
+        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
+            s0, s1, s2 = 0.0, 0.0, 0.0
+            for start in range(0, c.shape[1], BLOCK):
+                count = min(BLOCK, c.shape[1] - start)
+                _distances(x[:, i], c, start, count, half, scale, q)
+                _apply(kind, q, count)
+                for j in range(count):
+                    s0 += w[0, start + j] * q[j]
+                    s1 += w[1, start + j] * q[j]
+                    s2 += w[2, start + j] * q[j]
+            out[0, i], out[1, i], out[2, i] = s0, s1, s2
+
+
+@njit(parallel=True, **OPTIONS)
+def fill_matrix(x, c, across, along, half, scale, kind, out):  # type: ignore[no-untyped-def]
     """Write G_ab = phi(|x_a - c_b|) (m_a . n_b) to out (N, n).
 
     ``x`` (4, N) and ``c`` (4, n) have the features of each constraint's node, ``across`` (d, N)
     and ``along`` (d, n) its unit direction; d = 0 leaves the dot product out. ``half`` is 0 for
     Euclidean features.
     """
-    d = across.shape[0]
+    d, n = across.shape[0], c.shape[1]
     for a in prange(x.shape[1]):
-        x0, x1, x2, x3 = x[0, a], x[1, a], x[2, a], x[3, a]
-        for b in range(c.shape[1]):
-            d0, d3 = x0 - c[0, b], x3 - c[3, b]
-            if half > 0.0:
-                turn = _half_chord(half * (x1 * c[2, b] - x2 * c[1, b]))
-                squared = d0 * d0 + d3 * d3 + 2.0 * x0 * c[0, b] * turn
-            else:
-                d1, d2 = x1 - c[1, b], x2 - c[2, b]
-                squared = d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3
-            value = _wendland_c2(squared, scale)
-            if d > 0:
+        row = out[a]
+        _distances(x[:, a], c, 0, n, half, scale, row)
+        if kind == 0:
+            for b in range(n):
+                u = max(1.0 - row[b], 0.0)
+                u = u * u
+                row[b] = u * u * (4.0 * row[b] + 1.0)
+        else:
+            _apply(kind, row, n)
+        if d > 0:
+            for b in range(n):
                 dot = 0.0
                 for k in range(d):
                     dot += across[k, a] * along[k, b]
-                value *= dot
-            out[a, b] = value
+                row[b] *= dot

@@ -9,6 +9,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
+from slideviz.rbf.kernels import KERNELS
 
 CHUNK = 25_000_000
 """Pairs between two calls of ``tick``: some tens of milliseconds."""
@@ -30,10 +31,13 @@ class Basis:
         Support radius R, in the mesh's length unit.
     period : float
         Angle in radians of a rotational periodic distance (Eq. 2.15); 0: Euclidean features.
+    kernel : str
+        A key of ``KERNELS``.
     """
 
     radius: float
     period: float = 0.0
+    kernel: str = "wendland-c2"
 
     @property
     def half(self) -> float:
@@ -61,8 +65,8 @@ def evaluate(
     tick
         Called between chunks with the fraction done; may raise to stop.
     """
-    rotational = basis.period > 0
-    rows = 4 if rotational or len(targets) == 4 else 3
+    rotational, kind = basis.period > 0, KERNELS[basis.kernel].code
+    rows = 4 if rotational or kind or len(targets) == 4 else 3
     x, c = _rows(targets, rows), _rows(controls, rows)
     w = _rows(weights.T, 3)
     total, scale = x.shape[1], 1.0 / basis.radius
@@ -72,7 +76,9 @@ def evaluate(
         part = np.ascontiguousarray(x[:, start : start + size])
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
-            if rotational:
+            if kind:
+                compiled.sum_any(part, c, w, basis.half, scale, kind, result)
+            elif rotational:
                 compiled.sum_rotational(part, c, w, basis.half, scale, result)
             elif rows == 4:
                 compiled.sum_four(part, c, w, scale, result)
@@ -112,6 +118,7 @@ def matrix(
                 along,
                 basis.half,
                 1.0 / basis.radius,
+                KERNELS[basis.kernel].code,
                 out[part],
             )
         tick(part.stop / total)

@@ -6,8 +6,9 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.problem import Cycle, Problem, Rows, Watch
-from slideviz.rbf.solve import factorise
+from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch, linear_terms
+from slideviz.rbf.solve import condition, factorise, saddle_condition, solve_saddle
 
 
 class ExactFit:
@@ -15,20 +16,18 @@ class ExactFit:
 
     Attributes
     ----------
-    controls : (c,) int64
-        The nodes that carry coefficients.
-    weights : (c, d) float64
-        Coefficients alpha of Eq. 2.6, ``sum_a w_a n_a`` over the constraints of each node.
+    found : Interpolant
     dropped : (m,) int64
         Nodes of which the pivot guard left out a constraint.
     """
 
     def __init__(self, problem: Problem, watch: Watch) -> None:
+        d = problem.values.shape[1]
         self._problem, self._watch = problem, watch
         self._rows: Rows | None = None
+        self._lower: FloatArray | None = None
         self.history: tuple[Cycle, ...] = ()
-        self.controls: IntArray = np.empty(0, np.int64)
-        self.weights: FloatArray = np.empty((0, problem.values.shape[1]))
+        self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         self.dropped: IntArray = np.empty(0, np.int64)
 
     def add(self, rows: Rows) -> None:
@@ -42,12 +41,51 @@ class ExactFit:
         self._rows = rows
         problem = self._problem
         with self._watch.phase("solve") as tick:
+            if KERNELS[problem.basis.kernel].polynomial:
+                self.found, deficient = saddle_fit(problem, rows)
+                self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
+                return
             place = problem.features[:, rows.nodes], rows.normals
             factor = factorise(matrix(problem.basis, place, tick=tick), tick)
             weights = factor.solve(rows.right)
+        self._lower = factor.lower
         self.dropped = np.unique(rows.nodes[factor.dropped])
-        self.controls, self.weights = rows.nodes, weights
-        if rows.normals is not None:
-            self.controls, group = np.unique(rows.nodes, return_inverse=True)
-            self.weights = np.zeros((len(self.controls), rows.normals.shape[1]))
-            np.add.at(self.weights, group, weights * rows.normals)
+        self.found = gathered(rows, weights)
+
+    def condition(self) -> float:
+        """Return an estimate of the condition number of the last system."""
+        if self._lower is not None:
+            return condition(self._lower)
+        if self._rows is None:
+            return 1.0
+        place = self._problem.features[:, self._rows.nodes], self._rows.normals
+        return saddle_condition(
+            matrix(self._problem.basis, place), row_terms(self._problem, self._rows)
+        )
+
+
+def gathered(rows: Rows, weights: FloatArray, tail: FloatArray | None = None) -> Interpolant:
+    """Return the interpolant of one weight for each row, (r, m)."""
+    if rows.normals is None:
+        return Interpolant(rows.nodes, weights, tail)
+    nodes, first, group = np.unique(rows.nodes, return_index=True, return_inverse=True)
+    total = np.zeros((len(nodes), rows.normals.shape[1]))
+    np.add.at(total, group, weights * rows.normals)
+    order = np.argsort(first)
+    return Interpolant(nodes[order], total[order], tail)
+
+
+def row_terms(problem: Problem, rows: Rows) -> FloatArray:
+    """Return the polynomial's terms in each row, (r, q), or (r, q d) with normals."""
+    terms = linear_terms(problem.basis, problem.features[:, rows.nodes])
+    if rows.normals is None:
+        return terms
+    return np.einsum("rq,rd->rqd", terms, rows.normals).reshape(len(terms), -1)
+
+
+def saddle_fit(problem: Problem, rows: Rows) -> tuple[Interpolant, bool]:
+    """Return the interpolant with polynomial, and whether the system was singular."""
+    place = problem.features[:, rows.nodes], rows.normals
+    solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.right)
+    d = problem.values.shape[1]
+    return gathered(rows, solved.weights, solved.tail.reshape(-1, d)), solved.rank_deficient

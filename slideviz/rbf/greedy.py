@@ -15,15 +15,18 @@ the control nodes alone: neither numbering nor threads change the selection.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import evaluate, matrix
-from slideviz.rbf.problem import Cycle, Problem, Rows, Watch
-from slideviz.rbf.solve import PIVOT_GUARD
+from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.exact import gathered, saddle_fit
+from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch
+from slideviz.rbf.solve import PIVOT_GUARD, condition
 
 POOL = 1024
 """Largest number of rows in the pool of a block."""
@@ -45,10 +48,9 @@ class GreedyFit:
 
     Attributes
     ----------
-    controls : (c,) int64
-        The chosen nodes, in the order of their choice.
-    weights : (c, d) float64
-        Their coefficients, summed over the levels (Eq. 2.38).
+    found : Interpolant
+        The chosen nodes, in the order of their choice, and their coefficients, summed over the
+        levels (Eq. 2.38).
     dropped : (m,) int64
         Nodes left out by the pivot guard although their error is above the tolerance.
     history : tuple of Cycle
@@ -59,8 +61,12 @@ class GreedyFit:
         self._problem, self._watch, self._settings = problem, watch, problem.reduction
         d = problem.values.shape[1]
         self.history = history
-        self.controls: IntArray = np.empty(0, np.int64)
-        self.weights: FloatArray = np.empty((0, d))
+        self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
+        kernel = KERNELS[problem.basis.kernel]
+        self._tailed, self._singular = kernel.polynomial, False
+        # Only positive definite functions have pivots. For the others the default one tells
+        # which nodes add most, and the weights come from the system with the polynomial.
+        self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
         self.dropped: IntArray = np.empty(0, np.int64)
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._level = history[-1].level if history else 1
@@ -70,7 +76,8 @@ class GreedyFit:
 
     def _new_level(self) -> None:
         """Begin a level: an empty factor for what the levels before left."""
-        self._settled = self.controls, self.weights
+        self._settled = self.found
+        self._now = Interpolant(np.empty(0, np.int64), self.found.weights[:0])
         self._factor = np.empty((0, 0))
         self._half = np.empty((0, self._rows.right.shape[1]))
         self._chosen = np.empty(0, np.int64)
@@ -108,12 +115,12 @@ class GreedyFit:
         """Run cycles until the error is below the tolerance, or nothing is left to choose."""
         settings = self._settings
         target = self._targets()
-        residual = target - self._values(*self._own())
+        residual = target - self._values(self._now)
         errors = self._errors(residual)
         goal = self._level_goal(errors)
         while True:
             self._record(errors)
-            if errors.max(initial=0.0) <= settings.tolerance or self._full():
+            if errors.max(initial=0.0) <= settings.tolerance or self._full() or self._singular:
                 break
             if self._level_done(errors, goal):
                 self._new_level()
@@ -122,7 +129,7 @@ class GreedyFit:
                 residual = target
             if not self._grow(target, residual, errors):
                 break
-            residual = target - self._values(*self._own())
+            residual = target - self._values(self._now)
             errors = self._errors(residual)
             self._watch.report("select", self._fraction(errors))
         self._note_dropped(errors)
@@ -139,7 +146,7 @@ class GreedyFit:
 
     def _full(self) -> bool:
         limit = self._settings.max_nodes
-        return limit is not None and len(self.controls) >= limit
+        return limit is not None and len(self.found.nodes) >= limit
 
     def _fraction(self, errors: FloatArray) -> float:
         """Return how far the error has fallen from its first value, on a logarithmic scale."""
@@ -152,7 +159,7 @@ class GreedyFit:
             len(self.history) + 1,
             self._level,
             float(errors.max(initial=0.0)),
-            len(self.controls),
+            len(self.found.nodes),
             perf_counter() - self._start,
         )
         self.history = (*self.history, cycle)
@@ -163,30 +170,31 @@ class GreedyFit:
         barred = np.zeros(len(errors), bool)
         barred[self._candidate[self._barred]] = True
         barred[self._candidate[self._chosen]] = False
+        barred |= self._singular
         self.dropped = np.unique(self._rows.nodes[self._first[over & barred]])
 
     def _targets(self) -> FloatArray:
         """Return what this level has to meet: the data less the levels before, (r, m)."""
-        if not len(self._settled[0]):
+        if not len(self._settled.nodes):
             return self._rows.right
-        return self._rows.right - self._values(*self._settled)
+        return self._rows.right - self._values(self._settled)
 
-    def _own(self) -> tuple[IntArray, FloatArray]:
-        """Return nodes and weights (c, d) of this level."""
-        if not len(self._chosen):
-            return self._chosen, np.empty((0, self._problem.values.shape[1]))
+    def _own(self, target: FloatArray) -> Interpolant:
+        """Return the interpolant of this level."""
+        chosen, normals = self._chosen, self._rows.normals
+        rows = Rows(
+            self._rows.nodes[chosen], None if normals is None else normals[chosen], target[chosen]
+        )
+        if self._tailed:
+            found, self._singular = saddle_fit(self._problem, rows)
+            return found
         w = solve_triangular(self._factor, self._half, lower=True, trans=1, check_finite=False)
-        nodes, normals = self._rows.nodes[self._chosen], self._rows.normals
-        return nodes, w if normals is None else w * normals[self._chosen]
+        return gathered(rows, w)
 
-    def _values(self, nodes: IntArray, weights: FloatArray) -> FloatArray:
-        """Return the interpolant of these weights in each row, (r, m)."""
-        features, rows = self._problem.features, self._rows
-        at = rows.nodes[self._first]
-        if not len(nodes):
-            return np.zeros_like(rows.right)
-        s = evaluate(self._problem.basis, features[:, at], features[:, nodes], weights)
-        s = s[self._candidate]
+    def _values(self, sum_: Interpolant) -> FloatArray:
+        """Return an interpolant in each row, (r, m)."""
+        rows = self._rows
+        s = sum_.at(self._problem, rows.nodes[self._first])[self._candidate]
         return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
 
     def _errors(self, residual: FloatArray) -> FloatArray:
@@ -203,7 +211,8 @@ class GreedyFit:
             rows = np.flatnonzero(np.isin(self._candidate, pool) & ~self._barred)
             picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
             if picked:
-                self._update_weights()
+                self._now = self._own(target)
+                self.found = self._settled.plus(self._now)
                 return True
             # All of the pool fell to the pivot guard: try the next ones.
             open_[pool] = False
@@ -212,7 +221,7 @@ class GreedyFit:
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
         """Return how many nodes to pick, and the candidates to pick them from."""
-        settings, chosen = self._settings, len(self.controls)
+        settings, chosen = self._settings, len(self.found.nodes)
         eligible = np.count_nonzero(errors > settings.tolerance)
         if not eligible:
             return 0, np.empty(0, np.int64)
@@ -255,7 +264,7 @@ class GreedyFit:
     ) -> bool:
         """Run the Newton greedy on the pool's rows and append what it picks to the factor."""
         features, normals = self._problem.features, self._rows.normals
-        basis, old = self._problem.basis, self._chosen
+        basis, old = self._basis, self._chosen
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
             nodes = self._rows.nodes[index]
@@ -295,16 +304,9 @@ class GreedyFit:
         self._chosen = np.concatenate([self._chosen, rows])
         self._barred[rows] = True
 
-    def _update_weights(self) -> None:
-        """Set controls and weights from this level and the settled ones."""
-        nodes, weights = self._own()
-        nodes = np.concatenate([self._settled[0], nodes])
-        weights = np.concatenate([self._settled[1], weights])
-        unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
-        total = np.zeros((len(unique), weights.shape[1]))
-        np.add.at(total, group, weights)
-        order = np.argsort(first)
-        self.controls, self.weights = unique[order], total[order]
+    def condition(self) -> float:
+        """Return an estimate of the condition number of the last level's system."""
+        return condition(self._factor)
 
 
 def _newton(

@@ -16,12 +16,12 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.correction import correct
-from slideviz.rbf.evaluate import evaluate
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import (
     AGREE,
     Cycle,
+    Interpolant,
     Problem,
     Rows,
     Solution,
@@ -35,13 +35,15 @@ from slideviz.rbf.problem import (
 class Fit(Protocol):
     """An interpolant that grows with the constraints it is given."""
 
-    controls: IntArray
-    weights: FloatArray
+    found: Interpolant
     dropped: IntArray
     history: tuple[Cycle, ...]
 
     def add(self, rows: Rows) -> None:
         """Meet further constraints, exactly or to the tolerance."""
+
+    def condition(self) -> float:
+        """Return an estimate of the condition number of the system."""
 
 
 def regular(problem: Problem, watch: Watch) -> Solution:
@@ -93,14 +95,15 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     return _finish(problem, watch, second, nodes, values)
 
 
-def _within(problem: Problem, sliding: IntArray, free: FloatArray) -> FloatArray:
-    """Return the displacements (m, d) without what rounding left along the normals."""
-    row = np.empty(len(problem.features[0]), np.int64)
-    row[sliding] = np.arange(len(sliding))
+def _within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
+    """Return the displacements (m, d) of sliding nodes without their part along the normals."""
+    row = np.full(len(problem.features[0]), -1)
+    row[nodes] = np.arange(len(nodes))
     at = row[problem.normal_nodes]
-    off = np.einsum("qd,qd->q", free[at], problem.normals)
+    normals, at = problem.normals[at >= 0], at[at >= 0]
+    off = np.einsum("qd,qd->q", free[at], normals)
     within = free.copy()
-    np.subtract.at(within, at, off[:, None] * problem.normals)
+    np.subtract.at(within, at, off[:, None] * normals)
     return within
 
 
@@ -121,18 +124,18 @@ def _fit(problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> Fit
 def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray) -> FloatArray:
     """Return the interpolated displacements (m, d) of nodes."""
     with watch.phase("evaluate") as tick:
-        return evaluate(
-            problem.basis,
-            problem.features[:, nodes],
-            problem.features[:, fit.controls],
-            fit.weights,
-            tick,
-        )
+        return fit.found.at(problem, nodes, tick)
 
 
 def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatArray:
-    """Return the interpolated displacements (m, d) of sliding nodes, projected."""
+    """Return the interpolated displacements (m, d) of sliding nodes, projected.
+
+    On curved boundaries the part along the normals goes first: the point that is closest to a
+    node pushed through a thin profile is on the profile's other side.
+    """
     free = _at(problem, watch, fit, level)
+    if problem.curved:
+        free = _within(problem, level, free)
     with watch.phase("project"):
         return problem.project(level, free)
 
@@ -149,5 +152,11 @@ def _finish(
             correct(problem, displacement, nodes, errors, tick)
     displacement[nodes] = values
     return Solution(
-        displacement, len(fit.controls), largest, fit.dropped, fit.controls, fit.history
+        displacement,
+        len(fit.found.nodes),
+        largest,
+        fit.dropped,
+        fit.found.nodes,
+        fit.condition(),
+        fit.history,
     )

@@ -12,9 +12,9 @@ import numpy as np
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import Basis, Tick
+from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
 
-AGREE = 1e-9
+AGREE = 1e-7
 """Largest difference of the data of coinciding nodes, as a fraction of the support radius."""
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
@@ -140,6 +140,8 @@ class Solution:
         Nodes that the pivot guard left out.
     chosen : (c,) int64
         The control nodes.
+    condition : float
+        Estimated condition number of the final system.
     history : tuple of Cycle
         Convergence of the selection; empty without data reduction.
     """
@@ -149,7 +151,67 @@ class Solution:
     max_error: float
     dropped: IntArray
     chosen: IntArray
+    condition: float
     history: tuple[Cycle, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolant:
+    """A sum of radial functions and, for some kernels, a linear polynomial (Eq. 2.1).
+
+    Attributes
+    ----------
+    nodes : (c,) int64
+        The control nodes.
+    weights : (c, d) float64
+        Coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node.
+    tail : (q, d) float64 or None
+        Coefficients beta of the polynomial's terms.
+    """
+
+    nodes: IntArray
+    weights: FloatArray
+    tail: FloatArray | None = None
+
+    def at(self, problem: Problem, nodes: IntArray, tick: Tick = no_tick) -> FloatArray:
+        """Return the displacements (m, d) of nodes in the frame."""
+        features = problem.features
+        if not len(self.nodes):
+            return np.zeros((len(nodes), problem.values.shape[1]))
+        found = evaluate(
+            problem.basis, features[:, nodes], features[:, self.nodes], self.weights, tick
+        )
+        if self.tail is not None:
+            found += linear_terms(problem.basis, features[:, nodes]) @ self.tail
+        return found
+
+    def plus(self, other: Interpolant) -> Interpolant:
+        """Return the sum of both, each node once, in the order of first occurrence."""
+        nodes = np.concatenate([self.nodes, other.nodes])
+        weights = np.concatenate([self.weights, other.weights])
+        unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
+        total = np.zeros((len(unique), weights.shape[1]))
+        np.add.at(total, group, weights)
+        order = np.argsort(first)
+        tail = other.tail if self.tail is None else self.tail
+        if self.tail is not None and other.tail is not None:
+            tail = self.tail + other.tail
+        return Interpolant(unique[order], total[order], tail)
+
+
+def linear_terms(basis: Basis, features: FloatArray) -> FloatArray:
+    """Return the terms of the linear polynomial at nodes, (n, q), periodic where the case is.
+
+    1 and the features: with a translational period these include the circle's cosine and sine;
+    with a rotational one the angle enters by the cosine and sine of its full period.
+    """
+    rows = [np.ones(features.shape[1])]
+    if basis.period > 0:
+        r, sine, cosine, z = features
+        rows += [r, cosine**2 - sine**2, 2 * sine * cosine, z]
+    else:
+        rows += list(features)
+    return np.stack(rows, axis=1)
 
 
 def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -1,18 +1,21 @@
-"""Symmetric positive definite systems: blocked Cholesky with a pivot guard.
+"""Symmetric systems: blocked Cholesky with a pivot guard, and saddle points with a polynomial.
 
 Radial functions of nodes that nearly coincide make nearly equal rows: the smallest eigenvalue
 falls with the cube of the smallest distance, so boundary layers can make the matrix numerically
-singular. Then constraints are taken in the order of their remaining pivots and those below the
-guard are left out, and reported; nothing falls back silently.
+singular. A row whose remaining pivot is below the guard is left out, and reported; nothing
+falls back silently.
 """
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotrf, dpstrf
+from numba import njit
+from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
+from scipy.linalg.lapack import dpotrf
+from scipy.sparse.linalg import LinearOperator, onenormest
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -20,6 +23,8 @@ from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12
 BLOCK = 768
+RANK = 1e-10
+"""Relative size below which a polynomial term adds nothing at the control nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +35,7 @@ class Factor:
     ----------
     lower : (k, k) float64
     kept : (k,) int64
-        The rows of G that are in the system, in the order of the factor.
+        The rows of G that are in the system, in order.
     dropped : (n - k,) int64
         Rows left out because their remaining pivot is below the guard.
     """
@@ -47,49 +52,162 @@ class Factor:
         return out
 
 
+def condition(lower: FloatArray) -> float:
+    """Return an estimate of the condition number (1-norm) of L L^T, by Higham and Tisseur."""
+    n = len(lower)
+    if n < 5:
+        return float(np.linalg.cond(lower @ lower.T, 1)) if n else 1.0
+
+    def product(x: FloatArray) -> FloatArray:
+        return lower @ (lower.T @ x)
+
+    def inverse(x: FloatArray) -> FloatArray:
+        half = solve_triangular(lower, x, lower=True, check_finite=False)
+        return solve_triangular(lower, half, lower=True, trans=1, check_finite=False)
+
+    sizes = []
+    for apply in (product, inverse):
+        operator = LinearOperator((n, n), matvec=apply, rmatvec=apply, matmat=apply, dtype=float)
+        sizes.append(float(onenormest(operator)))
+    return sizes[0] * sizes[1]
+
+
 def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
     """Return the factor of a symmetric matrix (n, n) with unit diagonal.
 
-    The matrix is kept unchanged only if it is needed for the pivoted second try.
+    Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
+    few tens of milliseconds even for 10,000 unknowns.
 
     Raises
     ------
     DeformError
         The matrix has numbers that are not finite.
     """
-    n = len(matrix)
-    if not np.all(np.isfinite(matrix)):
-        raise DeformError(
-            "the interpolation system has numbers that are not finite; check the coordinates "
-            "and displacements for NaN and the support radius for zero"
-        )
-    lower = _blocked_cholesky(matrix, tick)
-    if lower is not None:
-        return Factor(lower, np.arange(n), np.empty(0, np.int64))
-    packed, order, rank, _ = dpstrf(matrix, tol=PIVOT_GUARD, lower=1)
-    order = order.astype(np.int64) - 1
-    kept = order[:rank]
-    return Factor(np.tril(packed[:rank, :rank]), kept, np.sort(order[rank:]))
-
-
-def _blocked_cholesky(matrix: FloatArray, tick: Tick) -> FloatArray | None:
-    """Return the lower factor, or None when a pivot falls below the guard.
-
-    Left-looking by columns of blocks, so that ``tick`` is called, and may stop the work, every
-    few tens of milliseconds even for 10,000 unknowns.
-    """
+    _require_finite(matrix)
     n = len(matrix)
     lower = np.zeros((n, n), order="F")
+    dropped = np.zeros(n, bool)
     for start in range(0, n, BLOCK):
         stop = min(n, start + BLOCK)
         panel = matrix[start:, start:stop] - lower[start:, :start] @ lower[start:stop, :start].T
         head, info = dpotrf(panel[: stop - start], lower=1, clean=1)
         if info != 0 or np.min(np.diag(head)) ** 2 < PIVOT_GUARD:
-            return None
+            head = np.ascontiguousarray(panel[: stop - start])
+            _guarded_cholesky(head, PIVOT_GUARD, dropped[start:stop])
         lower[start:stop, start:stop] = head
         if stop < n:
-            lower[stop:, start:stop] = solve_triangular(
-                head, panel[stop - start :].T, lower=True, check_finite=False
-            ).T
+            below = solve_triangular(head, panel[stop - start :].T, lower=True, check_finite=False)
+            below[dropped[start:stop]] = 0.0
+            lower[stop:, start:stop] = below.T
         tick((stop / n) ** 2)
-    return lower
+    if not dropped.any():
+        return Factor(lower, np.arange(n), np.empty(0, np.int64))
+    kept = np.flatnonzero(~dropped)
+    return Factor(np.asfortranarray(lower[np.ix_(kept, kept)]), kept, np.flatnonzero(dropped))
+
+
+@njit(nogil=True, cache=True)
+def _guarded_cholesky(a, guard, dropped):  # type: ignore[no-untyped-def]
+    """Factorise a block in place; rows with a small pivot become rows of the identity."""
+    n = len(a)
+    for j in range(n):
+        for i in range(j):
+            a[i, j] = 0.0
+        pivot = a[j, j]
+        for k in range(j):
+            pivot -= a[j, k] * a[j, k]
+        if pivot < guard:
+            dropped[j] = True
+            a[j, :j] = 0.0
+            a[j + 1 :, j] = 0.0
+            a[j, j] = 1.0
+            continue
+        root = np.sqrt(pivot)
+        a[j, j] = root
+        for i in range(j + 1, n):
+            value = a[i, j]
+            for k in range(j):
+                value -= a[i, k] * a[j, k]
+            a[i, j] = value / root
+
+
+@dataclass(frozen=True, eq=False)
+class Saddle:
+    """Solution of a system with a polynomial (Eq. 2.4).
+
+    Attributes
+    ----------
+    weights : (n, m) float64
+    tail : (q, m) float64
+        Coefficients of the polynomial's terms.
+    rank_deficient : bool
+        Whether the system was singular, so that this is its least-squares solution.
+    """
+
+    weights: FloatArray
+    tail: FloatArray
+    rank_deficient: bool
+
+
+def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Saddle:
+    """Return weights and polynomial of ``[[G, P], [P^T, 0]] [w, c] = [b, 0]``.
+
+    Symmetric indefinite, solved with Bunch and Kaufman's pivoting. Terms that are dependent at
+    the given nodes (all in one plane) are left out.
+
+    Parameters
+    ----------
+    matrix : (n, n)
+    terms : (n, q)
+        The polynomial's terms in each row.
+    right : (n, m)
+
+    Raises
+    ------
+    DeformError
+        Numbers are not finite.
+    """
+    _require_finite(matrix)
+    system, use = _saddle_system(matrix, terms)
+    n = len(matrix)
+    full = np.concatenate([right, np.zeros((len(use), right.shape[1]))])
+    deficient = False
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            found = solve(system, full, assume_a="sym", check_finite=False)
+        except (LinAlgError, LinAlgWarning):
+            found = lstsq(
+                system, full, cond=PIVOT_GUARD, check_finite=False, lapack_driver="gelsy"
+            )[0]
+            deficient = True
+    tail = np.zeros((terms.shape[1], right.shape[1]))
+    tail[use] = found[n:]
+    return Saddle(found[:n], tail, deficient)
+
+
+def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:
+    """Return the condition number (1-norm) of a system with a polynomial; inf when singular."""
+    return float(np.linalg.cond(_saddle_system(matrix, terms)[0], 1))
+
+
+def _saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return ``[[G, P], [P^T, 0]]`` with the independent terms, and which ones these are."""
+    scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
+    r, order = qr(terms / scale, pivoting=True, mode="r")
+    size = np.abs(np.diag(r))
+    use = np.sort(order[: len(size)][size > RANK * size.max(initial=0.0)])
+    n, q = len(matrix), len(use)
+    system = np.zeros((n + q, n + q))
+    system[:n, :n] = matrix
+    system[:n, n:] = terms[:, use]
+    system[n:, :n] = terms[:, use].T
+    return system, use
+
+
+def _require_finite(matrix: FloatArray) -> None:
+    if not np.all(np.isfinite(matrix)):
+        raise DeformError(
+            "the interpolation system has numbers that are not finite; check the coordinates "
+            "and displacements for NaN and the support radius for zero"
+        )

@@ -1,0 +1,112 @@
+"""The fourteen radial functions of thesis Tables 2.1 and 2.2 (De Boer et al. 2007).
+
+Every function takes xi = distance / R. Those with compact support are 0 from xi = 1 on. Three of
+the global ones are only conditionally positive definite and bring a linear polynomial along.
+The thesis prints 36/3 in CP C4; it is 35/3, without which the function has a jump in its second
+derivative. ``a`` of the (inverse) multiquadric is ``SHAPE``; the inverse one is multiplied by a,
+which changes no interpolant, so that it is 1 at 0 like the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray
+
+SHAPE = 0.05
+"""The parameter a of the multiquadrics, in parts of R."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A radial function.
+
+    Attributes
+    ----------
+    name : str
+        The value of RBF_KERNEL.
+    title : str
+        The name in words.
+    code : int
+        Its number in the compiled loops.
+    compact : bool
+        Whether it is 0 from xi = 1 on.
+    polynomial : bool
+        Whether it needs the linear polynomial of Eq. 2.1.
+    function : callable
+        phi(xi) on arrays, as printed: the definition that the compiled loops are tested against.
+    """
+
+    name: str
+    title: str
+    code: int
+    compact: bool
+    polynomial: bool
+    function: Callable[[FloatArray], FloatArray]
+
+    def __call__(self, xi: FloatArray) -> FloatArray:
+        """Return phi(xi) for an array of xi >= 0."""
+        xi = np.asarray(xi, float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = np.where(xi > 0, self.function(xi), self.function(np.full_like(xi, 1e-300)))
+        return np.where(xi < 1, value, 0.0) if self.compact else value
+
+
+def _ctps_c1(x: FloatArray) -> FloatArray:
+    return 1 + 80 / 3 * x**2 - 40 * x**3 + 15 * x**4 - 8 / 3 * x**5 + 20 * x**2 * np.log(x)
+
+
+def _ctps_c2a(x: FloatArray) -> FloatArray:
+    return 1 - 30 * x**2 - 10 * x**3 + 45 * x**4 - 6 * x**5 - 60 * x**3 * np.log(x)
+
+
+def _ctps_c2b(x: FloatArray) -> FloatArray:
+    return 1 - 20 * x**2 + 80 * x**3 - 45 * x**4 - 16 * x**5 + 60 * x**4 * np.log(x)
+
+
+_ROWS: tuple[tuple[str, str, bool, bool, Callable[[FloatArray], FloatArray]], ...] = (
+    ("wendland-c2", "CP C2", True, False, lambda x: (1 - x) ** 4 * (4 * x + 1)),
+    ("wendland-c0", "CP C0", True, False, lambda x: (1 - x) ** 2),
+    (
+        "wendland-c4",
+        "CP C4",
+        True,
+        False,
+        lambda x: (1 - x) ** 6 * (35 / 3 * x**2 + 6 * x + 1),
+    ),
+    (
+        "wendland-c6",
+        "CP C6",
+        True,
+        False,
+        lambda x: (1 - x) ** 8 * (32 * x**3 + 25 * x**2 + 8 * x + 1),
+    ),
+    ("ctps-c0", "CTPS C0", True, False, lambda x: (1 - x) ** 5),
+    ("ctps-c1", "CTPS C1", True, False, _ctps_c1),
+    ("ctps-c2a", "CTPS C2a", True, False, _ctps_c2a),
+    ("ctps-c2b", "CTPS C2b", True, False, _ctps_c2b),
+    ("thin-plate", "thin plate spline", False, True, lambda x: x**2 * np.log(x)),
+    ("multiquadric", "multiquadric", False, True, lambda x: np.sqrt(SHAPE**2 + x**2)),
+    (
+        "inverse-multiquadric",
+        "inverse multiquadric",
+        False,
+        False,
+        lambda x: SHAPE / np.sqrt(SHAPE**2 + x**2),
+    ),
+    ("quadric", "quadric", False, True, lambda x: 1 + x**2),
+    ("inverse-quadric", "inverse quadric", False, False, lambda x: 1 / (1 + x**2)),
+    ("gaussian", "Gaussian", False, False, lambda x: np.exp(-(x**2))),
+)
+
+PLAIN = "wendland-c2"
+"""The default."""
+
+KERNELS: dict[str, Kernel] = {
+    name: Kernel(name, title, code, compact, polynomial, function)
+    for code, (name, title, compact, polynomial, function) in enumerate(_ROWS)
+}
+"""Radial function by the value of RBF_KERNEL."""
