@@ -325,3 +325,37 @@ def pair(kind, dim, vector=(0, 0, 0), angle=0.0, axis=(0.0, 0.0, 1.0), origin=(0
     """A periodic pair without nodes."""
     shift = np.array(vector, float)[:dim]
     return Pair("a", "b", kind, shift, angle, axis, origin, np.empty((0, 2), np.int64), 0.0)
+
+
+def wedge(n: int = 6, angle_deg: float = 60.0) -> Mesh:
+    """2D sector down to its axis, where triangles meet in one node; per1, per2, outer, BLOCK."""
+    shape = (n, n)
+    index = np.array([(0, 0)] + [(i, j) for i in range(1, n + 1) for j in range(n + 1)], float)
+    row = {tuple(p): k for k, p in enumerate(index.astype(int).tolist())}
+    quads, triangles = [], []
+    for i, j in np.ndindex(n, n):
+        if i == 0:
+            triangles.append([0, row[1, j], row[1, j + 1]])
+        elif not (n // 2 - 1 <= i < n // 2 + 1 and n // 2 - 1 <= j < n // 2 + 1):
+            quads.append([row[i, j], row[i + 1, j], row[i + 1, j + 1], row[i, j + 1]])
+
+    def on_side(p: np.ndarray, side: int) -> bool:
+        return bool(np.all((p[:, 1] == side) | (p[:, 0] == 0)))
+
+    rules: list[Rule] = [
+        ("outer", lambda p: bool(np.all(p[:, 0] == n))),
+        ("per1", lambda p: on_side(p, 0)),
+        ("per2", lambda p: on_side(p, n)),
+        ("BLOCK", lambda p: True),
+    ]
+    points = ring(shape, 0.0, 1.0, angle_deg)(index)
+    return make_mesh(points, [(5, np.array(triangles)), (9, np.array(quads))], rules, index)
+
+
+def channel(n: int = 10) -> Mesh:
+    """Box 2 x 1 whose lower wall is in three parts; the middle one can move into the domain."""
+    rules = box_rules((2 * n, n))
+    rules[2] = ("low1", lambda p: bool(np.all(p[:, 1] == 0) and p[:, 0].max() <= n // 2))
+    rules.insert(3, ("bump", lambda p: bool(np.all(p[:, 1] == 0) and p[:, 0].max() <= 3 * n // 2)))
+    rules.insert(4, ("low2", lambda p: bool(np.all(p[:, 1] == 0))))
+    return grid((2 * n, n), rules=rules, place=lambda p: p / n)
