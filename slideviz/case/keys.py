@@ -125,11 +125,21 @@ _ROWS = (
     setting(
         "RBF_KERNEL",
         METHOD,
-        choice({name: name for name in KERNELS}),
+        replace(
+            choice({name: name for name in KERNELS}),
+            allowed="one of the names below",
+            details=tuple(f"{kernel.name:<22}{kernel.title}" for kernel in KERNELS.values()),
+        ),
         "kernel",
         "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
     ),
-    setting("CURVED", METHOD, YES_NO, "curved", "Bring slid nodes back onto curved boundaries."),
+    setting(
+        "CURVED",
+        METHOD,
+        YES_NO,
+        "curved",
+        "RBF-SliDe's switch for curved boundaries; here they are found and followed anyway.",
+    ),
     setting(
         "FEATURE_ANGLE",
         METHOD,
