@@ -28,7 +28,7 @@ if [ "${WINDOW:-yes}" = no ]; then
     printf '\nthe window: %s %s\n' "$slideviz" "$case"
 elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
     printf '\nopening the window; close it to end\n'
-    "$slideviz" "$case"
+    "$slideviz" "$case" --run
 else
     printf '\nno screen here; where there is one: %s %s\n' "$slideviz" "$case"
 fi

@@ -28,7 +28,7 @@ def window(arguments: argparse.Namespace) -> int:
         )
     from slideviz.gui.app import launch
 
-    return launch(arguments.file)
+    return launch(arguments.file, run=arguments.run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -288,6 +288,16 @@ def sample(arguments: argparse.Namespace) -> int:
         print(path)
     case = next(path for path in paths if path.suffix == ".cfg")
     print(f"now: slideviz run {case}   or: slideviz {case}")
+    return DONE
+
+
+def shots(arguments: argparse.Namespace) -> int:
+    """Draw the window in typical states."""
+    from slideviz.cli import DONE
+    from slideviz.gui.shots import shots as draw
+
+    for path in draw(arguments.output):
+        print(path)
     return DONE
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from slideviz import __version__
 from slideviz.cli import commands
 
-COMMANDS = ("run", "info", "quality", "sample", "keys")
+COMMANDS = ("run", "info", "quality", "sample", "keys", "shots")
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -58,6 +58,7 @@ def _window_parser() -> argparse.ArgumentParser:
     parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
+    parser.add_argument("--run", action="store_true", help="deform the case at once")
     parser.set_defaults(command=commands.window)
     return parser
 
@@ -72,6 +73,16 @@ def _parser() -> argparse.ArgumentParser:
     _add_sample(calls)
     keys = calls.add_parser("keys", help="reference of all case keys")
     keys.set_defaults(command=commands.keys)
+    shots = calls.add_parser("shots", help="draw the pictures of the window again")
+    shots.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        default=Path("screenshots"),
+        help="folder (default: screenshots)",
+    )
+    shots.set_defaults(command=commands.shots)
     return parser
 
 

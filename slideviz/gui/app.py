@@ -15,8 +15,16 @@ from slideviz.gui.window import MainWindow
 log = logging.getLogger("slideviz")
 
 
-def launch(path: Path | None = None) -> int:
-    """Show the window, open a mesh or case in it, and return the exit code when it is closed."""
+def launch(path: Path | None = None, run: bool = False) -> int:
+    """Show the window, open a mesh or case in it, and return the exit code when it is closed.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The mesh or case to open.
+    run : bool
+        Whether to deform it at once.
+    """
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     app = QApplication.instance() or QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")
@@ -27,10 +35,20 @@ def launch(path: Path | None = None) -> int:
     window.show()
     if path is not None:
         QTimer.singleShot(0, lambda: window.files.open_path(path))
+        if run:
+            QTimer.singleShot(100, lambda: _run_when_read(window))
     try:
         return int(app.exec())
     finally:
         sys.excepthook = previous
+
+
+def _run_when_read(window: MainWindow) -> None:
+    """Start the run as soon as the file is read, if nothing is missing for it."""
+    if window.runner.busy:
+        QTimer.singleShot(100, lambda: _run_when_read(window))
+    elif window.run_panel.run.isEnabled():
+        window.start_run()
 
 
 def _unexpected(window: MainWindow, kind, error, trace) -> None:
