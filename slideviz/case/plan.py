@@ -17,6 +17,8 @@ from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, find_fans
+from slideviz.rbf.axis import corners as corners_of
+from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, classify, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, make_frame
@@ -50,6 +52,10 @@ class Plan:
         Whether images move alike (PERIODIC_MODE= fixed or moving).
     reduction : Reduction or None
         Settings of the greedy selection; None: all candidates are control nodes.
+    axis : (n,) bool
+        Nodes on the axis of a cylindrical frame.
+    held : (h,) int64
+        Sliding nodes on the axis that cannot move.
     boundary, fans, tracks
         Topology, and where sliding nodes slide.
     pairs : tuple of Pair
@@ -66,6 +72,8 @@ class Plan:
     images: IntArray
     periodic_displacement: bool
     reduction: Reduction | None
+    axis: np.ndarray
+    held: IntArray
     boundary: Boundary
     fans: Fans
     tracks: Tracks
@@ -80,11 +88,23 @@ class Plan:
         at = coords if self.tracks.curved else self.coords
         partner = {int(a): int(b) for a, b in self.images if a != b}
         partner |= {b: a for a, b in partner.items()}
-        return directions(
+        corners = corners_of(at, self.boundary.facets, self.axis)
+        nodes, normals = directions(
             self.classes,
-            fan_normals(self.boundary, self.fans, at),
+            fan_normals(self.boundary, self.fans, at, corners),
             partner if self.periodic_displacement else None,
         )
+        return hold_on_axis(nodes, normals, self.axis)[:2]
+
+    def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
+        """Return the displacements (m, d) of nodes brought back on their boundary.
+
+        Nodes on the axis stay on it, and in place where another surface meets it.
+        """
+        out = self.tracks.project(coords, nodes, free)
+        out[self.axis[nodes], :2] = 0.0
+        out[np.isin(nodes, self.held)] = 0.0
+        return out
 
 
 def make_plan(case: Case, mesh: Mesh) -> Plan:
@@ -116,11 +136,13 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     )
     coords = frame.coords(mesh.points)
     free = case.periodic in ("fixed", "moving")
+    axis = on_axis(frame, coords)
+    normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
     tracks = find_tracks(
         boundary,
         fans,
         classes,
-        coords,
+        lambda nodes: corners_of(coords, nodes, axis),
         (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
     )
     known, target, warnings = _prescribed(case, mesh, frame, classes)
@@ -144,6 +166,8 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         images=images,
         periodic_displacement=free,
         reduction=_reduction(case, mesh.extent),
+        axis=axis,
+        held=hold_on_axis(*directions(classes, normals), axis)[2],
         boundary=boundary,
         fans=fans,
         tracks=tracks,

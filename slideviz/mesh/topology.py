@@ -183,8 +183,12 @@ def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:
     In 3D it is the cross product of the diagonals, which for a triangle with its last node
     repeated is the cross product of two sides.
     """
-    x = coords[facets]
-    if facets.shape[1] == 2:
+    return corner_vectors(coords[facets])
+
+
+def corner_vectors(x: FloatArray) -> FloatArray:
+    """Return what ``facet_vectors`` does, from the corners of the facets (f, k, d)."""
+    if x.shape[1] == 2:
         t = x[:, 1] - x[:, 0]
         return np.stack([t[:, 1], -t[:, 0]], axis=1)
     return np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
@@ -266,14 +270,21 @@ def find_fans(
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
 
 
-def fan_normals(boundary: Boundary, fans: Fans, coords: FloatArray) -> FloatArray:
+def fan_normals(
+    boundary: Boundary, fans: Fans, coords: FloatArray, corners: FloatArray | None = None
+) -> FloatArray:
     """Return the unit normal of each fan, (m, d), in the frame of ``coords`` (n, d).
 
     It is the mean of the facets' unit normals, weighted with the inverse distance from the node
     to the facet's centre (thesis section 2.4.4).
+
+    Parameters
+    ----------
+    corners : (f, k, d), optional
+        Of the facets, where they are not ``coords[boundary.facets]`` (at an axis).
     """
-    normal = unit(facet_vectors(coords, boundary.facets))
-    x = coords[boundary.facets]
+    x = coords[boundary.facets] if corners is None else corners
+    normal = unit(corner_vectors(x))
     if boundary.facets.shape[1] == 4:
         triangle = boundary.facets[:, 2] == boundary.facets[:, 3]
         weight = np.where(triangle[:, None], [1 / 3, 1 / 3, 1 / 6, 1 / 6], 1 / 4)

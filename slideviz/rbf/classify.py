@@ -228,7 +228,7 @@ def directions(
     for start, stop in spans.values():
         if stop - start == 2:
             total[start + 1] -= (total[start + 1] @ total[start]) * total[start]
-            total[start + 1] /= np.linalg.norm(total[start + 1])
+            total[start + 1] = unit(total[start + 1])
     keep = np.ones(len(node), bool)
     for start, stop in spans.values():
         if stop - start > 2:

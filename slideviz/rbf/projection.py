@@ -8,7 +8,7 @@ node never leaves its curve or surface however many steps are made.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import Boundary, Fans, facet_vectors, unit
+from slideviz.mesh.topology import Boundary, Fans, corner_vectors, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
 
@@ -65,49 +65,49 @@ def find_tracks(
     boundary: Boundary,
     fans: Fans,
     classes: Classes,
-    coords: FloatArray,
+    place: Callable[[IntArray], FloatArray],
     settings: tuple[Mapping[str, str], float, FloatArray | None],
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
 
     Parameters
     ----------
-    coords : (n, d)
-        Undeformed coordinates in the working frame.
+    place : callable
+        Corners (f, k, d) of facets or segments (f, k) in the undeformed working frame.
     settings
         Roles by marker, feature angle in degrees, and the shift (d,) of one period by which
         tracks are continued beyond periodic boundaries (None: they end there).
     """
     roles, angle_deg, shift = settings
-    of_node = np.full(len(coords), -1, np.int64)
+    of_node = np.full(classes.total, -1, np.int64)
     tracks: list[ClosestPoints] = []
     curved = False
-    labels = _surface_labels(boundary, coords, roles, angle_deg)
+    sides = place(boundary.facets)
+    labels = _surface_labels(boundary, corner_vectors(sides), roles, angle_deg)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
     fan_facet[fans.fan] = fans.facet
     row_label = labels[fan_facet[classes.row_fan]]
     row_node = classes.cluster_node[classes.row_cluster]
     for nodes, chosen in _by_surfaces(on_surface, row_node, row_label):
-        facets = boundary.facets[np.isin(labels, chosen)]
+        some = sides[np.isin(labels, chosen)]
         of_node[nodes] = len(tracks)
-        corners = _simplices(coords, facets)
-        curved |= _bends(facet_vectors(coords, facets))
-        tracks.append(ClosestPoints(_continued(corners, shift)))
+        curved |= _bends(corner_vectors(some))
+        tracks.append(ClosestPoints(_continued(_simplices(some), shift)))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(tracks)
-            corners = coords[ends]
+            corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
             tracks.append(ClosestPoints(_continued(corners, shift)))
     return Tracks(tuple(tracks), of_node, bool(curved))
 
 
 def _surface_labels(
-    boundary: Boundary, coords: FloatArray, roles: Mapping[str, str], angle_deg: float
+    boundary: Boundary, vectors: FloatArray, roles: Mapping[str, str], angle_deg: float
 ) -> IntArray:
     """Return labels (f,) of facets joined smoothly, also across markers of one role."""
-    normal = unit(facet_vectors(coords, boundary.facets))
+    normal = unit(vectors)
     a, b = boundary.joints.T
     along = np.einsum("jd,jd->j", normal[a], normal[b])
     role = np.array([roles.get(name, "fixed") for name in boundary.names])[boundary.marker]
@@ -145,12 +145,12 @@ def _components(count: int, a: IntArray, b: IntArray) -> IntArray:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _simplices(coords: FloatArray, facets: IntArray) -> FloatArray:
-    """Return segments (2D) or triangles (3D, quadrilaterals as two) with corners in the frame."""
-    if facets.shape[1] == 2:
-        return coords[facets]
-    quad = facets[facets[:, 2] != facets[:, 3]]
-    return coords[np.concatenate([facets[:, :3], quad[:, [0, 2, 3]]])]
+def _simplices(sides: FloatArray) -> FloatArray:
+    """Return segments (2D) or triangles (3D, quadrilaterals as two) of facets' corners."""
+    if sides.shape[1] == 2:
+        return sides
+    quad = sides[np.any(sides[:, 2] != sides[:, 3], axis=1)]
+    return np.concatenate([sides[:, :3], quad[:, [0, 2, 3]]])
 
 
 def _continued(corners: FloatArray, shift: FloatArray | None) -> FloatArray:

@@ -65,7 +65,9 @@ def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points)
     classes = classify(boundary, fans, mesh.points, roles, method, 40.0)
-    return classes, find_tracks(boundary, fans, classes, mesh.points, (roles, 40.0, shift))
+    return classes, find_tracks(
+        boundary, fans, classes, lambda nodes: mesh.points[nodes], (roles, 40.0, shift)
+    )
 
 
 CASES = {
