@@ -32,7 +32,18 @@ from slideviz.case.key import (
 )
 from slideviz.case.model import PERIODIC_MODES, SLIDING
 from slideviz.case.motion_text import MOTIONS
-from slideviz.case.values import AXIS, NAMES, PAIRS, PATH, POINT, YES_NO, choice, real, whole
+from slideviz.case.values import (
+    AXIS,
+    NAMES,
+    PAIRS,
+    PATH,
+    POINT,
+    YES_NO,
+    choice,
+    real,
+    steps_kind,
+    whole,
+)
 from slideviz.rbf.kernels import KERNELS
 
 _ROWS = (
@@ -114,7 +125,22 @@ _ROWS = (
         "sliding",
         "How nodes slide: not, pseudo sliding (ps) or direct sliding (ds).",
     ),
-    setting("STEPS", METHOD, whole(1), "steps", "Steps in which the deformation is applied."),
+    setting(
+        "STEPS",
+        METHOD,
+        steps_kind(),
+        "steps",
+        "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
+        "halves steps that fold a cell, and takes the fewest that are enough.",
+    ),
+    setting(
+        "STEPS_GAIN",
+        METHOD,
+        real(0.0, 1.0),
+        "steps_gain",
+        "With STEPS= auto, enough is when more steps raise the minimum quality by less than "
+        "this part.",
+    ),
     setting(
         "INFLUENCE_FACTOR",
         METHOD,
@@ -223,6 +249,7 @@ _OURS = {
     "FEATURE_ANGLE",
     "QUALITY_METRIC",
     "RBF_KERNEL",
+    "STEPS_GAIN",
     "SELECTION",
     "MAX_CONTROL_NODES",
     "DATA_RED_RELATIVE",

@@ -105,7 +105,8 @@ class Case:
     Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
     thesis. Paths are absolute, or relative to the current folder. ``direction`` is the
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
-    where that is left to the matching of the periodic markers; ``reduction`` is None where all
+    where that is left to the matching of the periodic markers; ``steps`` is 0 for as many as it
+    takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
     control nodes are used.
     """
 
@@ -123,6 +124,7 @@ class Case:
     feature_angle_deg: float = 40.0
     curved: bool = False
     steps: int = 1
+    steps_gain: float = 0.02
     influence_factor: float = 2.5
     kernel: str = "wendland-c2"
     reduction: Reduction | None = None

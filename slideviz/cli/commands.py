@@ -8,6 +8,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+KEPT_BYTES = 1_000_000_000
+"""Meshes of steps are kept up to this size, to tell when cells were inverted."""
+
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
@@ -64,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         picture(last.mesh, arguments.picture, reference=mesh, quality=found)
     seconds["total"] = time.perf_counter() - begin
-    report = run_report(case, steps, found, seconds)
+    report = run_report(case, mesh, steps, found, seconds)
     if arguments.history:
         save_history(arguments.history, report)
     text = save_json(arguments.json, report) if arguments.json else None
@@ -78,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
     if found.inverted:
-        print(f"slideviz: {_inverted_sentence(last.mesh, found)}", file=sys.stderr)
+        print(f"slideviz: {_inverted_sentence(last.mesh, found, report)}", file=sys.stderr)
         return INVERTED
     return DONE
 
@@ -114,7 +117,7 @@ def _refuse_input(output: Path, mesh_file: Path) -> None:
 
 
 def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
-    """Return all steps; only the last keeps its mesh, unless each is written."""
+    """Return all steps; of very many only the last keeps its mesh."""
     from dataclasses import replace
 
     from slideviz import deform, write
@@ -135,9 +138,9 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
                 width = len(str(step.total))
                 name = f"{case.mesh_file.stem}_{step.index:0{width}d}.su2"
                 write(folder / name, step.mesh)
-            if steps:
-                steps[-1] = replace(steps[-1], mesh=mesh)
             steps.append(step)
+            if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
+                steps[-2] = replace(steps[-2], mesh=mesh)
     return steps
 
 
@@ -174,17 +177,31 @@ def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> N
             print(f"{name}: {path}")
 
 
-def _inverted_sentence(mesh: Mesh, found: Quality) -> str:
+def _inverted_sentence(mesh: Mesh, found: Quality, report: dict) -> str:
     """Return which cells are inverted, and what helps."""
     from slideviz.cli.report import inverted_cells, type_name
 
     cells = inverted_cells(found)
-    named = ", ".join(f"{i} ({type_name(mesh, i)})" for i in cells[:5])
+    when = report["quality"]["inverted_at_step"]
+    named = ", ".join(
+        f"{i} ({type_name(mesh, i)}, step {k})" for i, k in zip(cells[:5], when, strict=False)
+    )
     more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
     return (
         f"{found.inverted} of {len(found)} cells are inverted: {named}{more}; more STEPS, "
-        "SLIDING_MODE= ps or ds, or PERIODIC_MODE= moving may help"
+        f"{_advice(report)} may help"
     )
+
+
+def _advice(report: dict) -> str:
+    """Return what this case has not tried yet."""
+    ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
+    if report["sliding"] == "none":
+        ideas.append("SLIDING_MODE= ps or ds")
+    if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":
+        ideas.append("PERIODIC_MODE= moving for a repeating mesh")
+    ideas.append("another role for the boundaries near these cells")
+    return ", ".join(ideas[:-1]) + " or " + ideas[-1]
 
 
 def info(arguments: argparse.Namespace) -> int:

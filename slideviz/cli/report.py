@@ -16,7 +16,7 @@ from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.staircase import Step
+from slideviz.staircase import Step, folded_at
 
 LISTED = 100
 """Inverted cells named in a report."""
@@ -28,7 +28,11 @@ PHASES = (
 
 
 def run_report(
-    case: Case, steps: Sequence[Step], quality: Quality, seconds: Mapping[str, float]
+    case: Case,
+    mesh: Mesh,
+    steps: Sequence[Step],
+    quality: Quality,
+    seconds: Mapping[str, float],
 ) -> dict[str, Any]:
     """Return the JSON object of ``run --json``."""
     last = steps[-1]
@@ -46,7 +50,11 @@ def run_report(
             **quality.summary(),
             "metric": quality.metric,
             "inverted_cells": inverted_cells(quality),
+            "inverted_at_step": folded_at(
+                steps, mesh, np.array(inverted_cells(quality), np.int64)
+            ).tolist(),
         },
+        "tried": [asdict(trial) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "condition": [step.condition for step in steps],
         "max_error": max(step.max_error for step in steps),

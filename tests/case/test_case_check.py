@@ -87,7 +87,7 @@ def test_good_cases(square, case):
             good(motions=(Rotate("UPPER", 5.0, "centroid", (0.0, 0.0, 0.0)),)),
             "motion 1: the axis (0, 0, 0) has no direction; write x, y, z or another vector",
         ),
-        (good(steps=0), "STEPS: 0 is too small; needed is a whole number from 1"),
+        (good(steps=-1), "STEPS: -1 is too small; needed is a whole number from 1, or auto"),
         (
             good(sliding="slide"),
             "SLIDING_MODE: 'slide' is not one of none | ps | ds",

@@ -184,7 +184,7 @@ def test_links_lead_to_the_right_file(tmp_path):
         (Case(roles={"": "fixed"}), "MARKER_FIXED: an empty name cannot be written"),
         (Case(roles={"a\udcff": "fixed"}), "it is not UTF-8; rename it"),
         (Case(mesh_file=Path("a\\b.su2")), r"MESH_FILENAME: .* it has a backslash; rename it"),
-        (Case(steps=0), "STEPS: 0 is too small"),
+        (Case(steps=-1), "STEPS: -1 is too small"),
         (Case(influence_factor=float("nan")), "INFLUENCE_FACTOR: 'nan' is not a number"),
         (Case(sliding="maybe"), "SLIDING_MODE: 'maybe' is not one of none"),
         (Case(axis=(0.0, 0.0, 0.0)), "PERIODIC_AXIS: the axis .* has no direction"),
