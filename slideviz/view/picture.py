@@ -115,6 +115,9 @@ def picture_of(
     look: Look = like.look if like is not None else PAPER
     with _plotter(size) as plotter:
         scene = Scene(plotter, look, _font_scale(size))
+        if transparent:
+            # A gradient would stay opaque.
+            plotter.set_background(look.background)
         scene.open(session, surfaces)
         if like is not None:
             scene.set_motion_ghosts(like.motion_ghosts)

@@ -60,6 +60,9 @@ def window(qtbot, settings, monkeypatch):
     qtbot.addWidget(made, before_close_func=close)
     with qtbot.waitExposed(made):
         made.show()
+    # Shortcuts belong to the active window.
+    made.activateWindow()
+    qtbot.waitUntil(made.isActiveWindow)
     return made
 
 
@@ -86,6 +89,11 @@ class Driver:
     @property
     def session(self):
         return self.window.store.session
+
+    def activate(self):
+        """Make the window the active one, as a window manager does when a dialog closes."""
+        self.window.activateWindow()
+        self.qtbot.waitUntil(self.window.isActiveWindow)
 
     def settle(self, timeout=60_000):
         """Wait until no job runs."""

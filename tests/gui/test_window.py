@@ -323,6 +323,7 @@ def test_motions_are_reordered_changed_and_removed(opened):
 def test_what_is_typed_is_checked_at_once(opened):
     opened.add_motion(Translate)
     field = opened.window.motions.editor.vector.fields[0]
+    opened.click(field)
     field.selectAll()
     QTest.keyClicks(field, "1.5x")
     assert field.property("bad")
@@ -393,9 +394,10 @@ def test_what_is_missing_leads_to_its_panel(opened):
     assert "airfoil” has no motion" in panel.text.text()
     assert not panel.run.isEnabled()
     opened.window.docks["method"].raise_()
-    opened.qtbot.waitUntil(lambda: not opened.window.motions.isVisible())
+    motions = opened.window.motions
+    opened.qtbot.waitUntil(lambda: motions.visibleRegion().isEmpty())
     panel.text.linkActivated.emit("motion")
-    opened.qtbot.waitUntil(opened.window.motions.isVisible)
+    opened.qtbot.waitUntil(lambda: not motions.visibleRegion().isEmpty())
 
 
 def run(driver, steps=3):
@@ -657,8 +659,8 @@ def test_all_panels_fit_1280_x_800(ready):
     assert (window.width(), window.height()) == (1280, 800)
     for name in ("motion", "method"):
         window.docks[name].raise_()
-        ready.qtbot.waitUntil(window.docks[name].widget().isVisible)
         panel = window.docks[name].widget()
+        ready.qtbot.waitUntil(lambda panel=panel: not panel.visibleRegion().isEmpty())
         assert panel.height() >= panel.minimumSizeHint().height()
         assert panel.width() >= panel.minimumSizeHint().width()
     bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
