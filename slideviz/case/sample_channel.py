@@ -1,4 +1,4 @@
-"""The channel around the blade of the sample ``passage``, with a hole for the O-grid."""
+"""The channel around the blade of ``passage`` and ``stator``, with a hole for the O-grid."""
 
 from __future__ import annotations
 
@@ -6,14 +6,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.case.sample_blade import camber
+from slideviz.case.sample_blade import PASSAGE, Section, camber
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray
 
-PITCH = 0.75
-X_IN, X_OUT = -0.5, 1.6
-HOLE = (-0.1, 1.12, 0.14)
-"""First and last x of the hole before smoothing, and its half height about the camber line."""
+
+@dataclass(frozen=True)
+class Shares:
+    """Numbers of cells for 36 along the inflow, and how the O-grid is turned against the hole.
+
+    Attributes
+    ----------
+    ahead, along, behind, beside, layers : int
+        As of `Counts`.
+    nose, tail : float
+        Where the lines of leading and trailing edge meet the first and the last side of the
+        hole, over its length: 0 is the corner on the pressure side.
+    """
+
+    ahead: int = 20
+    along: int = 52
+    behind: int = 22
+    beside: int = 16
+    layers: int = 18
+    nose: float = 0.25
+    tail: float = 0.0
+
+
+PASSAGE_SHARES = Shares()
+"""Of the sample ``passage``; they leave its cells nearly orthogonal."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +49,8 @@ class Counts:
         Of the channel in y, likewise.
     layers : int
         Of the O-grid, away from the blade.
+    nose, tail : int
+        Beside the hole, from its lower corners to the lines of leading and trailing edge.
     """
 
     ahead: int
@@ -37,9 +60,16 @@ class Counts:
     beside: int
     above: int
     layers: int
+    nose: int
+    tail: int
+
+    @property
+    def lower(self) -> int:
+        """Return the cells on the pressure side of the blade."""
+        return self.nose + self.along + self.tail
 
 
-def counts(size: int) -> Counts:
+def counts(size: int, shares: Shares = PASSAGE_SHARES) -> Counts:
     """Return the numbers of cells for ``size`` cells along the inflow.
 
     Raises
@@ -49,11 +79,12 @@ def counts(size: int) -> Counts:
     """
     if size < 12:
         raise CaseError(f"size {size} is too coarse for the blade; needed are 12 cells or more")
-    ahead, along, behind, beside, layers = (
-        round(size * share / 36) for share in (20, 52, 22, 16, 18)
-    )
+    cells = (shares.ahead, shares.along, shares.behind, shares.beside, shares.layers)
+    ahead, along, behind, beside, layers = (round(size * share / 36) for share in cells)
     below = (size - beside) // 2
-    return Counts(ahead, along, behind, below, beside, size - beside - below, layers)
+    nose, tail = round(beside * shares.nose), round(beside * shares.tail)
+    above = size - beside - below
+    return Counts(ahead, along, behind, below, beside, above, layers, nose, tail)
 
 
 def channel_numbers(n: Counts) -> IntArray:
@@ -64,13 +95,13 @@ def channel_numbers(n: Counts) -> IntArray:
     return np.where(kept, np.cumsum(kept).reshape(shape) - 1, -1)
 
 
-def channel_points(n: Counts) -> FloatArray:
+def channel_points(n: Counts, section: Section = PASSAGE) -> FloatArray:
     """Return the channel's nodes with straight lines, hole included: (m, 2)."""
-    first, last, half = HOLE
-    x = _pieces((X_IN, first, last, X_OUT), (n.ahead, n.along, n.behind))
-    y = _pieces((-PITCH / 2, -half, half, PITCH / 2), (n.below, n.beside, n.above))
+    first, last, half = section.hole
+    x = _pieces((section.ends[0], first, last, section.ends[1]), (n.ahead, n.along, n.behind))
+    y = _pieces((-section.pitch / 2, -half, half, section.pitch / 2), (n.below, n.beside, n.above))
     xs, ys = np.meshgrid(x, y, indexing="ij")
-    return np.column_stack([xs.ravel(), ys.ravel() + camber(xs.ravel())])
+    return np.column_stack([xs.ravel(), ys.ravel() + camber(xs.ravel(), section)])
 
 
 def _pieces(places: tuple[float, ...], cells: tuple[int, ...]) -> FloatArray:

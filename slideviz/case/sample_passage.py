@@ -1,4 +1,4 @@
-"""The mesh of the sample ``passage``: one blade of a linear turbine cascade.
+"""The sample ``passage``, one blade of a linear turbine cascade, and the grid of ``stator``.
 
 An O-grid lies around the blade, in a rectangular hole of a channel of quadrilaterals (H-grid).
 Both are drawn with straight lines first and then smoothed as one, with the
@@ -7,10 +7,12 @@ nodes of the periodic sides free and moving in pairs.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.case.sample_blade import blade_nodes
+from slideviz.case.sample_blade import PASSAGE, Section, blade_nodes
 from slideviz.case.sample_channel import Counts, channel_numbers, channel_points, counts
 from slideviz.case.sample_smooth import smooth
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
@@ -18,6 +20,38 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 WALL = 0.05
 """Height of the cells at the blade over that of the O-grid's outermost ones."""
 LINE, QUADRILATERAL = 3, 9
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The cells of O-grid and channel, whatever the section.
+
+    Attributes
+    ----------
+    n : Counts
+    number : (i, j) int
+        Node at each place of the channel, -1 inside the hole.
+    ring : (layers + 1, k) int
+        Nodes of the O-grid, from the blade out, counter-clockwise; the last are the hole's rim.
+    quads : (m, 4) int
+        Nodes of the cells, counter-clockwise.
+    """
+
+    n: Counts
+    number: IntArray
+    ring: IntArray
+    quads: IntArray
+
+    def sides(self) -> dict[str, IntArray]:
+        """Return the edges (k, 2) of blade, inflow, outflow, and the periodic sides."""
+        number = self.number
+        return {
+            "blade": np.column_stack([self.ring[0], np.roll(self.ring[0], -1)]),
+            "inflow": _line(number[0]),
+            "outflow": _line(number[-1]),
+            "periodic_1": _line(number[:, 0]),
+            "periodic_2": _line(number[:, -1]),
+        }
 
 
 def passage_mesh(size: int) -> Mesh:
@@ -28,18 +62,12 @@ def passage_mesh(size: int) -> Mesh:
     CaseError
         ``size`` is below 12.
     """
-    n = counts(size)
-    number = channel_numbers(n)
-    channel = channel_points(n)[number.ravel() >= 0]
-    ring = _ring(n, number)
-    quads, rho = _quads(n, number, ring)
-    points = np.concatenate([channel, _ring_points(n, channel[ring[-1]])])
-    points = smooth(points, quads, rho, _unknowns(len(points), number, ring))
-    loop = np.column_stack([ring[0], np.roll(ring[0], -1)])
-    sides = {"airfoil": loop, "inflow": _line(number[0]), "outflow": _line(number[-1])}
-    sides |= {"periodic_1": _line(number[:, 0]), "periodic_2": _line(number[:, -1])}
+    grid = make_grid(counts(size))
+    points = smoothed(grid, straight_points(grid, PASSAGE))
+    sides = {"airfoil" if k == "blade" else k: side for k, side in grid.sides().items()}
     markers = [Marker(name, Cells.from_blocks([(LINE, side)])) for name, side in sides.items()]
-    return Mesh(points, Cells.from_blocks([(QUADRILATERAL, quads)]), tuple(markers), name="passage")
+    cells = Cells.from_blocks([(QUADRILATERAL, grid.quads)])
+    return Mesh(points, cells, tuple(markers), name="passage")
 
 
 def passage_case() -> Case:
@@ -60,41 +88,52 @@ def passage_case() -> Case:
     )
 
 
+def make_grid(n: Counts) -> Grid:
+    """Return the grid of so many cells."""
+    number = channel_numbers(n)
+    ring = _ring(n, number)
+    return Grid(n, number, ring, _quads(n, number, ring))
+
+
+def straight_points(grid: Grid, section: Section) -> FloatArray:
+    """Return nodes on straight lines (m, 2), to start from."""
+    channel = channel_points(grid.n, section)[grid.number.ravel() >= 0]
+    rim = channel[grid.ring[-1]]
+    blade = blade_nodes(grid.n.lower, len(rim) - grid.n.lower, section)
+    part = layer_parts(grid.n)[:-1, None, None]
+    return np.concatenate([channel, (blade + part * (rim - blade)).reshape(-1, 2)])
+
+
+def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatArray:
+    """Return the points (m, 2) smoothed as ``sample_smooth.smooth`` does it."""
+    heights = np.diff(layer_parts(grid.n))
+    heights /= heights[-1]
+    n_channel = len(grid.quads) - grid.ring[1:].size
+    rho = np.concatenate([np.ones(n_channel), np.repeat(heights, grid.ring.shape[1])])
+    unknown = _unknowns(len(points), grid.number, grid.ring)
+    return smooth(points, grid.quads, rho, unknown, tolerance)
+
+
+def layer_parts(n: Counts) -> FloatArray:
+    """Return how far out each row of the O-grid lies, from 0 to 1: (layers + 1,)."""
+    heights = WALL ** (np.arange(n.layers)[::-1] / (n.layers - 1))
+    return np.concatenate([[0.0], np.cumsum(heights) / heights.sum()])
+
+
 def _ring(n: Counts, number: IntArray) -> IntArray:
     """Return the nodes of the O-grid, from the blade out, counter-clockwise: (layers + 1, k).
 
-    Column 0 starts at the leading edge, a quarter up the hole's first side. The trailing edge
-    goes to the corner of pressure side and outflow. That is how the blade is turned against the
-    hole, and what leaves the cells nearly orthogonal.
+    Column 0 starts at the leading edge, on the hole's first side.
     """
     hole = number[n.ahead : n.ahead + n.along + 1, n.below : n.below + n.beside + 1]
     rim = np.concatenate([hole[:-1, 0], hole[-1, :-1], hole[:0:-1, -1], hole[0, :0:-1]])
-    rim = np.roll(rim, _nose(n))
+    rim = np.roll(rim, n.nose)
     inner = number.max() + 1 + np.arange(n.layers * len(rim)).reshape(n.layers, -1)
     return np.concatenate([inner, rim[None]])
 
 
-def _nose(n: Counts) -> int:
-    """Return the number of edges from the leading edge to the corner below it."""
-    return round(n.beside / 4)
-
-
-def _thickness(n: Counts) -> FloatArray:
-    """Return the heights of the O-grid's layers, from the blade out, the last being 1."""
-    return WALL ** (np.arange(n.layers)[::-1] / (n.layers - 1))
-
-
-def _ring_points(n: Counts, rim: FloatArray) -> FloatArray:
-    """Return the O-grid's nodes on straight lines from the blade to the rim, without it."""
-    lower = _nose(n) + n.along
-    blade = blade_nodes(lower, len(rim) - lower)
-    height = _thickness(n)
-    part = (np.concatenate([[0.0], np.cumsum(height)[:-1]]) / height.sum())[:, None, None]
-    return (blade + part * (rim - blade)).reshape(-1, 2)
-
-
-def _quads(n: Counts, number: IntArray, ring: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the cells (m, 4), counter-clockwise, and their height over width (m,)."""
+def _quads(n: Counts, number: IntArray, ring: IntArray) -> IntArray:
+    """Return the cells (m, 4), counter-clockwise: first the channel, then the O-grid."""
     around = np.roll(ring, -1, axis=1)
     channel = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     o_grid = [ring[1:], around[1:], around[:-1], ring[:-1]]
@@ -103,8 +142,7 @@ def _quads(n: Counts, number: IntArray, ring: IntArray) -> tuple[IntArray, Float
     inside[n.ahead : n.ahead + n.along, n.below : n.below + n.beside] = True
     h_quads = h_quads[~inside.ravel()]
     o_quads = np.column_stack([part.ravel() for part in o_grid])
-    rho = np.concatenate([np.ones(len(h_quads)), np.repeat(_thickness(n), ring.shape[1])])
-    return np.concatenate([h_quads, o_quads]), rho
+    return np.concatenate([h_quads, o_quads])
 
 
 def _unknowns(n_points: int, number: IntArray, ring: IntArray) -> IntArray:

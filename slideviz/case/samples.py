@@ -9,6 +9,8 @@ from pathlib import Path
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.case.sample_passage import passage_case, passage_mesh
+from slideviz.case.sample_row import row_case, row_mesh
+from slideviz.case.sample_stator import stator_case, stator_displacement, stator_mesh
 from slideviz.case.sample_thesis import FILE, thesis_case
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError
@@ -21,16 +23,29 @@ SAMPLES: Mapping[str, str] = {
     "hexahedron": "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
     "cylindrical": "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
     "passage": "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
+    "turbine-row": "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
+    "size: cells (224180)",
+    "stator": "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
 }
 """What each sample is, by name."""
 
-DEFAULT_SIZES = {"square": 25, "polar": 25, "hexahedron": 25, "cylindrical": 25, "passage": 36}
+DEFAULT_SIZES = {
+    "square": 25,
+    "polar": 25,
+    "hexahedron": 25,
+    "cylindrical": 25,
+    "passage": 36,
+    "turbine-row": 224_180,
+    "stator": 240_000,
+}
 VARIANTS: Mapping[str, tuple[str, ...]] = {
     "square": ("file", "motion", "translate"),
     "polar": ("file",),
     "hexahedron": ("file", "motion", "flat"),
     "cylindrical": ("file",),
     "passage": ("motion",),
+    "turbine-row": ("motion",),
+    "stator": ("file",),
 }
 """How each sample can move, the default first.
 
@@ -71,15 +86,15 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     name : str
         One of ``SAMPLES``.
     size : int, optional
-        Cells in each direction; of the passage: cells along its inflow. The thesis's
-        (25), or 36 for the passage, when left out.
+        Cells in each direction; of the passage: cells along its inflow; of turbine row and
+        stator: all cells. One of ``DEFAULT_SIZES`` when left out.
     variant : str, optional
         One of ``VARIANTS[name]``; the first when left out.
 
     Raises
     ------
     CaseError
-        There is no such sample or variant, or the size is too small.
+        There is no such sample or variant, or the size is out of range.
     """
     if name not in SAMPLES:
         hint = nearest(name, SAMPLES)
@@ -90,6 +105,11 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     cells = DEFAULT_SIZES[name] if size is None else size
     if name == "passage":
         return Sample(name, passage_mesh(cells), passage_case())
+    if name == "turbine-row":
+        return Sample(name, row_mesh(cells), row_case(cells))
+    if name == "stator":
+        mesh = stator_mesh(cells)
+        return Sample(name, mesh, stator_case(), stator_displacement(mesh))
     return Sample(name, *thesis_case(name, cells, kind))
 
 

@@ -190,7 +190,7 @@ def same_mesh(one: sv.Mesh, other: sv.Mesh) -> bool:
 
 @pytest.mark.parametrize(("name", "variant"), [(n, v) for n in SAMPLES for v in VARIANTS[n]])
 def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, name, variant):
-    size = 12 if name == "passage" else 5
+    size = {"passage": 12, "turbine-row": 5_000, "stator": 5_000}.get(name, 5)
     paths = write_sample(name, tmp_path / "a" / "b", size, variant)
     assert all(path.is_file() for path in paths)
     assert {path.name for path in paths} == {path.name for path in (tmp_path / "a/b").iterdir()}
@@ -204,7 +204,7 @@ def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, na
     assert not case.warnings
     found = displacements(case, mesh)
     assert not found.warnings
-    assert np.abs(found.vectors).max() > 0.1
+    assert np.abs(found.vectors).max() > 0.03 * mesh.extent
     if expected.displacement is not None:
         np.testing.assert_array_equal(found.nodes, expected.displacement.nodes)
         np.testing.assert_array_equal(found.vectors, expected.displacement.vectors)
