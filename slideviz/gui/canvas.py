@@ -45,6 +45,12 @@ class View3D(QtInteractor):
         self._render()
         return np.asarray(self.screenshot(return_img=True))
 
+    def spare_software(self) -> None:
+        """Give up smooth edges where no graphics card draws: they take most of the time there."""
+        drawn_by = self.render_window.ReportCapabilities().lower()
+        if any(name in drawn_by for name in ("llvmpipe", "softpipe", "swrast")):
+            self.render_window.SetMultiSamples(0)
+
     def set_flat(self, flat: bool) -> None:
         """Choose the mouse for a 2D mesh (drag moves it) or a 3D one (drag turns it)."""
         self.flat = flat

@@ -211,6 +211,7 @@ class MainWindow(QMainWindow):
         self.banner.hide()
         self.start.hide()
         self.player.stop()
+        self.view.spare_software()
         self.view.set_flat(session.mesh.dim == 2)
         self.scene.open(session, opened.surfaces)
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
