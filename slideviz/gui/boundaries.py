@@ -136,7 +136,7 @@ class BoundariesPanel(QWidget):
 
     def _count(self, session: Session) -> None:
         for row, name in enumerate(self._names):
-            text = f"{len(session.mesh.marker(name).cells):,}".replace(",", "\u2009")
+            text = f"{len(session.mesh.marker(name).cells):,}"
             self.table.item(row, COUNT).setText(text)
 
     def _sync_row(self, session: Session, row: int, name: str) -> None:

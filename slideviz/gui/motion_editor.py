@@ -144,7 +144,7 @@ class MotionEditor(QWidget):
             self._markers = tuple(names)
             self.marker.clear()
             for name in names:
-                self.marker.addItem(name or "all moving boundaries", name)
+                self.marker.addItem(name or "all moving", name)
         self.marker.show_value(motion.marker)
 
     def _kind_chosen(self, kind: type) -> None:
