@@ -2,6 +2,7 @@
 
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
 
 TRIANGLE, QUADRILATERAL = 5, 9
+KEPT = Path(__file__).parents[2] / "sample_meshes" / "turbine-row"
 
 made = cache(row_mesh)
 
@@ -238,3 +240,16 @@ def test_vane_grows_without_inverted_cells(method):
     np.testing.assert_allclose(shift, np.broadcast_to([0, pitch()], shift.shape), atol=1e-9)
     assert np.abs(first - mesh.points[mesh.marker("PER1").nodes]).max() > 1e-4
     assert len(first) == len(second)
+
+
+def test_sample_meshes_folder_holds_a_small_row():
+    """Not node by node: which point the front accepts can turn on the last digit of a cosine."""
+    kept, fresh = sv.read(KEPT / "mesh.su2"), made(5_000)
+    assert len(kept.cells) == pytest.approx(len(fresh.cells), rel=0.02)
+    assert kept.marker_names == fresh.marker_names
+    for one, other in zip(kept.markers, fresh.markers, strict=True):
+        ours, theirs = kept.points[one.nodes], fresh.points[other.nodes]
+        np.testing.assert_allclose(np.sort(ours, 0), np.sort(theirs, 0), rtol=0, atol=1e-9)
+    case, now = sv.Case.read(KEPT / "turbine-row.cfg"), row_case(5_000)
+    paths = {"mesh_file": None, "mesh_out": None, "source": None}
+    assert case.change(**paths) == now.change(**paths)

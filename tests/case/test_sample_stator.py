@@ -2,11 +2,13 @@
 
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.case.motion import displacements
 from slideviz.case.sample_blade import Section, blade_nodes
 from slideviz.case.sample_channel import Shares, counts
 from slideviz.case.sample_passage import make_grid, smoothed, straight_points
@@ -18,6 +20,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
 
 made = cache(sample)
+KEPT = Path(__file__).parents[2] / "sample_meshes" / "stator"
 PERIOD = 2 * np.pi / 41
 
 
@@ -169,3 +172,16 @@ def test_refined_grid_keeps_the_places_of_the_coarse_one():
     np.testing.assert_allclose(shift, np.broadcast_to([0, 0.9], shift.shape), atol=1e-12)
     mesh = sv.Mesh(found, sv.Cells.from_blocks([(9, fine.quads)]))
     assert sv.quality(mesh).min > 0.5
+
+
+def test_sample_meshes_folder_holds_a_small_stator():
+    kept, fresh = sv.read(KEPT / "mesh.su2"), stator(5_000)
+    np.testing.assert_allclose(kept.points, fresh.mesh.points, rtol=0, atol=1e-8)
+    assert kept.cells.same_as(fresh.mesh.cells)
+    assert kept.marker_names == fresh.mesh.marker_names
+    case = sv.Case.read(KEPT / "stator.cfg")
+    found = displacements(case, kept)
+    np.testing.assert_array_equal(found.nodes, fresh.displacement.nodes)
+    np.testing.assert_allclose(found.vectors, fresh.displacement.vectors, rtol=0, atol=1e-8)
+    paths = {"mesh_file": None, "mesh_out": None, "source": None, "motions": ()}
+    assert case.change(**paths) == fresh.case.change(**paths)
