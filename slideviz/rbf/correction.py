@@ -51,7 +51,8 @@ def correct(
     targets = np.flatnonzero(free)
     for start in range(0, len(targets), CHUNK):
         part = targets[start : start + CHUNK]
-        near = tree.query(points[part], distance_upper_bound=radius, workers=-1)
+        workers = -1 if len(part) == CHUNK else 1
+        near = tree.query(points[part], distance_upper_bound=radius, workers=workers)
         distance, index = (np.asarray(found) for found in near)
         hit = np.isfinite(distance)
         q = distance[hit] / radius

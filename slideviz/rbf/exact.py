@@ -8,7 +8,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch, linear_terms
-from slideviz.rbf.solve import condition, factorise, saddle_condition, solve_saddle
+from slideviz.rbf.solve import condition, enough_threads, factorise, saddle_condition, solve_saddle
 
 
 class ExactFit:
@@ -46,8 +46,10 @@ class ExactFit:
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
                 return
             place = problem.features[:, rows.nodes], rows.normals
-            factor = factorise(matrix(problem.basis, place, tick=tick), tick)
-            weights = factor.solve(rows.right)
+            system = matrix(problem.basis, place, tick=tick)
+            with enough_threads(len(system) ** 3 / 3):
+                factor = factorise(system, tick)
+                weights = factor.solve(rows.right)
         self._lower = factor.lower
         self.dropped = np.unique(rows.nodes[factor.dropped])
         self.found = gathered(rows, weights)
@@ -55,7 +57,8 @@ class ExactFit:
     def condition(self) -> float:
         """Return an estimate of the condition number of the last system."""
         if self._lower is not None:
-            return condition(self._lower)
+            with enough_threads(20.0 * len(self._lower) ** 2):
+                return condition(self._lower)
         if self._rows is None:
             return 1.0
         place = self._problem.features[:, self._rows.nodes], self._rows.normals

@@ -26,7 +26,7 @@ from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch
-from slideviz.rbf.solve import PIVOT_GUARD, condition
+from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads
 
 POOL = 1024
 """Largest number of rows in the pool of a block."""
@@ -209,9 +209,12 @@ class GreedyFit:
         count, pool = self._pool(np.where(open_, errors, -1.0), residual)
         while len(pool):
             rows = np.flatnonzero(np.isin(self._candidate, pool) & ~self._barred)
-            picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
+            flops = 4.0 * (len(self._chosen) + count) * len(rows) * len(self._chosen)
+            with enough_threads(flops):
+                picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
+                if picked:
+                    self._now = self._own(target)
             if picked:
-                self._now = self._own(target)
                 self.found = self._settled.plus(self._now)
                 return True
             # All of the pool fell to the pivot guard: try the next ones.
@@ -306,7 +309,8 @@ class GreedyFit:
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the last level's system."""
-        return condition(self._factor)
+        with enough_threads(20.0 * len(self._factor) ** 2):
+            return condition(self._factor)
 
 
 def _newton(

@@ -49,11 +49,12 @@ class Tracks:
             Current positions in the frame, on the tracks.
         nodes : (m,)
         free : (m, d)
-            Displacements as interpolated. Zero ones stay exactly zero.
+            Displacements as interpolated. Zero ones stay exactly zero, and so do nodes that have
+            no track.
         """
         out = np.zeros_like(free)
         label = self.of_node[nodes]
-        moved = np.any(free != 0, axis=1)
+        moved = np.any(free != 0, axis=1) & (label >= 0)
         for index in np.unique(label[moved]):
             rows = np.flatnonzero(moved & (label == index))
             start = coords[nodes[rows]]

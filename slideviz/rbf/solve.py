@@ -9,13 +9,16 @@ falls back silently.
 from __future__ import annotations
 
 import warnings
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numba import njit
 from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
 from scipy.linalg.lapack import dpotrf
 from scipy.sparse.linalg import LinearOperator, onenormest
+from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -25,6 +28,22 @@ PIVOT_GUARD = 1e-12
 BLOCK = 768
 RANK = 1e-10
 """Relative size below which a polynomial term adds nothing at the control nodes."""
+
+
+SMALL_FLOPS = 50_000_000
+"""Work below which the threads of the linear algebra library wait longer than they work."""
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def enough_threads(flops: float) -> AbstractContextManager[object]:
+    """Return a context in which small dense work is done by one thread."""
+    if flops > SMALL_FLOPS:
+        return nullcontext()
+    return _libraries().limit(limits=1, user_api="blas")
 
 
 @dataclass(frozen=True, eq=False)
