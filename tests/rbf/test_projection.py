@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from slideviz.mesh.topology import find_boundary, find_fans
 from slideviz.rbf.classify import classify
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.projection import find_tracks
+from slideviz.rbf.projection import Tracks, find_tracks
 from tests import builders
 from tests.oracles import geometry
 
@@ -177,3 +177,10 @@ def test_a_node_between_two_roles_in_one_plane_slides_on_both(second):
     for shift in (-0.2, 0.2):
         moved = tracks.project(mesh.points, np.array([node]), np.array([[shift, 0.1]]))
         np.testing.assert_allclose(moved, [[shift, 0.0]], atol=1e-15)
+
+
+def test_a_node_without_a_track_stays():
+    track = ClosestPoints(np.array([[[0.0, 0.0], [1.0, 0.0]]]))
+    tracks = Tracks((track,), np.array([0, -1]), False)
+    found = tracks.project(np.zeros((2, 2)), np.array([0, 1]), np.full((2, 2), 0.3))
+    np.testing.assert_array_equal(found, [[0.3, 0.0], [0.0, 0.0]])
