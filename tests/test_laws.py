@@ -171,7 +171,7 @@ def test_thread_count_changes_nothing():
     seed=st.integers(0, 99),
     scale=st.sampled_from([1e-3, 1.0, 40.0]),
 )
-def test_moving_turning_mirroring_and_scaling_the_problem_does_so_to_the_result(method, dim, seed, scale):
+def test_the_result_moves_turns_mirrors_and_scales_with_the_problem(method, dim, seed, scale):
     rng = np.random.default_rng(seed)
     mesh = box(dim)
     q, _ = np.linalg.qr(rng.normal(size=(dim, dim)))
