@@ -19,14 +19,13 @@ from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch
-from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads
+from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, solve_lower
 
 POOL = 1024
 """Largest number of rows in the pool of a block."""
@@ -188,7 +187,7 @@ class GreedyFit:
         if self._tailed:
             found, self._singular = saddle_fit(self._problem, rows)
             return found
-        w = solve_triangular(self._factor, self._half, lower=True, trans=1, check_finite=False)
+        w = solve_lower(self._factor, self._half, transposed=True)
         return gathered(rows, w)
 
     def _values(self, sum_: Interpolant) -> FloatArray:
@@ -276,12 +275,7 @@ class GreedyFit:
         schur = matrix(basis, place(rows))
         left: FloatArray = np.empty((0, len(rows)))
         if len(old):
-            left = solve_triangular(
-                self._factor,
-                matrix(basis, place(old), place(rows)),
-                lower=True,
-                check_finite=False,
-            )
+            left = solve_lower(self._factor, matrix(basis, place(old), place(rows)))
             schur -= left.T @ left
         floor = 0.0 if self._settings.pick != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
@@ -302,7 +296,7 @@ class GreedyFit:
         factor[n:, :n] = left.T
         factor[n:, n:] = corner
         rest = target[rows] - left.T @ self._half
-        half = solve_triangular(corner, rest, lower=True, check_finite=False)
+        half = solve_lower(corner, rest)
         self._factor, self._half = factor, np.concatenate([self._half, half])
         self._chosen = np.concatenate([self._chosen, rows])
         self._barred[rows] = True

@@ -15,8 +15,8 @@ from functools import cache
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
-from scipy.linalg.lapack import dpotrf
 from scipy.sparse.linalg import LinearOperator, onenormest
 from threadpoolctl import ThreadpoolController
 
@@ -25,7 +25,10 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12
-BLOCK = 768
+BLOCK = 512
+TRIANGLE = 192
+"""Rows of a triangular solve that hold the interpreter lock: a few milliseconds."""
+
 RANK = 1e-10
 """Relative size below which a polynomial term adds nothing at the control nodes."""
 
@@ -66,9 +69,30 @@ class Factor:
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the weights (n, m) for right-hand sides (n, m); zero in dropped rows."""
         out = np.zeros_like(right, dtype=float)
-        half = solve_triangular(self.lower, right[self.kept], lower=True, check_finite=False)
-        out[self.kept] = solve_triangular(self.lower, half, lower=True, trans=1, check_finite=False)
+        half = solve_lower(self.lower, right[self.kept])
+        out[self.kept] = solve_lower(self.lower, half, transposed=True)
         return out
+
+
+def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) -> FloatArray:
+    """Return ``L^-1 B`` (or ``L^-T B``) for a lower triangular L (n, n) and B (n, m).
+
+    By blocks, because SciPy's triangular solver keeps the interpreter lock, for seconds on large
+    systems, and with it a window still; products of matrices do not.
+    """
+    out = np.array(right, dtype=float)
+    starts = range(0, len(lower), TRIANGLE)
+    for start in reversed(starts) if transposed else starts:
+        here = slice(start, start + TRIANGLE)
+        if transposed:
+            out[here] -= lower[start + TRIANGLE :, here].T @ out[start + TRIANGLE :]
+        else:
+            out[here] -= lower[here, :start] @ out[:start]
+        corner = lower[here, here]
+        out[here] = solve_triangular(
+            corner, out[here], lower=True, trans=1 if transposed else 0, check_finite=False
+        )
+    return out
 
 
 def condition(lower: FloatArray) -> float:
@@ -81,8 +105,7 @@ def condition(lower: FloatArray) -> float:
         return lower @ (lower.T @ x)
 
     def inverse(x: FloatArray) -> FloatArray:
-        half = solve_triangular(lower, x, lower=True, check_finite=False)
-        return solve_triangular(lower, half, lower=True, trans=1, check_finite=False)
+        return solve_lower(lower, solve_lower(lower, x), transposed=True)
 
     sizes = []
     for apply in (product, inverse):
@@ -109,13 +132,10 @@ def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
     for start in range(0, n, BLOCK):
         stop = min(n, start + BLOCK)
         panel = matrix[start:, start:stop] - lower[start:, :start] @ lower[start:stop, :start].T
-        head, info = dpotrf(panel[: stop - start], lower=1, clean=1)
-        if info != 0 or np.min(np.diag(head)) ** 2 < PIVOT_GUARD:
-            head = np.ascontiguousarray(panel[: stop - start])
-            _guarded_cholesky(head, PIVOT_GUARD, dropped[start:stop])
+        head = _cholesky(panel[: stop - start], dropped[start:stop])
         lower[start:stop, start:stop] = head
         if stop < n:
-            below = solve_triangular(head, panel[stop - start :].T, lower=True, check_finite=False)
+            below = solve_lower(head, panel[stop - start :].T)
             below[dropped[start:stop]] = 0.0
             lower[stop:, start:stop] = below.T
         tick((stop / n) ** 2)
@@ -123,6 +143,19 @@ def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
         return Factor(lower, np.arange(n), np.empty(0, np.int64))
     kept = np.flatnonzero(~dropped)
     return Factor(np.asfortranarray(lower[np.ix_(kept, kept)]), kept, np.flatnonzero(dropped))
+
+
+def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:
+    """Return the factor of a diagonal block; marks the rows that the guard leaves out."""
+    try:
+        head = np.asarray(np.linalg.cholesky(block), np.float64)
+        if np.min(np.diag(head)) ** 2 >= PIVOT_GUARD:
+            return head
+    except np.linalg.LinAlgError:
+        pass
+    guarded: FloatArray = np.array(block, np.float64)
+    _guarded_cholesky(guarded, PIVOT_GUARD, dropped)
+    return guarded
 
 
 @njit(nogil=True, cache=True)
