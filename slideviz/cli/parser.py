@@ -141,7 +141,7 @@ def _add_sample(calls: argparse._SubParsersAction) -> None:
     sample = calls.add_parser("sample", help="write a sample case")
     sample.add_argument("name", nargs="?", help="which one; none: list them")
     sample.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
-    sample.add_argument("--size", type=int, metavar="N", help="cells along a side")
+    sample.add_argument("--size", type=int, metavar="N", help="size; what it counts is in the list")
     sample.add_argument("--variant", metavar="NAME", help="other motions; listed without NAME")
     sample.add_argument("--force", action="store_true", help="replace files that exist")
     sample.set_defaults(command=commands.sample)
