@@ -420,10 +420,11 @@ def test_a_moving_body_that_touches_sliding_walls(method):
 
 @pytest.mark.parametrize("method", ["ps", "ds"])
 def test_an_airfoil_keeps_its_trailing_edge_and_its_shape(method):
-    mesh = builders.airfoil(n=60, layers=10)
+    """Near the edge the profile is thinner than the way its nodes are pushed across it."""
+    mesh = builders.airfoil(n=80, layers=10)
     case = Case(
         roles={"airfoil": "sliding", "far": "moving"},
-        motions=(Rotate("far", 0.5, (0.5, 0.0)),),
+        motions=(Rotate("far", 1.0, (0.5, 0.0)),),
         sliding=method,
         steps=2,
     )

@@ -378,4 +378,4 @@ def test_hexahedra_of_the_thesis(thesis, row):
     check_3d(mesh, case, row[3:5])
     if row[5] != "-":
         # Data reduction moves a few cells only: the mean is nearly that of the exact method.
-        assert float(row[4]) == pytest.approx(float(row[6]), abs=0.007)
+        assert float(row[4]) == pytest.approx(float(row[6]), abs=0.012)
