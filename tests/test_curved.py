@@ -159,3 +159,34 @@ def test_the_far_field_can_be_translated_past():
         far = np.linalg.norm(step.mesh.points[-72:], axis=1)
         assert far.max() <= 10.0 + 1e-12
         assert far.min() >= 10.0 * np.cos(np.pi / 72) - 1e-12
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+def test_walls_go_on_beyond_a_moving_end(sliding):
+    """The inlet is pulled out of the bend: its neighbours follow beyond the old end of the walls."""
+    mesh = duct()
+    walls = ("inner", "outer", "bottom", "top")
+    pull = (Rotate("in", -8.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),)
+    roles = {"in": "moving", "out": "fixed"} | dict.fromkeys(walls, "sliding")
+    *_, last = sv.deform(Case(roles=roles, motions=pull, sliding=sliding, steps=2), mesh)
+    found = sv.quality(last.mesh, mesh)
+    assert found.inverted == 0
+    assert found.min > 0.8
+    followed = np.setdiff1d(mesh.marker("outer").nodes, mesh.marker("in").nodes)
+    assert last.mesh.points[followed, 1].min() < -0.05
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+def test_a_blade_may_leave_its_place_on_the_hub(tmp_path, sliding):
+    """Nodes of the hub follow the blade into the place where it stood, which has no facets."""
+    write_sample("stator", tmp_path, 5000)
+    mesh = sv.read(tmp_path / "mesh.su2")
+    case = sv.Case.read(tmp_path / "stator.cfg")
+    turn = Rotate("BLADE", 2.5, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    roles = {**case.roles, "HUB": "sliding", "SHROUD": "sliding"}
+    case = case.change(sliding=sliding, reduction=None, roles=roles, motions=(turn,), steps=3)
+    *_, last = sv.deform(case, mesh)
+    assert sv.quality(last.mesh, mesh).min > 0.6
+    nodes = np.setdiff1d(mesh.marker("HUB").nodes, mesh.marker("BLADE").nodes)
+    before, after = (np.hypot(*m.points[nodes, :2].T) for m in (mesh, last.mesh))
+    assert np.abs(after - before).max() < 1e-12

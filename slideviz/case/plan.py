@@ -29,6 +29,10 @@ COINCIDENT = 1e-12
 """Nodes nearer than this part of the mesh's extent are one control node."""
 
 
+REACH = 1.5
+"""How far surfaces are continued at moving boundaries, in largest displacements."""
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Everything that stays the same over the steps.
@@ -138,14 +142,15 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     free = case.periodic in ("fixed", "moving")
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    known, target, warnings = _prescribed(case, mesh, frame, classes)
     tracks = find_tracks(
         boundary,
         fans,
         classes,
         lambda nodes: corners_of(coords, nodes, axis),
         (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
+        reach=REACH * float(np.linalg.norm(target, axis=1).max(initial=0.0)),
     )
-    known, target, warnings = _prescribed(case, mesh, frame, classes)
     images = (
         np.concatenate([pair.nodes for pair in pairs])
         if pairs and case.periodic != "none"

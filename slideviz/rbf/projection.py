@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, corner_vectors, unit
+from slideviz.rbf.apron import edge_apron, surface_apron
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
 
@@ -68,6 +69,7 @@ def find_tracks(
     classes: Classes,
     place: Callable[[IntArray], FloatArray],
     settings: tuple[Mapping[str, str], float, FloatArray | None],
+    reach: float = 0.0,
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
 
@@ -78,12 +80,16 @@ def find_tracks(
     settings
         Roles by marker, feature angle in degrees, and the shift (d,) of one period by which
         tracks are continued beyond periodic boundaries (None: they end there).
+    reach
+        How far tracks are continued where moving boundaries stand on them.
     """
     roles, angle_deg, shift = settings
     of_node = np.full(classes.total, -1, np.int64)
     tracks: list[ClosestPoints] = []
     curved = False
     sides = place(boundary.facets)
+    moving = np.zeros(classes.total, bool)
+    moving[classes.moving] = reach > 0
     labels = _surface_labels(boundary, corner_vectors(sides), roles, angle_deg)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
@@ -91,15 +97,18 @@ def find_tracks(
     row_label = labels[fan_facet[classes.row_fan]]
     row_node = classes.cluster_node[classes.row_cluster]
     for nodes, chosen in _by_surfaces(on_surface, row_node, row_label):
-        some = sides[np.isin(labels, chosen)]
+        member = np.isin(labels, chosen)
         of_node[nodes] = len(tracks)
-        curved |= _bends(corner_vectors(some))
-        tracks.append(ClosestPoints(_continued(_simplices(some), shift)))
+        curved |= _bends(corner_vectors(sides[member]))
+        apron = surface_apron(boundary, member, moving, place, reach)
+        corners = np.concatenate([_simplices(sides[member]), apron])
+        tracks.append(ClosestPoints(_continued(corners, shift)))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(tracks)
             corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
+            corners = np.concatenate([corners, edge_apron(ends, moving, place, reach)])
             tracks.append(ClosestPoints(_continued(corners, shift)))
     return Tracks(tuple(tracks), of_node, bool(curved))
 
