@@ -163,7 +163,7 @@ def test_the_far_field_can_be_translated_past():
 
 @pytest.mark.parametrize("sliding", ["ps", "ds"])
 def test_walls_go_on_beyond_a_moving_end(sliding):
-    """The inlet is pulled out of the bend: its neighbours follow beyond the old end of the walls."""
+    """The inlet is pulled out of the bend; neighbours follow beyond the old end of the walls."""
     mesh = duct()
     walls = ("inner", "outer", "bottom", "top")
     pull = (Rotate("in", -8.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),)
