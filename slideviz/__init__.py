@@ -12,11 +12,11 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.staircase import Step, deform
     from slideviz.errors import SlidevizError
     from slideviz.mesh.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
+    from slideviz.staircase import Step, deform
 
 _HOME = {
     "Case": "case.model",

@@ -1,0 +1,73 @@
+"""How time and memory grow with cells, candidates and control nodes: ``make bench``."""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+
+import pytest
+
+import slideviz as sv
+from slideviz.case.model import Reduction
+from slideviz.case.samples import write_sample
+
+
+@pytest.fixture(scope="session")
+def stator(tmp_path_factory):
+    """Sample stators by number of cells."""
+    made = {}
+
+    def of(cells):
+        if cells not in made:
+            made[cells] = tmp_path_factory.mktemp(f"stator{cells}")
+            write_sample("stator", made[cells], cells)
+        return made[cells]
+
+    return of
+
+
+@pytest.mark.parametrize("cells", [20_000, 60_000, 240_000])
+def test_run_of_the_command(benchmark, stator, cells):
+    """Whole command, reading and writing included, in a process of its own."""
+    folder = stator(cells)
+    report = folder / "report.json"
+    call = [sys.executable, "-m", "slideviz", "run", str(folder / "stator.cfg"), "-q"]
+    benchmark.pedantic(subprocess.run, ([*call, "--json", str(report)],), {"check": True}, rounds=2)
+    told = json.loads(report.read_text())
+    seconds = told["seconds"]
+    deformation = sum(
+        seconds[k] for k in ("classify", "select", "solve", "evaluate", "project", "correct")
+    )
+    benchmark.extra_info.update(
+        cells=told["quality"]["cells"],
+        control_nodes=told["control_nodes"][-1],
+        deformation_seconds=deformation,
+        largest_memory_gb=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6,
+    )
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
+def test_selection(benchmark, stator, sliding, tolerance):
+    """The deformation of 240,000 hexahedra to a tolerance."""
+    folder = stator(240_000)
+    mesh = sv.read(folder / "mesh.su2")
+    case = sv.Case.read(folder / "stator.cfg").change(
+        sliding=sliding, reduction=Reduction(tolerance=tolerance)
+    )
+    steps = benchmark.pedantic(lambda: list(sv.deform(case, mesh)), rounds=2)
+    counts = steps[-1].node_counts
+    benchmark.extra_info.update(
+        candidates=sum(counts.values()) - counts["internal"],
+        control_nodes=steps[-1].control_nodes,
+        select_seconds=steps[-1].seconds["select"],
+    )
+
+
+def test_second_start(benchmark, tmp_path):
+    """The 25 by 25 square in 20 steps, from the shell: imports, cached code, everything."""
+    write_sample("square", tmp_path)
+    call = [sys.executable, "-m", "slideviz", "run", str(tmp_path / "square.cfg"), "-q"]
+    benchmark.pedantic(subprocess.run, (call,), {"check": True}, rounds=5, warmup_rounds=1)
