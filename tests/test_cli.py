@@ -269,3 +269,13 @@ def test_readme_python_example(square, monkeypatch):
     sv.write("out.su2", last.mesh)
     assert found.inverted == 0
     assert np.array_equal(sv.read("out.su2").points, last.mesh.points)
+
+
+def test_the_first_run_says_that_it_compiles(square, capsys, monkeypatch):
+    argv = ["run", str(square / "square.cfg"), "--set", "STEPS=2"]
+    monkeypatch.setattr("slideviz.rbf.compiled.is_cached", lambda: False)
+    assert run(argv) == 0
+    assert "compiling" in capsys.readouterr().err
+    monkeypatch.undo()
+    assert run(argv) == 0
+    assert "compiling" not in capsys.readouterr().err

@@ -123,6 +123,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
     from slideviz.errors import CaseError
+    from slideviz.rbf.compiled import is_cached
 
     steps: list[Step] = []
     folder = arguments.steps_dir
@@ -131,6 +132,8 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
             raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+    if not (arguments.quiet or is_cached()):
+        print("slideviz: first run: compiling the kernels, some seconds, once", file=sys.stderr)
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:

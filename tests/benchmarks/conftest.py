@@ -2,6 +2,7 @@
 
 import os
 import platform
+from pathlib import Path
 
 
 def pytest_terminal_summary(terminalreporter, config):
@@ -19,7 +20,7 @@ def pytest_terminal_summary(terminalreporter, config):
 
 def _processor() -> str:
     try:
-        with open("/proc/cpuinfo", encoding="ascii") as lines:
-            return next(line.split(":")[1].strip() for line in lines if "model name" in line)
+        lines = Path("/proc/cpuinfo").read_text(encoding="ascii").splitlines()
+        return next(line.split(":")[1].strip() for line in lines if "model name" in line)
     except (OSError, StopIteration):
         return platform.processor() or "unknown processor"
