@@ -1,13 +1,29 @@
-"""The method panel: sliding, periodicity, steps, and the numbers of the interpolation."""
+"""The method panel: sliding, periodicity, steps, data reduction, and more."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
-from qtpy.QtWidgets import QFormLayout, QLabel, QSpinBox, QVBoxLayout, QWidget
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import (
+    QCheckBox,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
 
-from slideviz.gui.fields import Choice, NumberField, VectorField, angle_limit, positive
+from slideviz.case.model import Reduction
+from slideviz.gui.fields import Choice, NumberField, VectorField, positive
+from slideviz.gui.method_more import NO_REDUCTION, MoreSettings, enable, set_tip
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
 from slideviz.view.state import Session
@@ -26,14 +42,12 @@ TIPS = {
     "matches.",
     "axis": "The axis that the mesh repeats about, for rotational periodicity.",
     "origin": "A point on that axis.",
-    "steps": "Into how many equal parts the motion is divided; more steps take longer and keep "
-    "large motions valid.",
-    "influence_factor": "How far a boundary node reaches into the mesh, as a multiple of the "
-    "mesh's largest extent.",
-    "feature_angle_deg": "A boundary that turns by more than this angle has an edge there, which "
-    "sliding nodes do not cross.",
-    "quality_metric": "How cells are judged: Knupp's published size-skew, or as the program "
-    "RBF-SliDe computes it for hexahedra.",
+    "steps": "Into how many equal parts the motion is divided: more keep large motions valid and "
+    "take longer; automatic (0) takes as few as give no inverted cell.",
+    "reduction": "Interpolate with some of the boundary nodes, as many as the tolerance needs, and "
+    "correct the rest: for meshes whose boundary has more than some thousand nodes.",
+    "tolerance": "The largest error at the boundary that the control nodes may leave to the "
+    "correction, in the mesh's length unit.",
 }
 
 
@@ -43,8 +57,9 @@ class MethodPanel(QWidget):
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.store = store
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 4)
+        self._mesh = None
+        self._reduction: Reduction | None = None
+        layout = self._make_scroll()
         self.form = QFormLayout()
         self.form.setVerticalSpacing(4)
         self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
@@ -54,9 +69,26 @@ class MethodPanel(QWidget):
         self.reason.setWordWrap(True)
         self.reason.setProperty("hint", True)
         layout.addWidget(self.reason)
+        self.more = MoreSettings()
+        self.more.changed.connect(self._set)
+        layout.addWidget(self.more)
         layout.addStretch(1)
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
+
+    def _make_scroll(self) -> QVBoxLayout:
+        outside = QVBoxLayout(self)
+        outside.setContentsMargins(0, 0, 0, 0)
+        self.scroll = QScrollArea()
+        self.scroll.setWidgetResizable(True)
+        self.scroll.setFrameShape(QFrame.Shape.NoFrame)
+        self.scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        outside.addWidget(self.scroll)
+        inside = QWidget()
+        self.scroll.setWidget(inside)
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(6, 6, 6, 4)
+        return layout
 
     def _make_fields(self) -> None:
         self.sliding = Choice({"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"})
@@ -76,13 +108,17 @@ class MethodPanel(QWidget):
         self.found = QLabel()
         self.found.setWordWrap(True)
         self.found.setProperty("hint", True)
-        self.steps = QSpinBox()
+        self.steps = StepsBox()
         self.steps.setRange(0, MAX_STEPS)
         self.steps.setSpecialValueText("automatic")
         self.steps.setMinimumHeight(self.sliding.sizeHint().height())
-        self.influence_factor = NumberField(2.5, positive)
-        self.feature_angle_deg = NumberField(40.0, angle_limit)
-        self.quality_metric = Choice({"knupp": "Knupp", "rbf-slide": "as RBF-SliDe"})
+        self.reduction = QCheckBox("few control nodes")
+        self.tolerance = NumberField(1e-3, positive)
+        self.tolerance_hint = QLabel()
+        self.tolerance_hint.setProperty("hint", True)
+        self.guess_text = QLabel()
+        self.guess_text.setWordWrap(True)
+        self.guess_text.setProperty("hint", True)
         rows = (
             ("Sliding", "sliding"),
             ("Periodicity", "periodic"),
@@ -93,36 +129,32 @@ class MethodPanel(QWidget):
         for title, name in rows:
             self._add_row(title, name)
         self.form.addRow("", self.found)
-        rows = (
-            ("Steps", "steps"),
-            ("Support radius ×", "influence_factor"),
-            ("Feature angle (°)", "feature_angle_deg"),
-            ("Quality", "quality_metric"),
-        )
-        for title, name in rows:
-            self._add_row(title, name)
+        self._add_row("Steps", "steps")
+        self._add_row("Data reduction", "reduction")
+        both = QWidget()
+        line = QHBoxLayout(both)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.addWidget(self.tolerance, 1)
+        line.addWidget(self.tolerance_hint)
+        self._add_row("Tolerance", "tolerance", both)
+        self.form.addRow(self.guess_text)
         self._connect()
 
-    def _add_row(self, title: str, name: str) -> None:
+    def _add_row(self, title: str, name: str, widget: QWidget | None = None) -> None:
         label, field = QLabel(title), getattr(self, name)
         field.setObjectName(name)
-        label.setToolTip(TIPS[name.removesuffix("_")])
-        self._tip(field, TIPS[name])
-        self.form.addRow(label, field)
-
-    def _tip(self, field: QWidget, text: str) -> None:
-        if hasattr(field, "set_tip"):
-            field.set_tip(text)
-        field.setToolTip(text)
+        label.setToolTip(TIPS[name])
+        set_tip(field, TIPS[name])
+        self.form.addRow(label, widget or field)
 
     def _connect(self) -> None:
-        for name in ("sliding", "periodic", "periodic_type", "quality_metric"):
+        for name in ("sliding", "periodic", "periodic_type"):
             getattr(self, name).chosen.connect(lambda value, name=name: self._set(name, value))
-        for name in ("influence_factor", "feature_angle_deg"):
-            getattr(self, name).changed.connect(lambda value, name=name: self._set(name, value))
         self.axis.changed.connect(self._axis_changed)
         self.origin.changed.connect(lambda value: self._set("origin", value))
         self.steps.valueChanged.connect(lambda value: self._set("steps", value))
+        self.reduction.toggled.connect(self._reduction_toggled)
+        self.tolerance.changed.connect(self._tolerance_changed)
 
     def _set(self, name: str, value: object) -> None:
         if getattr(self.store.session.case, name) != value:
@@ -132,14 +164,22 @@ class MethodPanel(QWidget):
         if any(value):
             self._set("axis", value)
 
+    def _reduction_toggled(self, on: bool) -> None:
+        # What was set before it was switched off comes back with it.
+        mesh = self.store.session.mesh
+        first = self._reduction or (changes.suggested_reduction(mesh) if mesh else Reduction())
+        self._set("reduction", first if on else None)
+
+    def _tolerance_changed(self, value: float) -> None:
+        given = self.store.session.case.reduction or Reduction()
+        self._set("reduction", replace(given, tolerance=value, relative=None))
+
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
         """Show the session."""
         case = session.case
-        for name in ("sliding", "periodic", "periodic_type", "quality_metric"):
-            getattr(self, name).show_value(getattr(case, name))
-        for name in ("influence_factor", "feature_angle_deg"):
+        for name in ("sliding", "periodic", "periodic_type"):
             getattr(self, name).show_value(getattr(case, name))
         self.axis.show_value(case.axis)
         self.origin.show_value(case.origin)
@@ -147,10 +187,31 @@ class MethodPanel(QWidget):
             self.steps.blockSignals(True)
             self.steps.setValue(case.steps)
             self.steps.blockSignals(False)
+        self._sync_reduction(session)
+        self.more.sync(session)
         self._sync_reasons(session)
         text = found_text(session)
         self.found.setText(text)
         self.form.setRowVisible(self.found, bool(text))
+
+    def _sync_reduction(self, session: Session) -> None:
+        given = session.case.reduction
+        if session.mesh is not self._mesh:
+            self._mesh, self._reduction = session.mesh, None
+        self._reduction = given or self._reduction
+        self.reduction.blockSignals(True)
+        self.reduction.setChecked(given is not None)
+        self.reduction.blockSignals(False)
+        enable(self.tolerance, "" if given else NO_REDUCTION, TIPS["tolerance"])
+        extent = session.mesh.extent if session.mesh is not None else 0.0
+        if self._reduction is not None:
+            of_extent = self._reduction.relative
+            absolute = of_extent * extent if of_extent else self._reduction.tolerance
+            self.tolerance.show_value(float(f"{absolute:.6g}"))
+        part = f"{self.tolerance.value / extent:.3g} of the extent" if extent and given else ""
+        self.tolerance_hint.setText(part)
+        self.guess_text.setText(session.reduction_guess)
+        self.form.setRowVisible(self.guess_text, bool(session.reduction_guess))
 
     def _sync_reasons(self, session: Session) -> None:
         case = session.case
@@ -168,9 +229,7 @@ class MethodPanel(QWidget):
             ("axis", no_axis),
             ("origin", no_axis),
         ):
-            field = getattr(self, name)
-            field.setEnabled(not why)
-            self._tip(field, f"Not available: {why}." if why else TIPS[name])
+            enable(getattr(self, name), why, TIPS[name])
         for name in ("axis", "origin"):
             self.form.setRowVisible(getattr(self, name), not no_axis)
         reasons = list(
@@ -184,6 +243,13 @@ class MethodPanel(QWidget):
             "\n".join(reasons) if session.mesh is not None else "Open a mesh first."
         )
         self.reason.setVisible(bool(self.reason.text()))
+
+
+class StepsBox(QSpinBox):
+    """The number of steps; the wheel scrolls the panel instead of changing it."""
+
+    def wheelEvent(self, event) -> None:
+        event.ignore()
 
 
 def _kinds(session: Session) -> set[str]:

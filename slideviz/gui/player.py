@@ -125,7 +125,11 @@ def result_text(session: Session) -> str:
     if frame is None:
         return ""
     quality = frame.quality
-    parts = [f"min <b>{quality.min:.4f}</b>", f"mean <b>{quality.mean:.4f}</b>"]
+    parts = []
+    if session.ran is not None and not session.ran.steps and session.deformed is not None:
+        count = len(session.frames) - 1
+        parts.append(f"automatic: <b>{count}</b> step{'s' if count > 1 else ''}")
+    parts += [f"min <b>{quality.min:.4f}</b>", f"mean <b>{quality.mean:.4f}</b>"]
     bad = quality.inverted
     colour = " style='color:#e8112d'" if bad else ""
     parts.append(f"<span{colour}>inverted <b>{bad}</b> of {len(quality):,}</span>")

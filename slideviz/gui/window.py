@@ -37,7 +37,7 @@ from slideviz.gui.worker import JobRunner
 from slideviz.view import changes, jobs
 from slideviz.view.ghosts import Ghosts
 from slideviz.view.scene import Scene
-from slideviz.view.state import Session
+from slideviz.view.state import Frame, Session
 from slideviz.view.store import Store
 
 log = logging.getLogger("slideviz")
@@ -217,7 +217,10 @@ class MainWindow(QMainWindow):
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
         self.store.put(session)
         self.view.render()
-        self.say(f"Opened {(session.case.source or session.path).name}")
+        if session.reduction_guess:
+            log.info("%s", session.reduction_guess)
+        note = f". {session.reduction_guess}" if session.reduction_guess else ""
+        self.say(f"Opened {(session.case.source or session.path).name}{note}")
 
     # Jobs ------------------------------------------------------------------------------
 
@@ -242,7 +245,7 @@ class MainWindow(QMainWindow):
         self.store.change(changes.start_run)
         if session.view.colour_by == "role":
             self.store.change(changes.set_view, colour_by="size_skew")
-        log.info("run: sliding %s, periodic %s, %d steps", *_settings(session))
+        log.info("run: sliding %s, periodic %s, %s steps", *_settings(session))
         self.start_job("Starting", self._run_done, jobs.compute, session.case, session.mesh)
 
     def cancel(self) -> None:
@@ -287,7 +290,10 @@ class MainWindow(QMainWindow):
         if frame is None:
             return
         quality = frame.quality
-        text = f"min {quality.min:.4f}, mean {quality.mean:.4f}, {quality.inverted} inverted"
+        text = (
+            f"{_steps_text(frame)}min {quality.min:.4f}, mean {quality.mean:.4f}, "
+            f"{quality.inverted} inverted"
+        )
         log.info("done: %s", text)
         warnings = frame.step.warnings
         for warning in warnings:
@@ -408,5 +414,14 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
 
-def _settings(session: Session) -> tuple[str, str, int]:
-    return session.case.sliding, session.case.periodic, session.case.steps
+def _settings(session: Session) -> tuple[str, str, object]:
+    return session.case.sliding, session.case.periodic, session.case.steps or "automatic"
+
+
+def _steps_text(frame: Frame) -> str:
+    """Return how many steps an automatic run took, and what else it tried; else nothing."""
+    if frame.step is None or not frame.step.tried:
+        return ""
+    count = frame.step.total
+    tried = ", ".join(str(trial.steps) for trial in frame.step.tried)
+    return f"{count} step{'s' if count > 1 else ''} (automatic, tried {tried}); "

@@ -7,10 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from slideviz.case.model import Case, FromFile, Motion, Role
+import numpy as np
+
+from slideviz.case.model import Case, FromFile, Motion, Reduction, Role
+from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.view.guess import guess_case, guess_roles
 from slideviz.view.state import Frame, Session, ViewState
+
+MANY_NODES = 20_000
+"""Boundary nodes from which on a mesh is opened with data reduction."""
+
+RELATIVE_TOLERANCE = 1e-5
 
 Place = Literal["open", "boundaries", "motion", "method"]
 
@@ -33,7 +41,28 @@ def open_mesh(
     listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
-    return Session(mesh, path, chosen, guesses, tuple(pairs), (first,), saved=chosen)
+    session = Session(mesh, path, chosen, guesses, tuple(pairs), (first,), saved=chosen)
+    return session if case is not None else _guess_reduction(session, mesh)
+
+
+def _guess_reduction(session: Session, mesh: Mesh) -> Session:
+    """Return the session with data reduction where all boundary nodes would be too many."""
+    if not mesh.markers:
+        return session
+    count = len(np.unique(np.concatenate([marker.nodes for marker in mesh.markers])))
+    if count <= MANY_NODES:
+        return session
+    case = session.case.change(reduction=suggested_reduction(mesh))
+    why = (
+        f"Data reduction is a guess: without it, {count:,} boundary nodes would need up to "
+        f"{2.6 * 8 * count**2 / 1e9:.0f} GB of memory."
+    )
+    return replace(session, case=case, saved=case, reduction_guess=why)
+
+
+def suggested_reduction(mesh: Mesh) -> Reduction:
+    """Return data reduction with a tolerance that suits the size of the mesh: 1e-5 of it."""
+    return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
 
 
 def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
@@ -61,7 +90,8 @@ def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
 
 def set_case(session: Session, **values: Any) -> Session:
     """Return the session with other settings of the case."""
-    return replace(session, case=session.case.change(**values))
+    guess = "" if "reduction" in values else session.reduction_guess
+    return replace(session, case=session.case.change(**values), reduction_guess=guess)
 
 
 def add_motion(session: Session, motion: Motion) -> Session:

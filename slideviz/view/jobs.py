@@ -105,7 +105,14 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         # Sliding solves more than once in a step; a bar that runs back would look broken.
         furthest = max(furthest, overall(now))
         phase = PHASES.get(now.phase, now.phase)
-        report(Doing(f"Step {now.step} of {now.total}: {phase}", furthest))
+        if case.steps:
+            report(Doing(f"Step {now.step} of {now.total}: {phase}", furthest))
+        elif now.phase == "classify":
+            report(Doing(f"Automatic steps: {phase}"))
+        else:
+            # Nobody knows how many numbers will be tried: the bar only says that it goes on.
+            tried = f"{now.total} step{'s' if now.total > 1 else ''}"
+            report(Doing(f"Trying {tried}: step {now.step}, {phase}"))
 
     for step in deform(case, mesh, progress=progress):
         report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))

@@ -110,6 +110,8 @@ class Session:
         What is on disk, or what was there at the start.
     unsaved_mesh : bool
         Steps were computed and their mesh has not been written.
+    reduction_guess : str
+        Why data reduction was switched on without being asked for; empty when it was not.
     """
 
     mesh: Mesh | None = None
@@ -122,6 +124,7 @@ class Session:
     saved: Case | None = None
     unsaved_mesh: bool = False
     view: ViewState = field(default_factory=ViewState)
+    reduction_guess: str = ""
 
     @property
     def frame(self) -> Frame | None:

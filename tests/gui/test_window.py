@@ -10,7 +10,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QMenu
 
 from slideviz import Case, read
-from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.view import changes, jobs
 
 
@@ -350,16 +350,19 @@ def test_settings_reach_the_case(opened):
     opened.choose(method.sliding, "ds")
     opened.choose(method.periodic, "moving")
     opened.choose(method.periodic_type, "translational")
-    opened.choose(method.quality_metric, "rbf-slide")
     method.steps.selectAll()
     QTest.keyClicks(method.steps, "12")
     opened.window.docks["method"].raise_()
-    opened.type(method.influence_factor, "3.5")
-    opened.type(method.feature_angle_deg, "35")
+    opened.click(method.more.button)
+    more = method.more
+    opened.choose(more.kernel, "wendland-c4")
+    opened.choose(more.quality_metric, "rbf-slide")
+    opened.type(more.influence_factor, "3.5")
+    opened.type(more.feature_angle_deg, "35")
     case = opened.session.case
     assert (case.sliding, case.periodic, case.periodic_type) == ("ds", "moving", "translational")
     assert (case.steps, case.influence_factor, case.feature_angle_deg) == (12, 3.5, 35.0)
-    assert case.quality_metric == "rbf-slide"
+    assert (case.quality_metric, case.kernel) == ("rbf-slide", "wendland-c4")
     assert "λ =" in method.found.text()
 
 
@@ -377,13 +380,70 @@ def test_what_is_not_available_says_why(opened):
 
 
 def test_impossible_numbers_are_marked_and_not_taken(opened):
-    field = opened.window.method.influence_factor
+    field = opened.window.method.more.influence_factor
     opened.window.docks["method"].raise_()
+    opened.click(opened.window.method.more.button)
     field.selectAll()
     QTest.keyClicks(field, "-1")
     assert field.property("bad")
     assert "greater than 0" in field.toolTip()
     assert opened.session.case.influence_factor == 2.5
+
+
+def test_data_reduction_has_a_tolerance_and_keeps_its_settings(opened):
+    method, more = opened.window.method, opened.window.method.more
+    opened.window.docks["method"].raise_()
+    opened.click(more.button)
+    assert not method.tolerance.isEnabled()
+    assert "data reduction is off" in method.tolerance.toolTip()
+    assert "data reduction is off" in more.selection.toolTip()
+    method.reduction.click()
+    given = opened.session.case.reduction
+    extent = opened.session.mesh.extent
+    assert given.tolerance == pytest.approx(1e-5 * extent, rel=0.05)
+    assert "of the extent" in method.tolerance_hint.text()
+    opened.type(method.tolerance, "0.002")
+    opened.choose(more.selection, "double")
+    opened.choose(more.levels, "tol")
+    opened.type(more.level_end, "2")
+    assert opened.session.case.reduction.level_tolerance == 0.5, "2 is no part"
+    opened.type(more.level_end, "0.25")
+    opened.type(more.gamma, "30")
+    wanted = Reduction(0.002, True, "tol", 0.25, selection="double", gamma=30.0)
+    assert opened.session.case.reduction == wanted
+    method.reduction.click()
+    assert opened.session.case.reduction is None
+    method.reduction.click()
+    assert opened.session.case.reduction == wanted
+
+
+def test_a_relative_tolerance_is_shown_in_length_and_becomes_absolute_when_typed(opened):
+    method, extent = opened.window.method, opened.session.mesh.extent
+    opened.window.docks["method"].raise_()
+    given = Reduction(relative=1e-4, gamma=20.0)
+    opened.window.store.change(changes.set_case, reduction=given)
+    assert method.tolerance.value == pytest.approx(1e-4 * extent, rel=1e-5)
+    opened.type(method.tolerance, "0.25")
+    assert opened.session.case.reduction == Reduction(0.25, gamma=20.0)
+
+
+def test_all_kernels_can_be_chosen(opened):
+    kernel = opened.window.method.more.kernel
+    assert kernel.count() == 14
+    assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}
+
+
+def test_a_guessed_data_reduction_says_why_until_it_is_changed(opened, monkeypatch):
+    monkeypatch.setattr(changes, "MANY_NODES", 10)
+    opened.open(opened.session.path)
+    method = opened.window.method
+    opened.window.docks["method"].raise_()
+    assert method.reduction.isChecked()
+    assert "boundary nodes" in method.guess_text.text()
+    assert "Data reduction is a guess" in opened.window.statusBar().currentMessage()
+    opened.type(method.tolerance, "0.01")
+    assert not method.guess_text.text()
+    assert opened.session.case.reduction.tolerance == 0.01
 
 
 # Running ----------------------------------------------------------------------------------
@@ -420,6 +480,23 @@ def test_a_run_shows_its_steps_and_the_quality(ready):
     assert "inverted <b>0</b>" in text
     assert window.windowTitle().startswith("*")
     assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
+
+
+def test_an_automatic_run_says_how_many_steps_it_took(ready):
+    window = ready.window
+    window.docks["method"].raise_()
+    window.method.steps.setValue(0)
+    assert window.method.steps.text() == "automatic"
+    ready.click(window.run_panel.run)
+    ready.settle()
+    frames = ready.session.frames
+    count = len(frames) - 1
+    assert count == frames[-1].step.total >= 1
+    assert [frame.step.index for frame in frames[1:]] == list(range(1, count + 1))
+    assert f"automatic: <b>{count}</b> step" in window.player.result.text()
+    assert window.player.step_text.text() == f"Step {count} of {count}"
+    assert f"Done: {count} step" in window.statusBar().currentMessage()
+    assert len(frames[-1].step.tried) >= 2
 
 
 def test_the_slider_the_buttons_and_the_keys_show_steps(ready):

@@ -55,6 +55,20 @@ def test_computing_reports_every_step_with_its_quality(tmp_path):
     assert fractions == sorted(fractions)
 
 
+def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(tmp_path):
+    write_sample("passage", tmp_path, size=12)
+    case = Case.read(tmp_path / "passage.cfg").change(steps=0)
+    heard = []
+    jobs.compute(case, read(case.mesh_file), heard.append, never)
+    frames = [item for item in heard if isinstance(item, Frame)]
+    assert len(frames) == frames[-1].step.total
+    texts = [item.text for item in heard if isinstance(item, jobs.Doing)]
+    assert any(text.startswith("Trying 1 step: step 1, ") for text in texts)
+    assert any(text.startswith("Trying 2 steps: step 2, ") for text in texts)
+    trying = [i for i in heard if isinstance(i, jobs.Doing) and i.text.startswith("Trying")]
+    assert {doing.fraction for doing in trying} == {None}
+
+
 def test_computing_stops_when_asked_and_keeps_what_was_reported(tmp_path):
     write_sample("passage", tmp_path, size=12)
     case = Case.read(tmp_path / "passage.cfg").change(steps=50)
