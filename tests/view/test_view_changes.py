@@ -132,8 +132,8 @@ def test_what_is_missing_is_told_in_the_order_of_work(session):
 def test_what_the_case_finds_wrong_is_passed_on(session):
     session = changes.set_role(session, ("left",), "moving")
     session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
-    (missing,) = changes.is_missing(changes.set_case(session, steps=0))
-    assert "0" in missing.text
+    (missing,) = changes.is_missing(changes.set_case(session, steps=-1))
+    assert "-1" in missing.text
 
 
 @pytest.mark.parametrize(
