@@ -13,6 +13,8 @@ from slideviz.view.jobs import Doing
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
+LONG = 100
+
 
 class RunPanel(QWidget):
     """Starts and cancels a run; says what a run still needs, as a link to where it is given."""
@@ -62,7 +64,7 @@ class RunPanel(QWidget):
     def sync(self, session: Session) -> None:
         """Show whether a run can start, and if not what it needs."""
         # Some checks look at the mesh: not again while only the view changes.
-        key = (session.mesh, session.case)
+        key = (session.mesh, session.case, session.clash)
         if key != getattr(self, "_key", None):
             self._key = key
             self._missing = is_missing(session)
@@ -76,7 +78,7 @@ class RunPanel(QWidget):
         if self._missing:
             first = self._missing[0]
             more = len(self._missing) - 1
-            text = html.escape(first.text)
+            text = html.escape(_short(first.text))
             self.text.setText(
                 f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
             )
@@ -90,6 +92,12 @@ class RunPanel(QWidget):
             self.text.setText("Settings changed since the last run.")
         else:
             self.text.setText("Done." if session.deformed else "Ready.")
+
+    def take_theme(self) -> None:
+        """Show the text in the colours of another theme: those of a link are kept otherwise."""
+        text = self.text.text()
+        self.text.clear()
+        self.text.setText(text)
 
     def set_busy(self, what: str) -> None:
         """Show that a job runs (its name), or with an empty text that none does."""
@@ -117,3 +125,8 @@ class RunPanel(QWidget):
         """Show that the job was asked to stop."""
         self.cancel.setEnabled(False)
         self.text.setText("Cancelling…")
+
+
+def _short(text: str) -> str:
+    """Return a text that fits beside the button: a long one without its remedy, a tooltip's."""
+    return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."

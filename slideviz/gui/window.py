@@ -25,6 +25,7 @@ from slideviz.gui import theme
 from slideviz.gui.actions import Actions
 from slideviz.gui.boundaries import BoundariesPanel, boundary_menu
 from slideviz.gui.canvas import View3D
+from slideviz.gui.clash import ClashWatch
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.files import Files
 from slideviz.gui.log import LogPanel
@@ -77,6 +78,7 @@ class MainWindow(QMainWindow):
         self.set_theme(str(self.settings.value("theme", "system")))
         self._restore()
         self.store.listen(self._session_changed)
+        self.clash_watch = ClashWatch(self.store, self)
         self.sync_actions()
 
     # Parts -----------------------------------------------------------------------------
@@ -382,6 +384,7 @@ class MainWindow(QMainWindow):
         self.actions_.by_name[f"theme_{name}"].setChecked(True)
         self.player.set_icon_colour(colour)
         self.motions.set_icon_colour(colour)
+        self.run_panel.take_theme()
         self.scene.set_look(look)
         self.view.render()
 
@@ -408,6 +411,7 @@ class MainWindow(QMainWindow):
             self.settings.setValue("state", self.saveState())
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
+            self.clash_watch.close()
             self.runner.close()
             self.log.detach()
             self.view.close()

@@ -202,6 +202,8 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
         found.append(Missing(text, "method"))
     if not found:
         found = [Missing(text, "boundaries") for text in _problems(session)]
+    if not found and session.clash:
+        found = [Missing(session.clash, "motion")]
     return tuple(found)
 
 

@@ -28,6 +28,8 @@ COLOUR_MAP = "viridis"
 
 INVERTED_COLOUR = "#e8112d"
 SELECTED_COLOUR = "#ffb000"
+CLASH_COLOUR = "#e8112d"
+"""The motion ghost where it runs into another boundary."""
 
 
 @dataclass(frozen=True)

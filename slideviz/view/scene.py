@@ -16,7 +16,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.view import actors, pick
 from slideviz.view.actors import LIFT, VALUES, Drawn
 from slideviz.view.legend import STRIP, add_colour_bar, add_role_legend, clear_legend
-from slideviz.view.look import LIGHT, ROLE_COLOURS, SELECTED_COLOUR, Look
+from slideviz.view.look import CLASH_COLOUR, LIGHT, ROLE_COLOURS, SELECTED_COLOUR, Look
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.surfaces import Surface
 
@@ -255,6 +255,8 @@ class Scene:
             if actor is None:
                 actor = self._add_ghost(f"motion:{name}", one.surface, ROLE_COLOURS["moving"], 0.55)
             actors.place(actor.mapper.dataset, points, 3 * self._lift)
+            actor.prop.color = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
+            actor.prop.line_width = 4.5 if session.clash else 2.5
             actor.visibility = shown and name not in session.view.hidden
 
     def _draw_undeformed(self, session: Session) -> None:

@@ -112,6 +112,8 @@ class Session:
         Steps were computed and their mesh has not been written.
     reduction_guess : str
         Why data reduction was switched on without being asked for; empty when it was not.
+    clash : str
+        What the motions put through what, in a sentence; empty as far as is known.
     """
 
     mesh: Mesh | None = None
@@ -125,6 +127,7 @@ class Session:
     unsaved_mesh: bool = False
     view: ViewState = field(default_factory=ViewState)
     reduction_guess: str = ""
+    clash: str = ""
 
     @property
     def frame(self) -> Frame | None:

@@ -291,6 +291,49 @@ def test_a_scaling(opened):
     assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
 
 
+def test_a_clash_is_told_while_the_motion_is_typed(opened):
+    from slideviz.view.look import CLASH_COLOUR, ROLE_COLOURS
+
+    window, panel = opened.window, opened.window.run_panel
+    opened.add_motion(Translate)
+    field = window.motions.editor.vector.fields[1]
+    opened.type(field, "0.01")
+    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    assert panel.run.isEnabled()
+    ghost = window.scene.plotter.actors["motion:airfoil"]
+    assert ghost.prop.color == ROLE_COLOURS["moving"]
+    opened.type(field, "-0.4")
+    opened.qtbot.waitUntil(lambda: not panel.run.isEnabled())
+    assert "puts airfoil through periodic_1" in panel.text.text()
+    assert "move airfoil less" in panel.text.toolTip()
+    assert ghost.prop.color == CLASH_COLOUR
+    assert "href='motion'" in panel.text.text()
+    opened.type(field, "0.02")
+    opened.qtbot.waitUntil(panel.run.isEnabled)
+    assert ghost.prop.color == ROLE_COLOURS["moving"]
+    assert panel.text.text() == "Ready."
+
+
+def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
+    from slideviz.view import clashes
+
+    window, asked = opened.window, []
+
+    def listening(case, mesh, report, stopped):
+        asked.append(case.motions[0].vector[1])
+        return ""
+
+    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    monkeypatch.setattr(clashes, "find_clash", listening)
+    opened.add_motion(Translate)
+    field = window.motions.editor.vector.fields[1]
+    field.selectAll()
+    QTest.keyClicks(field, "0.123456")
+    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    assert asked[-1] == 0.123456
+    assert len(asked) <= 2
+
+
 def test_a_displacement_file(opened, tmp_path):
     node = int(opened.session.mesh.marker("airfoil").nodes[0])
     file = tmp_path / "d.txt"

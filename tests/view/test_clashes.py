@@ -1,0 +1,56 @@
+from pathlib import Path
+
+import pytest
+
+from slideviz.case.model import Case, FromFile, Translate
+from slideviz.view import changes
+from slideviz.view.clashes import clash_key, find_clash, set_clash
+
+
+def look(case, mesh, stopped=False):
+    return find_clash(case, mesh, lambda _: None, lambda: stopped)
+
+
+@pytest.fixture
+def shifted(passage):
+    """The passage with its blade moved by so much."""
+
+    def make(by):
+        motion = Translate("airfoil", (0.0, by))
+        return passage.case.change(motions=(motion,), periodic="none", sliding="none")
+
+    return make
+
+
+def test_a_clash_is_a_sentence_with_a_place_and_a_remedy(shifted, passage):
+    text = look(shifted(-0.4), passage.mesh)
+    assert text.startswith("The motion puts airfoil through periodic_1 near (")
+    assert text.endswith(").")
+    assert "; move airfoil less" in text
+
+
+def test_there_is_none_where_there_is_none(shifted, passage):
+    assert look(shifted(0.001), passage.mesh) == ""
+    assert look(shifted(-0.4), passage.mesh, stopped=True) == ""
+    assert look(shifted(-0.4).change(motions=()), passage.mesh) == ""
+
+
+def test_other_problems_of_the_case_are_told_elsewhere(passage):
+    wrong = Case(roles={"airfoil": "moving"}, motions=(Translate("airfoil", (1.0, 0.0, 0.0)),))
+    assert look(wrong, passage.mesh) == ""
+    lost = Case(roles={"airfoil": "moving"}, motions=(FromFile(Path("/none"), "airfoil"),))
+    assert look(lost, passage.mesh) == ""
+
+
+def test_a_clash_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
+    session = changes.set_role(session, ["bottom"], "moving")
+    session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
+    assert not changes.is_missing(session)
+    key = clash_key(session)
+    told = set_clash(session, "It clashes.", key)
+    assert [(m.text, m.place) for m in changes.is_missing(told)] == [("It clashes.", "motion")]
+    assert not changes.is_missing(set_clash(told, "", key))
+    later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
+    assert set_clash(later, "It clashes.", key) is later
+    assert clash_key(changes.set_case(session, steps=7)) == key
+    assert clash_key(changes.set_role(session, ["top"], "internal")) != key
