@@ -12,6 +12,9 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.icons import logo
 from slideviz.gui.window import MainWindow
 
+WARM_UP_MS = 300
+"""The window is drawn first: compilation slows everything down a little."""
+
 log = logging.getLogger("slideviz")
 
 
@@ -33,6 +36,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     previous = sys.excepthook
     sys.excepthook = lambda kind, error, trace: _unexpected(window, kind, error, trace)
     window.show()
+    QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
     if path is not None:
         QTimer.singleShot(0, lambda: window.files.open_path(path))
         if run:

@@ -34,6 +34,7 @@ from slideviz.gui.motions import MotionPanel
 from slideviz.gui.player import Player
 from slideviz.gui.run import RunPanel
 from slideviz.gui.start import StartPage
+from slideviz.gui.warm import WarmUp
 from slideviz.gui.worker import JobRunner
 from slideviz.view import changes, jobs
 from slideviz.view.ghosts import Ghosts
@@ -79,6 +80,8 @@ class MainWindow(QMainWindow):
         self._restore()
         self.store.listen(self._session_changed)
         self.clash_watch = ClashWatch(self.store, self)
+        self.warm_up = WarmUp(self)
+        self.warm_up.compiling.connect(self.preparing.setVisible)
         self.sync_actions()
 
     # Parts -----------------------------------------------------------------------------
@@ -142,6 +145,10 @@ class MainWindow(QMainWindow):
 
     def _make_status(self) -> None:
         self.mesh_text = QLabel()
+        self.preparing = QLabel("Preparing… ")
+        self.preparing.setToolTip("The numerics are compiled, once after each installation.")
+        self.preparing.hide()
+        self.statusBar().addPermanentWidget(self.preparing)
         self.statusBar().addPermanentWidget(self.mesh_text)
         self.statusBar().setSizeGripEnabled(False)
 
@@ -411,6 +418,7 @@ class MainWindow(QMainWindow):
             self.settings.setValue("state", self.saveState())
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
+            self.warm_up.close()
             self.clash_watch.close()
             self.runner.close()
             self.log.detach()

@@ -1,0 +1,63 @@
+"""Tiny deformations that make Numba compile, or load, its loops before the user needs them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+from slideviz.case.model import Case, Sliding, Translate
+from slideviz.case.samples import sample
+from slideviz.errors import Cancelled, SlidevizError
+from slideviz.view.jobs import Stopped, require_going
+
+_RUNS: tuple[tuple[str, Sliding], ...] = (
+    # The first compiles nearly everything: curved boundaries, and angles in the distance.
+    ("cylindrical", "ps"),
+    ("cylindrical", "ds"),
+    ("hexahedron", "ps"),
+    ("square", "ps"),
+)
+"""Samples and methods that need every loop between them."""
+
+
+def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
+    """Deform some cells of the samples, in memory.
+
+    Parameters
+    ----------
+    compiling
+        Called when something is really compiled; never when all comes from the cache on disk.
+    stopped
+        Asked between and within the deformations; compilation itself cannot be interrupted.
+    """
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, _: object) -> None:
+            compiling()
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    # What fails here fails again in the user's run, and is told there.
+    with (
+        contextlib.suppress(Cancelled, SlidevizError),
+        event.install_listener("numba:compile", Listener()),
+    ):
+        for name, sliding in _RUNS:
+            require_going(stopped)
+            _deform(name, sliding, stopped)
+
+
+def _deform(name: str, sliding: Sliding, stopped: Stopped) -> None:
+    from slideviz.staircase import deform
+
+    made = sample(name, size=4)
+    mesh = made.mesh
+    (block,) = made.case.markers_with("moving")
+    motion = Translate(block, (1e-3 * mesh.extent,) * mesh.dim)
+    case: Case = made.case.change(
+        motions=(motion,), steps=1, sliding=sliding, periodic="moving", reduction=None
+    )
+    for _ in deform(case, mesh, progress=lambda _: require_going(stopped)):
+        pass

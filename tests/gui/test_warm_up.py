@@ -1,0 +1,88 @@
+"""Compilation beside the window."""
+
+import os
+import subprocess
+import sys
+from threading import Event, current_thread, main_thread
+
+import pytest
+
+from slideviz.view import warmup
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """A warm-up that compiles when told to, and goes on until told to end."""
+
+    class Work:
+        compile, end, stopped = Event(), Event(), None
+
+        def __call__(self, compiling, stopped):
+            self.stopped, self.thread = stopped, current_thread()
+            assert self.compile.wait(20)
+            compiling()
+            compiling()
+            assert self.end.wait(20)
+
+    made = Work()
+    made.compile, made.end = Event(), Event()
+    monkeypatch.setattr(warmup, "warm_up", made)
+    yield made
+    made.compile.set()
+    made.end.set()
+
+
+def test_a_window_does_not_warm_up_by_itself(window):
+    assert window.warm_up.thread_ is None
+    assert not window.preparing.isVisible()
+
+
+def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work):
+    window.warm_up.start()
+    qtbot.wait(50)
+    assert not window.preparing.isVisible()
+    work.compile.set()
+    qtbot.waitUntil(window.preparing.isVisible)
+    assert work.thread is not main_thread()
+    assert work.thread.daemon
+    work.end.set()
+    qtbot.waitUntil(lambda: not window.preparing.isVisible())
+    first = window.warm_up.thread_
+    window.warm_up.start()
+    assert window.warm_up.thread_ is first
+
+
+def test_closing_does_not_wait_for_it(window, work):
+    window.warm_up.start()
+    assert window.close()
+    assert window.warm_up.thread_.is_alive()
+    assert work.stopped()
+
+
+def test_the_program_ends_while_it_compiles(tmp_path):
+    code = (
+        "import sys\n"
+        "from qtpy.QtCore import QCoreApplication, QSettings, QTimer\n"
+        "from qtpy.QtWidgets import QApplication\n"
+        "QSettings.setPath(QSettings.defaultFormat(), QSettings.Scope.UserScope, sys.argv[1])\n"
+        "from slideviz.gui import app\n"
+        "app.WARM_UP_MS = 0\n"
+        "def end():\n"
+        "    tops = QApplication.topLevelWidgets()\n"
+        "    window = [top for top in tops if top.objectName() == 'slideviz'][0]\n"
+        "    if not window.preparing.isVisible():\n"
+        "        return QTimer.singleShot(20, end)\n"
+        "    window.close()\n"
+        "QTimer.singleShot(0, end)\n"
+        "code = app.launch()\n"
+        "sys.exit(code)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

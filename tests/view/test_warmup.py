@@ -1,0 +1,60 @@
+import pytest
+
+from slideviz.rbf import closest, compiled
+from slideviz.view import warmup
+
+
+def signatures():
+    return {
+        name: len(loop.signatures)
+        for name, loop in (*vars(compiled).items(), *vars(closest).items())
+        if hasattr(loop, "signatures")
+    }
+
+
+def test_it_makes_the_loops_ready_that_runs_use():
+    warmup.warm_up(lambda: None, lambda: False)
+    ready = signatures()
+    for name in ("fill_matrix", "sum_three", "sum_four", "sum_rotational", "_build", "_query"):
+        assert ready[name], name
+
+
+def test_nothing_is_told_when_nothing_is_compiled():
+    warmup.warm_up(lambda: None, lambda: False)
+    told = []
+    warmup.warm_up(lambda: told.append(1), lambda: False)
+    assert not told
+
+
+def test_compilation_is_told():
+    import numba
+
+    told = []
+
+    @numba.njit
+    def fresh(x):
+        return x + 1
+
+    def deform(name, sliding, stopped):
+        fresh(len(name))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(warmup, "_deform", deform)
+        warmup.warm_up(lambda: told.append(1), lambda: False)
+    assert told
+
+
+def test_it_stops_when_asked_and_swallows_what_the_run_would_tell(monkeypatch):
+    from slideviz.errors import CaseError
+
+    done = []
+
+    def deform(name, sliding, stopped):
+        done.append(name)
+        raise CaseError("wrong")
+
+    monkeypatch.setattr(warmup, "_deform", deform)
+    warmup.warm_up(lambda: None, lambda: True)
+    assert not done
+    warmup.warm_up(lambda: None, lambda: False)
+    assert len(done) == 1
