@@ -134,6 +134,7 @@ class Climb:
         ahead = [(k / count, 0) for k in range(1, count + 1)]
         coords, done, index, folded = plan.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *plan.warnings]
+        told: list[str] = []
         watch = Watch(lambda *_: None, dict(self.seconds))
         while ahead:
             part, halvings = ahead[0]
@@ -154,7 +155,9 @@ class Climb:
                 folded = now
             coords, done, index = moved, part, index + 1
             ahead.pop(0)
-            warnings += _dropped_warning(solution, index, mesh)
+            if not told:
+                told = _dropped_warning(solution, index, mesh)
+                warnings += told
             yield self._made(index, total, points, solution, watch, warnings)
             watch = Watch(lambda *_: None, {})
 
@@ -243,7 +246,8 @@ def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
     node = int(solution.dropped[0])
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
     sentence = (
-        f"step {index}: {len(solution.dropped)} boundary nodes nearly coincide with others and "
-        f"were left out as control nodes (first: node {node} at {where}); they are set exactly"
+        f"from step {index} on, {len(solution.dropped)} boundary nodes that nearly coincide with "
+        f"others (first: node {node} at {where}) are no control nodes; they still get exactly "
+        "their displacement, so this does no harm"
     )
     return [sentence]

@@ -279,3 +279,28 @@ def test_the_first_run_says_that_it_compiles(square, capsys, monkeypatch):
     monkeypatch.undo()
     assert run(argv) == 0
     assert "compiling" not in capsys.readouterr().err
+
+
+def test_roles_that_the_method_does_not_use_are_told(square, capsys):
+    argv = ["run", str(square / "square.cfg"), "--set", "STEPS=3", "--set", "SLIDING_MODE=none"]
+    run([*argv, "--set", "PERIODIC_MODE=none", "--json", "-"])
+    out = capsys.readouterr()
+    assert "LOWER and UPPER will not repeat" in out.err
+    assert "LEFT, RIGHT will not slide" in out.err
+    assert len(json.loads(out.out)["warnings"]) == 2
+
+
+def test_without_a_screen_the_window_says_so(square, capsys, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert run([str(square / "square.cfg")]) == 1
+    err = capsys.readouterr().err
+    assert "there is no screen" in err
+    assert "slideviz run CASE" in err
+
+
+def test_meshes_are_shown_in_a_line(square):
+    mesh = sv.read(square / "mesh.su2")
+    text = repr(mesh)
+    assert "2D, 676 points, Cells(620 quadrilateral), markers: LEFT, RIGHT" in text
+    assert len(text) < 300

@@ -130,8 +130,14 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
         else:
             remark = key.kind.remark(entry.value)
             remarks += [f"{path}:{entry.line}: {name}: {remark}"] if remark else []
-    problems += _second_roles(rows, values)
+    twice = _second_roles(rows, values)
+    # What follows from a mistyped key or from two roles is not worth telling again.
+    doubtful = {key for key in KEYS for _, text in problems if f"did you mean {key}?" in text}
+    doubtful |= {"MARKER_MOVING"} if twice else set()
+    problems += twice
     for keys, sentence in contradictions(case):
+        if doubtful.intersection(keys):
+            continue
         # A key that could not be read is told already; what follows from it is not worth telling.
         if all(key in values for key in keys if key in rows):
             problems.append((next(rows[key].line for key in keys if key in rows), sentence))

@@ -64,11 +64,13 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     """
     found: list[tuple[tuple[str, ...], str]] = []
     moving = case.markers_with("moving")
+    told: set[str] = set()
     for place, motion in enumerate(case.motions, start=1):
-        if motion.marker and motion.marker not in moving:
+        if motion.marker and motion.marker not in moving and motion.marker not in told:
+            told.add(motion.marker)
             sentence = (
-                f"motion {place} names {motion.marker!r}, which does not move; list it in "
-                f"MARKER_MOVING{nearest(motion.marker, moving)}"
+                f"motion {place} names {motion.marker!r}, which does not move: MARKER_MOVING= "
+                f"({', '.join(moving)}) does not have it; one of the two is wrong"
             )
             found.append((("MOTION", "MARKER_MOVING"), sentence))
     if case.periodic_type == "rotational" and case.direction in (0, 2):
@@ -173,3 +175,20 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
             yield "PERIODIC_DIRECTION= 2 is z, and the mesh has 2 dimensions; choose x or y"
         if case.periodic_type != "translational" and any(case.axis[:2]):
             yield f"PERIODIC_AXIS= {case.axis} leaves the plane; in 2D it is z"
+
+
+def idle_roles(case: Case) -> tuple[str, ...]:
+    """Return sentences about roles that this method does not use, which is seldom meant."""
+    found = []
+    periodic, sliding = case.markers_with("periodic"), case.markers_with("sliding")
+    if periodic and case.periodic == "none":
+        found.append(
+            f"PERIODIC_MODE= none: {' and '.join(periodic)} will not repeat any more; with "
+            "PERIODIC_MODE= moving (or fixed) they do"
+        )
+    if sliding and case.sliding == "none":
+        found.append(
+            f"SLIDING_MODE= none: {', '.join(sliding)} will not slide, but stay as they are; with "
+            "SLIDING_MODE= ps or ds they do"
+        )
+    return tuple(found)

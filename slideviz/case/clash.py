@@ -42,8 +42,8 @@ def jump(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | 
         hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)
         if hit is not None:
             return (
-                f"on its straight way {name} goes through {hit.marker} near {_place(hit)}; "
-                "cells there will be inverted unless the way is another in truth"
+                f"{name} goes through {hit.marker} near {_place(hit)} on its way; cells will be "
+                "inverted there, unless its real path is not straight and goes around"
             )
     return None
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,9 +31,18 @@ def window(arguments: argparse.Namespace) -> int:
             f"{arguments.file}: there is no such file, and no such command "
             f"(commands: {', '.join(COMMANDS)})"
         )
+    if sys.platform.startswith("linux") and not _has_screen():
+        raise CaseError(
+            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set); `slideviz run CASE` "
+            "works without one"
+        )
     from slideviz.gui.app import launch
 
     return launch(arguments.file, run=arguments.run)
+
+
+def _has_screen() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -65,7 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture:
         from slideviz.view.picture import picture
 
-        picture(last.mesh, arguments.picture, reference=mesh, quality=found)
+        named = replace(last.mesh, name=output.name)
+        picture(named, arguments.picture, reference=mesh, quality=found)
     seconds["total"] = time.perf_counter() - begin
     report = run_report(case, mesh, steps, found, seconds)
     if arguments.history:
@@ -90,6 +102,7 @@ def _case(arguments: argparse.Namespace) -> Case:
     """Return the case of the file with the changes of ``--set`` and ``--zone``."""
     from slideviz import Case
     from slideviz.case.cfg import set_key
+    from slideviz.case.check import idle_roles
     from slideviz.errors import CaseError
 
     case = Case.read(arguments.case)
@@ -98,6 +111,7 @@ def _case(arguments: argparse.Namespace) -> Case:
         if not sign:
             raise CaseError(f"--set {text!r} is not of the form KEY=VALUE")
         case = set_key(case, key.strip(), value.strip())
+    case = case.change(warnings=(*case.warnings, *idle_roles(case)))
     return case.change(zone=arguments.zone) if arguments.zone else case
 
 
@@ -118,8 +132,6 @@ def _refuse_input(output: Path, mesh_file: Path) -> None:
 
 def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
-    from dataclasses import replace
-
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
     from slideviz.errors import CaseError
@@ -173,7 +185,9 @@ def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> N
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
     print(table(rows))
-    phases = ", ".join(f"{k} {v:.2f}" for k, v in spent.items() if k != "total" and v >= 0.005)
+    parts = {k: v for k, v in spent.items() if k != "total"}
+    parts["start and others"] = spent["total"] - sum(parts.values())
+    phases = ", ".join(f"{k} {v:.2f}" for k, v in parts.items() if v >= 0.005)
     print(f"  {spent['total']:.2f} s ({phases or 'all phases below 0.01'})")
     for name, path in files.items():
         if path:

@@ -30,7 +30,7 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     return array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cells:
     """Elements of mixed type, in file order.
 
@@ -99,6 +99,12 @@ class Cells:
         """Return the indices of all nodes used, sorted, each once: (u,)."""
         return frozen_array(np.unique(self.connectivity), np.int64)
 
+    def __repr__(self) -> str:
+        found = ", ".join(
+            f"{len(ids)} {ELEMENTS[vtk].name}" for vtk, (ids, _) in self.by_type.items()
+        )
+        return f"Cells({found})"
+
     def same_as(self, other: Cells) -> bool:
         """Tell whether both hold the same elements in the same order."""
         return np.array_equal(self.types, other.types) and np.array_equal(
@@ -119,7 +125,7 @@ class Marker:
         return self.cells.nodes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """Points, cells and boundaries of one zone.
 
@@ -154,6 +160,12 @@ class Mesh:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
             raise MeshError(f"points have shape {self.points.shape}; needed is (n, 2) or (n, 3)")
+
+    def __repr__(self) -> str:
+        return (
+            f"Mesh({self.name!r}, {self.dim}D, {len(self.points)} points, {self.cells!r}, "
+            f"markers: {', '.join(self.marker_names) or 'none'})"
+        )
 
     @property
     def dim(self) -> int:

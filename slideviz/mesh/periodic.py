@@ -65,7 +65,8 @@ class Pair:
         """Return the transformation in words, for people."""
         if self.kind == "rotational":
             return f"{np.degrees(abs(self.angle)):.6g}° about {_axis_word(self.axis)}"
-        return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in self.vector)})"
+        exact = np.where(np.abs(self.vector) > 1e-9 * self.period, self.vector, 0.0)
+        return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in exact)})"
 
 
 def _axis_word(axis: Vector) -> str:

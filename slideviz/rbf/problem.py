@@ -239,8 +239,9 @@ def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoRetur
     other = next((int(n) for n in group if n != node), node)
     raise DeformError(
         f"nodes {node} and {other} coincide (in the same place, or one period apart) but are "
-        f"asked to move differently, by {gap:.3g}; give both the same displacement, or choose "
-        "PERIODIC_MODE= none"
+        f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "
+        "periodic sides (in a rotational case: about the axis of periodicity) and may not reach "
+        "into the next passage; or choose PERIODIC_MODE= none"
     )
 
 

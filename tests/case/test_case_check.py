@@ -57,7 +57,10 @@ def test_good_cases(square, case):
         ),
         (
             good(motions=(UP, Translate("LEFT", (1.0, 0.0)))),
-            "motion 2 names 'LEFT', which does not move; list it in MARKER_MOVING",
+            (
+                "motion 2 names 'LEFT', which does not move: MARKER_MOVING= (UPPER) does not have "
+                "it; one of the two is wrong"
+            ),
         ),
         (
             good(motions=(Translate("UPPER", (0.0, 0.0, 1.0)),)),
