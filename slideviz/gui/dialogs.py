@@ -196,8 +196,11 @@ class Banner(QFrame):
         self._full = ""
         self.hide()
 
-    def tell(self, text: str, full: str = "") -> None:
-        """Show a message, with a longer text behind “Details”."""
+    def tell(self, text: str, full: str = "", calm: bool = True) -> None:
+        """Show a message, with a longer text behind “Details”; calm ones are no error."""
+        self.setProperty("calm", calm)
+        self.style().unpolish(self)
+        self.style().polish(self)
         lines = text.splitlines() or [""]
         brief = "\n".join(lines[:4]) + ("\n…" if len(lines) > 4 else "")
         self.text.setText(html.escape(brief).replace("\n", "<br>"))
@@ -211,7 +214,7 @@ class Banner(QFrame):
         full = ""
         if not isinstance(error, SlidevizError):
             full = "".join(traceback.format_exception(error))
-        self.tell(message_of(error), full)
+        self.tell(message_of(error), full, calm=False)
 
     def _show_details(self) -> None:
         self.dialog = DetailsDialog(self, self._full)

@@ -91,7 +91,7 @@ class RunPanel(QWidget):
         if session.outdated:
             self.text.setText("Settings changed since the last run.")
         else:
-            self.text.setText("Done." if session.deformed else "Ready.")
+            self.text.setText(_ended(session))
 
     def take_theme(self) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
@@ -130,3 +130,13 @@ class RunPanel(QWidget):
 def _short(text: str) -> str:
     """Return a text that fits beside the button: a long one without its remedy, a tooltip's."""
     return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."
+
+
+def _ended(session: Session) -> str:
+    """Return how the last run ended, in words."""
+    last = session.frames[-1].step if session.deformed else None
+    if last is None:
+        return "Ready."
+    if last.index < last.total:
+        return f"Stopped after step {last.index} of {last.total}."
+    return "Done."

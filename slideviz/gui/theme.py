@@ -68,6 +68,7 @@ QPushButton#run {{ background: {accent}; color: white; font-weight: 600; border:
 QPushButton#run:hover {{ background: {accent_hover}; }}
 QPushButton#run:disabled {{ background: {mid}; color: {soft}; }}
 QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
+QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
 """
 
 _EXTRA = {
@@ -83,6 +84,8 @@ _EXTRA = {
         "accent_hover": "#265c98",
         "mid": "#d9dfe5",
         "banner": "#fdeceb",
+        "note": "#eaf2fb",
+        "noted": "#8fb3dc",
     },
     "dark": {
         "title": "#30363e",
@@ -96,6 +99,8 @@ _EXTRA = {
         "accent_hover": "#4c8fd6",
         "mid": "#3a424b",
         "banner": "#45282a",
+        "note": "#24364a",
+        "noted": "#4f76a3",
     },
 }
 

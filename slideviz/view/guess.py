@@ -56,7 +56,11 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
     """Return a case with the guessed roles, periodic when a pair of periodic boundaries matches."""
     roles = {name: guesses[name].role if name in guesses else "fixed" for name in mesh.marker_names}
     case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None)
+    if "sliding" in roles.values():
+        # A role that the method does not use would be no help.
+        case = case.change(sliding="ps", steps=5)
     for pair in pairs:
         if roles[pair.first] == roles[pair.second] == "periodic":
-            return case.change(periodic="periodic", axis=pair.axis, origin=pair.origin)
+            mode = "moving" if case.sliding == "ps" else "fixed"
+            return case.change(periodic=mode, axis=pair.axis, origin=pair.origin)
     return case

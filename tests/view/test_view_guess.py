@@ -47,7 +47,7 @@ def test_a_match_decides_where_the_names_say_nothing(square):
     assert guesses["q1"].role == guesses["q2"].role == "periodic"
     assert "q2" in guesses["q1"].reason
     assert guesses["inlet"].role == "sliding", "that it matches the outlet does not matter"
-    assert guess_case(mesh, guesses, find_pairs(mesh)).periodic == "periodic"
+    assert guess_case(mesh, guesses, find_pairs(mesh)).periodic == "moving"
 
 
 def test_without_a_pair_the_case_is_not_periodic(square):
