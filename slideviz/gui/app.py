@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import sys
 from pathlib import Path
@@ -35,6 +36,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     window = MainWindow()
     previous = sys.excepthook
     sys.excepthook = lambda kind, error, trace: _unexpected(window, kind, error, trace)
+    # The modules live as long as the window, and need not be searched for garbage.
+    gc.collect()
+    gc.freeze()
     window.show()
     QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
     if path is not None:

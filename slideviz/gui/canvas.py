@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 from pyvistaqt import QtInteractor
-from qtpy.QtCore import QObject, QPoint, Qt, Signal
+from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
 from qtpy.QtWidgets import QApplication
 
 
@@ -33,12 +33,24 @@ class View3D(QtInteractor):
         self.told = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(0)
+        self._soon.timeout.connect(self.render)
 
     def render(self) -> None:
         """Schedule one repaint; pyvista calls this everywhere."""
         if not getattr(self, "_closed", True):
             self._rendered = True
             self.update()
+
+    def render_soon(self) -> None:
+        """Repaint in the next turn of the event loop.
+
+        Clicks and timers come between what changed the scene and the drawing of it, which takes
+        as long again where no graphics card draws.
+        """
+        self._soon.start()
 
     def snapshot(self) -> np.ndarray:
         """Return what the view shows now, (height, width, 3)."""

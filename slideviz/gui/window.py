@@ -190,7 +190,7 @@ class MainWindow(QMainWindow):
             self._move_ghosts(new)
         if old.mesh is new.mesh:
             self.scene.update(new)
-            self.view.update()
+            self.view.render_soon()
         self.sync_actions()
 
     def sync_actions(self) -> None:
@@ -225,7 +225,7 @@ class MainWindow(QMainWindow):
         self.scene.open(session, opened.surfaces)
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
         self.store.put(session)
-        self.view.render()
+        self.view.render_soon()
         if session.reduction_guess:
             log.info("%s", session.reduction_guess)
         note = f". {session.reduction_guess}" if session.reduction_guess else ""

@@ -59,6 +59,7 @@ class Scene:
         self._cells_actor: Any = None
         self._lift = 0.0
         self._ghosts: dict[str, FloatArray] = {}
+        self._legend: tuple[object, ...] = ()
         self.set_look(look)
 
     # What is in the scene ---------------------------------------------------------------
@@ -86,7 +87,7 @@ class Scene:
         """Remove everything."""
         clear_legend(self.plotter)
         self.plotter.clear_actors()
-        self.drawn, self._ghosts = {}, {}
+        self.drawn, self._ghosts, self._legend = {}, {}, ()
         self._cells = self._cells_actor = None
         self._session = Session()
 
@@ -215,10 +216,14 @@ class Scene:
         return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
 
     def _draw_legend(self, session: Session) -> None:
-        what = session.view.colour_by
+        key = self._legend_key(session)
+        if key == self._legend:
+            return
+        self._legend = key
         clear_legend(self.plotter)
         if not session.view.legend or session.mesh is None:
             return
+        what = session.view.colour_by
         if what == "role":
             used = {session.role(name) for name in session.mesh.marker_names}
             add_role_legend(
@@ -227,9 +232,16 @@ class Scene:
             return
         mapper = self._cells_actor.mapper if self._cells_actor is not None else None
         mapper = mapper or next(iter(self.drawn.values())).actor.mapper
-        frame = session.frame
-        bad = frame is not None and frame.quality.inverted > 0
+        bad = _has_inverted(session)
         add_colour_bar(self.plotter, mapper, COLOUR_BY[what], bad, (self.look, self.font_scale))
+
+    def _legend_key(self, session: Session) -> tuple[object, ...]:
+        """Return all that the legend depends on: to make it anew takes longer than the rest."""
+        mesh, what = session.mesh, session.view.colour_by
+        names = mesh.marker_names if mesh is not None and what == "role" else ()
+        said = frozenset(session.role(name) for name in names) or _has_inverted(session)
+        place = tuple(self.plotter.window_size)
+        return (mesh, session.view.legend, what, said, self.look, place)
 
     # Ghosts -----------------------------------------------------------------------------
 
@@ -247,11 +259,13 @@ class Scene:
 
     def _draw_ghosts(self, session: Session) -> None:
         shown = session.view.motion_ghost and (session.view.frame == 0 or session.outdated)
+        # Once: pyvista makes the dictionary anew each time it is asked for.
+        known = self.plotter.actors if self._ghosts else {}
         for name, points in self._ghosts.items():
             one = self.drawn.get(name)
             if one is None:
                 continue
-            actor = self.plotter.actors.get(f"motion:{name}")
+            actor = known.get(f"motion:{name}")
             if actor is None:
                 actor = self._add_ghost(f"motion:{name}", one.surface, ROLE_COLOURS["moving"], 0.55)
             actors.place(actor.mapper.dataset, points, 3 * self._lift)
@@ -261,9 +275,10 @@ class Scene:
 
     def _draw_undeformed(self, session: Session) -> None:
         shown = session.view.undeformed and session.mesh is not None
+        known = self.plotter.actors
         for name, one in self.drawn.items():
             key = f"undeformed:{name}"
-            actor = self.plotter.actors.get(key)
+            actor = known.get(key)
             if actor is None and shown:
                 actor = self._add_ghost(key, one.surface, self.look.ghost, 0.45)
             if actor is not None:
@@ -367,3 +382,7 @@ class Scene:
         if drawn[0].surface.facets.shape[1] == 2:
             return pick.nearest_line(self.plotter, x, y, drawn)
         return pick.front_surface(self.plotter, x, y, drawn)
+
+
+def _has_inverted(session: Session) -> bool:
+    return session.frame is not None and session.frame.quality.inverted > 0

@@ -32,7 +32,9 @@ class Store:
         self.put(function(self.session, *values, **named))
 
     def put(self, session: Session) -> None:
-        """Replace the session and tell the listeners."""
+        """Replace the session and tell the listeners; the same one again is no news."""
+        if session is self.session:
+            return
         self._waiting.append((self.session, session))
         self.session = session
         if len(self._waiting) > 1:

@@ -1,5 +1,6 @@
 """Compilation beside the window."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -45,8 +46,11 @@ def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work)
     qtbot.waitUntil(window.preparing.isVisible)
     assert work.thread is not main_thread()
     assert work.thread.daemon
+    gc.unfreeze()
     work.end.set()
     qtbot.waitUntil(lambda: not window.preparing.isVisible())
+    assert gc.get_freeze_count() > 1000, "what was imported is not searched for garbage"
+    gc.unfreeze()
     first = window.warm_up.thread_
     window.warm_up.start()
     assert window.warm_up.thread_ is first

@@ -788,3 +788,15 @@ def test_all_panels_fit_1280_x_800(ready):
     bottom = window.run_panel.mapTo(window, window.run_panel.rect().bottomLeft()).y()
     assert bottom < 800
     assert window.run_panel.run.isVisible()
+
+
+def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
+    view, drawn = opened.window.view, []
+    opened.qtbot.wait(50)
+    monkeypatch.setattr(view, "update", lambda: drawn.append(1))
+    for name in ("inflow", "outflow", "inflow"):
+        opened.window.store.change(changes.select, (name,))
+    assert not drawn
+    opened.qtbot.waitUntil(lambda: bool(drawn))
+    opened.qtbot.wait(20)
+    assert len(drawn) == 1

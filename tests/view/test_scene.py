@@ -248,3 +248,34 @@ def test_triangles_and_quadrilaterals_become_vtk_faces():
     flat = facet_connectivity(np.array([[0, 1, 2, 2], [1, 2, 3, 4]]))
     assert flat.tolist() == [3, 0, 1, 2, 4, 1, 2, 3, 4]
     assert facet_connectivity(np.array([[5, 6]])).tolist() == [2, 5, 6]
+
+
+def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session, monkeypatch):
+    from slideviz.view import scene as module
+
+    session, made = opened(scene, session), []
+    for name in ("add_role_legend", "add_colour_bar"):
+        real = getattr(module, name)
+
+        def counted(*values, real=real):
+            made.append(values)
+            return real(*values)
+
+        monkeypatch.setattr(module, name, counted)
+    steps = (
+        (0, lambda s: changes.select(s, ["left"])),
+        (1, lambda s: changes.set_role(s, ["left"], "internal")),
+        (0, lambda s: changes.set_view(s, edges=False)),
+        (1, lambda s: changes.set_view(s, colour_by="size_skew")),
+        (0, lambda s: changes.set_role(s, ["left"], "fixed")),
+        (0, lambda s: changes.set_view(s, legend=False)),
+        (1, lambda s: changes.set_view(s, legend=True)),
+    )
+    for wanted, change in steps:
+        made.clear()
+        session = change(session)
+        scene.update(session)
+        assert len(made) == wanted
+    made.clear()
+    scene.set_look(DARK)
+    assert len(made) == 1, "its letters have another colour"

@@ -205,3 +205,12 @@ def test_a_case_is_not_given_data_reduction(square, monkeypatch):
     session = changes.open_mesh(Frame(square, quality(square)), None, case=Case())
     assert session.case.reduction is None
     assert not session.reduction_guess
+
+
+def test_store_tells_nobody_when_nothing_changed(session):
+    store, told = Store(session), []
+    store.listen(lambda old, new: told.append(new))
+    store.change(lambda same: same)
+    assert not told
+    store.change(changes.set_case, steps=3)
+    assert [new.case.steps for new in told] == [3]
