@@ -27,15 +27,15 @@ from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, solve_lower
 
-POOL = 1024
+POOL = 768
 """Largest number of rows in the pool of a block."""
 
 POOL_START = 192
-POOL_SHARE = 16
+POOL_SHARE = 6
 """The pool begins small and has this many candidates for each node to pick: as good, measured
 by the number of control nodes, and cheaper than the largest one from the start."""
 
-BLOCK_LIMIT = 64
+BLOCK_LIMIT = 128
 """Largest number of nodes picked in a cycle."""
 
 STALE = 0.3
@@ -77,7 +77,7 @@ class GreedyFit:
         """Begin a level: an empty factor for what the levels before left."""
         self._settled = self.found
         self._now = Interpolant(np.empty(0, np.int64), self.found.weights[:0])
-        self._factor = np.empty((0, 0))
+        self._factor = self._store = np.empty((0, 0))
         self._half = np.empty((0, self._rows.right.shape[1]))
         self._chosen = np.empty(0, np.int64)
         self._barred = np.zeros(len(self._rows.nodes), bool)
@@ -291,10 +291,14 @@ class GreedyFit:
     ) -> None:
         """Append rows (L21, L22) to the factor, and their entries to L^-1 b."""
         n, more = len(self._chosen), len(rows)
-        factor = np.zeros((n + more, n + more), order="F")
-        factor[:n, :n] = self._factor
-        factor[n:, :n] = left.T
-        factor[n:, n:] = corner
+        if n + more > len(self._store):
+            # Room for twice as much: copying the factor in every cycle would cost as much as
+            # computing it.
+            self._store = np.zeros((2 * (n + more), 2 * (n + more)))
+            self._store[:n, :n] = self._factor
+        self._store[n : n + more, :n] = left.T
+        self._store[n : n + more, n : n + more] = corner
+        factor = self._store[: n + more, : n + more]
         rest = target[rows] - left.T @ self._half
         half = solve_lower(corner, rest)
         self._factor, self._half = factor, np.concatenate([self._half, half])

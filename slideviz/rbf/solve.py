@@ -26,8 +26,8 @@ from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12
 BLOCK = 512
-TRIANGLE = 192
-"""Rows of a triangular solve that hold the interpreter lock: a few milliseconds."""
+TRIANGLE = 512
+"""Rows of a triangular solve that hold the interpreter lock: some milliseconds."""
 
 RANK = 1e-10
 """Relative size below which a polynomial term adds nothing at the control nodes."""
