@@ -172,7 +172,8 @@ def make_frame(
         axis=axis,
         origin=origin,
         theta0=_middle_angle(np.arctan2(local[:, 1], local[:, 0])[radii > 1e-9 * radii.max()]),
-        radius=float((radii.min() + radii.max()) / 2),
+        # The largest radius, so that no error of an angle is longer than its frame component.
+        radius=float(radii.max()),
     )
 
 
