@@ -1,23 +1,19 @@
-"""What each command does."""
+"""What each command does; ``run`` has a module of its own."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
-import time
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-KEPT_BYTES = 1_000_000_000
-"""Meshes of steps are kept up to this size, to tell when cells were inverted."""
+from slideviz.cli.run_command import cell_data, run
 
 if TYPE_CHECKING:
-    from slideviz.case.model import Case
-    from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
-    from slideviz.staircase import Step
+
+__all__ = ["info", "keys", "quality", "run", "sample", "shots", "window"]
 
 
 def window(arguments: argparse.Namespace) -> int:
@@ -43,182 +39,6 @@ def window(arguments: argparse.Namespace) -> int:
 
 def _has_screen() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def run(arguments: argparse.Namespace) -> int:
-    """Deform a mesh as a case says, and write mesh, report, steps and picture."""
-    from slideviz import quality, read, write
-    from slideviz.cli import DONE, INVERTED
-    from slideviz.cli.report import run_report, save_history, save_json
-    from slideviz.errors import CaseError
-
-    begin = time.perf_counter()
-    case = _case(arguments)
-    if case.mesh_file is None:
-        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
-    output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
-    if not arguments.force:
-        _refuse_input(output, case.mesh_file)
-    seconds = {"read": -time.perf_counter()}
-    mesh = read(case.mesh_file, zone=case.zone)
-    seconds["read"] += time.perf_counter()
-    steps = _pull(arguments, case, mesh)
-    last = steps[-1]
-    seconds["quality"] = -time.perf_counter()
-    found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
-    seconds["quality"] += time.perf_counter()
-    seconds["write"] = -time.perf_counter()
-    write(output, last.mesh, overwrite=arguments.force, cell_data=_cell_data(output, found))
-    qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
-    if qualities:
-        _write_qualities(qualities, found)
-    seconds["write"] += time.perf_counter()
-    if arguments.picture:
-        from slideviz.view.picture import picture
-
-        named = replace(last.mesh, name=output.name)
-        picture(named, arguments.picture, reference=mesh, quality=found)
-    seconds["total"] = time.perf_counter() - begin
-    report = run_report(case, mesh, steps, found, seconds)
-    if arguments.history:
-        save_history(arguments.history, report)
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    elif not arguments.quiet:
-        files = {"mesh": output, "quality of each cell": qualities}
-        files |= {"report": arguments.json, "picture": arguments.picture}
-        files["convergence"] = arguments.history
-        _print_run(report, found, files)
-    for warning in last.warnings:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
-    if found.inverted:
-        print(f"slideviz: {_inverted_sentence(last.mesh, found, report)}", file=sys.stderr)
-        return INVERTED
-    return DONE
-
-
-def _case(arguments: argparse.Namespace) -> Case:
-    """Return the case of the file with the changes of ``--set`` and ``--zone``."""
-    from slideviz import Case
-    from slideviz.case.cfg import set_key
-    from slideviz.case.check import idle_roles
-    from slideviz.errors import CaseError
-
-    case = Case.read(arguments.case)
-    for text in arguments.set:
-        key, sign, value = text.partition("=")
-        if not sign:
-            raise CaseError(f"--set {text!r} is not of the form KEY=VALUE")
-        case = set_key(case, key.strip(), value.strip())
-    case = case.change(warnings=(*case.warnings, *idle_roles(case)))
-    return case.change(zone=arguments.zone) if arguments.zone else case
-
-
-def _default_output(mesh_file: Path) -> Path:
-    """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
-    return Path(f"{mesh_file.stem}_def{mesh_file.suffix}")
-
-
-def _refuse_input(output: Path, mesh_file: Path) -> None:
-    from slideviz.errors import CaseError
-
-    if output.exists() and mesh_file.exists() and output.samefile(mesh_file):
-        raise CaseError(
-            f"{output} is the input mesh; choose another name with -o or MESH_OUT_FILENAME, "
-            "or say --force to write over it"
-        )
-
-
-def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
-    """Return all steps; of very many only the last keeps its mesh."""
-    from slideviz import deform, write
-    from slideviz.cli.progress import Bar
-    from slideviz.errors import CaseError
-    from slideviz.rbf.compiled import is_cached
-
-    steps: list[Step] = []
-    folder = arguments.steps_dir
-    if folder:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
-    if not (arguments.quiet or is_cached()):
-        print("slideviz: first run: compiling the kernels, some seconds, once", file=sys.stderr)
-    with Bar(not arguments.quiet) as bar:
-        for step in deform(case, mesh, bar):
-            if folder:
-                assert case.mesh_file is not None
-                width = len(str(step.total))
-                name = f"{case.mesh_file.stem}_{step.index:0{width}d}.su2"
-                write(folder / name, step.mesh)
-            steps.append(step)
-            if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
-                steps[-2] = replace(steps[-2], mesh=mesh)
-    return steps
-
-
-def _cell_data(path: Path, found: Quality) -> dict | None:
-    """Return the qualities for formats that hold cell data, None for the others."""
-    if path.suffix.lower() not in (".vtu", ".vtk", ".xdmf"):
-        return None
-    return {"size-skew": found.values, "size": found.size, "skew": found.skew}
-
-
-def _write_qualities(path: Path, found: Quality) -> None:
-    """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
-    from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import atomic_write
-
-    with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
-
-
-def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> None:
-    from slideviz.cli.report import quality_lines, table
-
-    counts, spent = report["node_counts"], report["seconds"]
-    print(f"{report['case']}: {report['steps']} steps, sliding {report['sliding']}, ", end="")
-    print(f"periodic {report['periodic']}")
-    print(quality_lines(found))
-    rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
-    rows.append(("control nodes", report["control_nodes"][-1]))
-    print(table(rows))
-    parts = {k: v for k, v in spent.items() if k != "total"}
-    parts["start and others"] = spent["total"] - sum(parts.values())
-    phases = ", ".join(f"{k} {v:.2f}" for k, v in parts.items() if v >= 0.005)
-    print(f"  {spent['total']:.2f} s ({phases or 'all phases below 0.01'})")
-    for name, path in files.items():
-        if path:
-            print(f"{name}: {path}")
-
-
-def _inverted_sentence(mesh: Mesh, found: Quality, report: dict) -> str:
-    """Return which cells are inverted, and what helps."""
-    from slideviz.cli.report import inverted_cells, type_name
-
-    cells = inverted_cells(found)
-    when = report["quality"]["inverted_at_step"]
-    named = ", ".join(
-        f"{i} ({type_name(mesh, i)}, step {k})" for i, k in zip(cells[:5], when, strict=False)
-    )
-    more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
-    return (
-        f"{found.inverted} of {len(found)} cells are inverted: {named}{more}; more STEPS, "
-        f"{_advice(report)} may help"
-    )
-
-
-def _advice(report: dict) -> str:
-    """Return what this case has not tried yet."""
-    ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
-    if report["sliding"] == "none":
-        ideas.append("SLIDING_MODE= ps or ds")
-    if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":
-        ideas.append("PERIODIC_MODE= moving for a repeating mesh")
-    ideas.append("another role for the boundaries near these cells")
-    return ", ".join(ideas[:-1]) + " or " + ideas[-1]
 
 
 def info(arguments: argparse.Namespace) -> int:
@@ -273,7 +93,7 @@ def quality(arguments: argparse.Namespace) -> int:
     if arguments.output and arguments.output.suffix.lower() == ".csv":
         _write_csv(arguments.output, found)
     elif arguments.output:
-        write(arguments.output, mesh, cell_data=_cell_data(arguments.output, found))
+        write(arguments.output, mesh, cell_data=cell_data(arguments.output, found))
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")

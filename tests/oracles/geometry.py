@@ -80,7 +80,7 @@ def box_classes(
 ) -> Mapping[str, set[int]]:
     """Classes of the nodes of a box with a moving block, by counting the sides they lie on.
 
-    All outer sides slide; those across ``axis`` are periodic (METHOD section 5).
+    All outer sides slide; those across ``axis`` are periodic.
     """
     found: dict[str, set[int]] = {k: set() for k in ("fixed", "edge", "surface", "internal")}
     dim = places.shape[1]
