@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 import sys
+from importlib import import_module
 from pathlib import Path
 
 from qtpy.QtCore import QCoreApplication, Qt, QTimer
@@ -29,6 +30,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     run : bool
         Whether to deform it at once.
     """
+    # Here, once: two threads that import Numba at the same time (the warm-up and a run) find it
+    # half-made.
+    import_module("slideviz.staircase")
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     app = QApplication.instance() or QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")

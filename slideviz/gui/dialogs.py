@@ -183,6 +183,7 @@ class Banner(QFrame):
         row.setContentsMargins(10, 6, 6, 6)
         self.text = QLabel()
         self.text.setWordWrap(True)
+        self.text.setTextFormat(Qt.TextFormat.RichText)
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.details = QPushButton("Details…")
         self.details.clicked.connect(self._show_details)
@@ -203,7 +204,7 @@ class Banner(QFrame):
         self.style().polish(self)
         lines = text.splitlines() or [""]
         brief = "\n".join(lines[:4]) + ("\n…" if len(lines) > 4 else "")
-        self.text.setText(html.escape(brief).replace("\n", "<br>"))
+        self.text.setText(html.escape(brief, quote=False).replace("\n", "<br>"))
         self._full = full or (text if len(lines) > 4 else "")
         self.details.setVisible(bool(self._full))
         self.show()

@@ -44,6 +44,9 @@ from slideviz.view.store import Store
 
 log = logging.getLogger("slideviz")
 
+LEFT_WIDTH = 350
+"""Pixels that the panels on the left need at least."""
+
 
 class MainWindow(QMainWindow):
     """The window of slideviz.
@@ -60,6 +63,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")
         self.setObjectName("slideviz")
+        self.setMinimumSize(900, 620)
         self.resize(1280, 800)
         self.setAcceptDrops(True)
         self.store = Store()
@@ -140,6 +144,9 @@ class MainWindow(QMainWindow):
         dock = QDockWidget(title, self)
         dock.setObjectName(title.lower())
         dock.setWidget(widget)
+        if area == Qt.DockWidgetArea.LeftDockWidgetArea:
+            # A window once made small must not leave names and fields cut off for ever.
+            dock.setMinimumWidth(LEFT_WIDTH)
         self.addDockWidget(area, dock)
         return dock
 
