@@ -135,11 +135,11 @@ class Climb:
         coords, done, index, folded = plan.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *plan.warnings]
         told: list[str] = []
-        watch = Watch(lambda *_: None, dict(self.seconds))
+        seconds = dict(self.seconds)
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
-            watch = Watch(self._report(index + 1, total), watch.seconds)
+            watch = Watch(self._report(index + 1, total), seconds)
             goal = plan.coords[plan.known] + plan.target * part
             solution = _step(plan, self.case.sliding, coords, goal, watch)
             moved = _moved(plan, coords, solution.displacement, goal)
@@ -159,7 +159,7 @@ class Climb:
                 told = _dropped_warning(solution, index, mesh)
                 warnings += told
             yield self._made(index, total, points, solution, watch, warnings)
-            watch = Watch(lambda *_: None, {})
+            seconds = {}
 
     def _report(self, index: int, total: int) -> Callable[[str, float], None]:
         return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))

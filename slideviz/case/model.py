@@ -16,7 +16,6 @@ Point = tuple[float, ...] | Literal["centroid"]
 ROLES: tuple[Role, ...] = ("moving", "fixed", "sliding", "periodic", "internal")
 SLIDING: tuple[Sliding, ...] = ("none", "ps", "ds")
 PERIODIC_MODES: tuple[PeriodicMode, ...] = ("none", "periodic", "fixed", "moving")
-PERIODIC_TYPES: tuple[PeriodicType, ...] = ("auto", "translational", "rotational")
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from slideviz.case.clash import clash, jump
@@ -16,7 +14,7 @@ from slideviz.case.motion import displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
-from slideviz.mesh.topology import Boundary, Fans, fan_normals, find_boundary, find_fans
+from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_boundary, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, classify, directions
@@ -230,8 +228,7 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
     links = np.concatenate([twins.reshape(-1, 2), images])
     count = len(mesh.points)
-    graph = coo_array((np.ones(len(links), np.int8), tuple(links.T)), shape=(count, count))
-    label = connected_components(graph, directed=False)[1]
+    label = components(count, *links.T)
     lowest = np.full(label.max() + 1, count, np.int64)
     np.minimum.at(lowest, label, np.arange(count))
     return lowest[label]

@@ -62,16 +62,14 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
     copies, others link unequal ones. A part then falls apart into two mirror images. Where it
     does not (a cell is its own mirror image), no numbering agrees and the file's is kept.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    from slideviz.mesh.topology import components  # loads SciPy, which few meshes need here
 
     m = len(cells)
     first, second, agree = _neighbours(cells)
     shift = np.where(agree, 0, m)
     rows = np.concatenate((first, first + m))
     columns = np.concatenate((second + shift, second + m - shift))
-    links = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(2 * m, 2 * m))
-    labels = connected_components(links, directed=False)[1].astype(np.int64)
+    labels = components(2 * m, rows, columns)
     plain, mirrored = labels[:m], labels[m:]
     signs = np.where(plain <= mirrored, 1, -1).astype(np.int8)
     return signs, np.minimum(plain, mirrored)

@@ -263,8 +263,8 @@ def find_fans(
         ]
         links.append(np.stack(ends))
     a, b = np.concatenate(links, axis=1) if links else np.empty((2, 0), np.int64)
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(len(node), len(node)))
-    total, fan = connected_components(graph, directed=False)
+    fan = components(len(node), a, b)
+    total = int(fan.max(initial=-1)) + 1
     fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
     fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
@@ -307,6 +307,16 @@ def find_pieces(
     """Return the piece that each facet belongs to, (f,): smooth parts of one marker."""
     smooth = smooth_joints(boundary, points, feature_angle_deg)
     a, b = boundary.joints[smooth].T
-    count = len(boundary.facets)
+    return components(len(boundary.facets), a, b)
+
+
+def components(count: int, a: IntArray, b: IntArray) -> IntArray:
+    """Return the number of the connected part that each of ``count`` things is in, (count,).
+
+    Parameters
+    ----------
+    a, b : (m,)
+        The pairs that are connected.
+    """
     graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)

@@ -33,11 +33,7 @@ class ExactFit:
     def add(self, rows: Rows) -> None:
         """Solve with these rows and all before them."""
         if self._rows is not None:
-            rows = Rows(
-                np.concatenate([self._rows.nodes, rows.nodes]),
-                None,
-                np.concatenate([self._rows.right, rows.right]),
-            )
+            rows = self._rows.followed_by(rows)
         self._rows = rows
         problem = self._problem
         with self._watch.phase("solve") as tick:

@@ -86,11 +86,7 @@ class GreedyFit:
         """Meet these constraints too, and select until all errors are below the tolerance."""
         rows = self._sorted(rows)
         if len(self._rows.nodes):
-            rows = Rows(
-                np.concatenate([self._rows.nodes, rows.nodes]),
-                None,
-                np.concatenate([self._rows.right, rows.right]),
-            )
+            rows = self._rows.followed_by(rows)
         else:
             self._half = np.empty((0, rows.right.shape[1]))
         self._rows = rows

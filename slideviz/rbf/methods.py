@@ -156,7 +156,6 @@ def _finish(
         len(fit.found.nodes),
         largest,
         fit.dropped,
-        fit.found.nodes,
         fit.condition(),
         fit.history,
     )

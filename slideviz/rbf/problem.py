@@ -138,8 +138,6 @@ class Solution:
         before the correction sets these exactly.
     dropped : (m,) int64
         Nodes that the pivot guard left out.
-    chosen : (c,) int64
-        The control nodes.
     condition : float
         Estimated condition number of the final system.
     history : tuple of Cycle
@@ -150,7 +148,6 @@ class Solution:
     control_nodes: int
     max_error: float
     dropped: IntArray
-    chosen: IntArray
     condition: float
     history: tuple[Cycle, ...] = ()
 
@@ -262,6 +259,11 @@ class Rows:
     nodes: IntArray
     normals: FloatArray | None
     right: FloatArray
+
+    def followed_by(self, more: Rows) -> Rows:
+        """Return these rows and then others, both without normals."""
+        nodes = np.concatenate([self.nodes, more.nodes])
+        return Rows(nodes, None, np.concatenate([self.right, more.right]))
 
 
 def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Rows:

@@ -12,11 +12,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import Boundary, Fans, corner_vectors, unit
+from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, unit
 from slideviz.rbf.apron import edge_apron, surface_apron
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
@@ -127,7 +125,7 @@ def _surface_labels(
         along > np.cos(np.radians(angle_deg)),
         (role[a] == role[b]) & (along > np.cos(np.radians(angle_deg * MERGE_FRACTION))),
     )
-    return _components(len(boundary.facets), a[smooth], b[smooth])
+    return components(len(boundary.facets), a[smooth], b[smooth])
 
 
 def _by_surfaces(
@@ -148,11 +146,6 @@ def _by_surfaces(
         together.setdefault(key, []).append(int(node))
     found = [*groups.items(), *((key, np.array(nodes)) for key, nodes in together.items())]
     return [(nodes, np.array(key)) for key, nodes in found]
-
-
-def _components(count: int, a: IntArray, b: IntArray) -> IntArray:
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _simplices(sides: FloatArray) -> FloatArray:
@@ -204,7 +197,7 @@ def _edge_chains(
     count = len(is_edge)
     own = count + np.arange(ends.size).reshape(ends.shape)
     tied = np.where(is_edge[ends], ends, own)
-    label = _components(count + ends.size, tied[:, 0], tied[:, 1])
+    label = components(count + ends.size, tied[:, 0], tied[:, 1])
     chains = []
     node_label = label[classes.edge]
     for value in np.unique(node_label):
