@@ -1,0 +1,129 @@
+"""Keys of a case file that say how the window showed it; a run without window passes them by.
+
+They are kept in ``Case.view`` as values by key; `slideviz.view.keep` puts them into a view.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+from slideviz.case.key import VIEW, Key
+from slideviz.case.model import Case
+from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
+from slideviz.case.words import list_of, number, shown
+from slideviz.errors import CaseError
+
+COLOURS = ("role", "size-skew", "size", "skew", "displacement")
+POINTS = ("none", "types", "control")
+MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
+SHOWN = ("edges", "undeformed", "motion-ghost", "legend", "triad", "perspective")
+FORMS = {"plane": 6, "cylinder": 7}
+"""Numbers of a section: normal and point of a plane; radius, axis and point of a cylinder."""
+
+SectionText = tuple[str, tuple[float, ...], bool]
+"""Form, numbers, and whether whole cells are shown."""
+
+
+def numbers(count: int, allowed: str, rising: bool = False) -> Kind:
+    """Return the kind of a list of so many numbers, each larger than the one before if rising."""
+
+    def read(text: str) -> tuple[float, ...]:
+        values = tuple(number(item.text) for item in list_of(text))
+        if len(values) != count:
+            raise CaseError(f"{shown(text)} has {len(values)} numbers; needed is {allowed}")
+        if rising and any(a >= b for a, b in pairwise(values)):
+            raise CaseError(f"{shown(text)} does not rise; needed is {allowed}")
+        return values
+
+    return Kind(allowed, read, vector_text)
+
+
+def words(known: tuple[str, ...]) -> Kind:
+    """Return the kind of a list of words of the table."""
+    allowed = f"a list of {', '.join(known)}"
+
+    def read(text: str) -> tuple[str, ...]:
+        given = [item.text.lower() for item in list_of(text)]
+        for word in given:
+            if word not in known:
+                raise CaseError(f"{shown(word)} is not one of {', '.join(known)}")
+        return tuple(word for word in known if word in given)
+
+    return Kind(allowed, read, lambda value: f"( {', '.join(value)} )")
+
+
+def read_sections(text: str) -> tuple[SectionText, ...]:
+    """Return the sections that the value of ``VIEW_SECTIONS`` describes.
+
+    Raises
+    ------
+    CaseError
+        One has another form, or a wrong count of numbers.
+    """
+    found = []
+    for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
+        items = [item.text for item in list_of(part.strip())]
+        form = items[0].lower() if items else ""
+        how = items[-1].lower() if items else ""
+        if form not in FORMS or how not in ("whole", "cut"):
+            raise CaseError(
+                f"section {place}: {shown(part.strip())} does not begin with plane or cylinder and "
+                "end with whole or cut"
+            )
+        values = tuple(number(item) for item in items[1:-1])
+        if len(values) != FORMS[form]:
+            raise CaseError(
+                f"section {place}: a {form} has {FORMS[form]} numbers, {len(values)} are given"
+            )
+        if not any(values[:3] if form == "plane" else values[1:4]):
+            raise CaseError(f"section {place}: its direction has no length")
+        if form == "cylinder" and values[0] <= 0:
+            raise CaseError(f"section {place}: the radius {values[0]:g} is not above 0")
+        found.append((form, values, how == "whole"))
+    return tuple(found)
+
+
+def write_sections(sections: tuple[SectionText, ...]) -> str:
+    """Return the value of ``VIEW_SECTIONS`` that ``read_sections`` reads back, without loss."""
+    texts = [
+        f"({form}, {', '.join(repr(float(v)) for v in values)}, {'whole' if all_ else 'cut'})"
+        for form, values, all_ in sections
+    ]
+    return " ; \\\n    ".join(texts) or "( )"
+
+
+SECTIONS = Kind(
+    "(form, numbers, whole | cut) ; ...",
+    read_sections,
+    write_sections,
+    details=(
+        "(plane, nx, ny, nz, x, y, z, whole | cut): normal and a point",
+        "(cylinder, r, ax, ay, az, x, y, z, whole | cut): radius, axis and a point on it",
+    ),
+)
+
+
+def _row(name: str, kind: Kind, meaning: str) -> Key:
+    def put(case: Case, value: Any) -> Case:
+        return case.change(view={**case.view, name: value})
+
+    return Key(name, VIEW, kind, meaning, put, lambda case: case.view.get(name), rbf_slide=False)
+
+
+VIEW_ROWS = (
+    _row("VIEW_COLOR", choice({w: w for w in COLOURS}), "What the colours say."),
+    _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the colour bar."),
+    _row("VIEW_MAP", choice({w: w for w in MAPS}), "The colour map."),
+    _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
+    _row("VIEW_POINTS", choice({w: w for w in POINTS}), "Nodes drawn as points."),
+    _row("VIEW_SHOW", words(SHOWN), "What is drawn beside the boundaries."),
+    _row("VIEW_COPIES", whole(-1), "Passages drawn on each side; -1 draws all."),
+    _row("VIEW_HIDDEN", NAMES, "Boundaries that are not drawn."),
+    _row("VIEW_SECTIONS", SECTIONS, "Planes and cylinders that cut the mesh."),
+    _row(
+        "VIEW_CAMERA",
+        numbers(10, "ten numbers"),
+        "Where the eye is, what it looks at, what is up, and half the height that it sees.",
+    ),
+)

@@ -1,0 +1,199 @@
+"""The store: what listeners hear, and what undo brings back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slideviz.case.model import ROLES, Translate
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.state import COLOUR_BY, Frame, Session
+from slideviz.view.store import TOGETHER_S, WORDS, Memento, Store
+
+
+class Clock:
+    """Seconds that pass only when told."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def store(session, clock):
+    return Store(session, clock)
+
+
+def test_undo_and_redo_bring_back_roles(store, clock):
+    before = store.session.case
+    store.change(changes.set_role, ("left",), "sliding")
+    clock.now += 10
+    store.change(changes.set_role, ("top",), "moving")
+    after = store.session.case
+    assert store.can_undo == "role"
+    store.undo()
+    assert store.session.role("top") == "fixed"
+    assert store.session.role("left") == "sliding"
+    store.undo()
+    assert store.session.case == before
+    assert not store.can_undo
+    store.undo()
+    store.redo()
+    store.redo()
+    assert store.session.case == after
+    assert not store.can_redo
+
+
+def test_a_new_change_after_undo_ends_redo(store, clock):
+    store.change(changes.set_case, steps=3)
+    store.undo()
+    assert store.can_redo == "settings"
+    store.change(changes.set_case, steps=5)
+    assert not store.can_redo
+
+
+def test_typing_into_one_field_is_undone_at_once_but_another_field_is_not(store, clock):
+    for steps in (1, 12, 123):
+        store.change(changes.set_case, steps=steps)
+        clock.now += TOGETHER_S / 2
+    store.change(changes.set_case, sliding="ps")
+    store.undo()
+    assert store.session.case.steps == 123
+    store.undo()
+    assert store.session.case.steps == 1
+    assert not store.can_undo
+
+
+def test_there_and_back_within_a_moment_leaves_nothing_to_undo(store):
+    store.change(changes.set_view, edges=False)
+    store.change(changes.set_view, edges=True)
+    assert not store.can_undo
+
+
+def test_what_passes_is_not_undone(store, clock):
+    store.change(changes.set_view, edges=False)
+    clock.now += 10
+    store.change(changes.select, ("left",))
+    store.change(changes.mark, 3)
+    assert store.can_undo == "view"
+    store.undo()
+    assert store.session.view.edges
+    assert store.session.view.selected == ("left",)
+    assert store.session.view.marked == 3
+
+
+def test_saving_is_not_undone(store, clock, tmp_path):
+    store.change(changes.set_case, steps=4)
+    saved = store.session.case.change(source=tmp_path / "a.cfg")
+    store.change(changes.saved_case, saved)
+    store.undo()
+    assert store.session.case.source == tmp_path / "a.cfg"
+    assert store.session.case.steps == 1
+    assert store.session.unsaved_case
+
+
+def test_another_mesh_cannot_be_undone(store, cube):
+    store.change(changes.set_case, steps=4)
+    store.put(changes.open_mesh(Frame(cube, quality(cube)), None))
+    assert not store.can_undo
+
+
+def test_every_word_belongs_to_a_change():
+    for name in WORDS:
+        assert callable(getattr(changes, name))
+
+
+names = st.lists(st.sampled_from(["left", "right", "top", "bottom"]), min_size=1, unique=True)
+intents = st.one_of(
+    st.tuples(st.just("set_role"), names.map(tuple), st.sampled_from(ROLES)),
+    st.tuples(st.just("confirm")),
+    st.tuples(st.just("confirm"), names.map(tuple)),
+    st.tuples(st.just("add_motion"), st.sampled_from(["top", "left", ""])),
+    st.tuples(st.just("remove_motion"), st.integers(0, 5)),
+    st.tuples(st.just("move_motion"), st.integers(0, 5), st.sampled_from([-1, 1])),
+    st.tuples(st.just("show"), names.map(tuple), st.booleans()),
+    st.tuples(st.just("isolate"), names.map(tuple)),
+    st.tuples(st.just("select"), names.map(tuple)),
+    st.tuples(st.just("mark"), st.none() | st.integers(0, 15)),
+    st.tuples(st.just("show_frame"), st.integers(-2, 9)),
+    st.tuples(st.just("steps"), st.integers(0, 9)),
+    st.tuples(st.just("colour"), st.sampled_from(list(COLOUR_BY))),
+    st.tuples(st.just("run"), st.integers(0, 2)),
+    st.tuples(st.just("show_run"), st.integers(0, 4)),
+    st.tuples(st.just("show_beside"), st.none() | st.integers(0, 4)),
+    st.tuples(st.just("remove_run"), st.integers(0, 4)),
+    st.tuples(st.just("take_settings"), st.integers(0, 4)),
+    st.tuples(st.just("undo")),
+    st.tuples(st.just("redo")),
+)
+
+
+def perform(store, intent):
+    name, *values = intent
+    session = store.session
+    if name == "add_motion":
+        store.change(changes.add_motion, Translate(values[0], (0.1, 0.0)))
+    elif name in ("remove_motion", "move_motion"):
+        if values[0] < len(session.case.motions):
+            store.change(getattr(changes, name), *values)
+    elif name == "steps":
+        store.change(changes.set_case, steps=values[0])
+    elif name == "colour":
+        store.change(changes.set_view, colour_by=values[0])
+    elif name == "run":
+        store.change(changes.start_run)
+        frame = replace(session.first, mesh=session.mesh.with_points(session.mesh.points + 0.1))
+        store.change(changes.add_frames, [frame] * values[0])
+        store.change(changes.end_run, "done")
+    elif name in ("undo", "redo"):
+        getattr(store, name)()
+    else:
+        store.change(getattr(changes, name), *values)
+
+
+def require_valid(session: Session):
+    case, view = session.case, session.view
+    assert set(case.roles) == set(session.mesh.marker_names)
+    assert all(case.roles[name] in ROLES for name in case.roles)
+    assert set(session.guesses) <= set(case.roles)
+    assert view.hidden <= set(case.roles)
+    assert 0 <= view.frame < len(session.frames)
+    assert session.frame is session.frames[view.frame]
+    assert session.shown is None or session.run_shown is not None
+    assert view.beside is None or (
+        session.run(view.beside) is not None and view.beside != session.shown
+    )
+    numbers = [run.number for run in session.runs]
+    assert numbers == sorted(set(numbers))
+    assert changes.seen_beside(session).frame is not None
+    assert np.isfinite(session.colour_range).all()
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(intents, max_size=25), st.booleans())
+def test_any_intents_keep_the_session_valid_and_undoing_all_gives_the_first_back(
+    session, some, slowly
+):
+    clock = Clock()
+    store = Store(session, clock)
+    for intent in some:
+        perform(store, intent)
+        require_valid(store.session)
+        clock.now += 2 * TOGETHER_S if slowly else 0.1
+    while store.can_undo:
+        store.undo()
+        require_valid(store.session)
+    assert Memento.of(store.session) == Memento.of(session)
+    while store.can_redo:
+        store.redo()
+        require_valid(store.session)
