@@ -16,7 +16,8 @@ Get = Callable[[Case], Any]
 _NO_DEFAULT = "not set"
 FILES, BOUNDARIES, MOTION = "Files", "Boundaries", "Motion"
 PERIODICITY, METHOD, REDUCTION, QUALITY = "Periodicity", "Method", "Data reduction", "Quality"
-GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY)
+VIEW = "View"
+GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY, VIEW)
 
 ROLE_KEYS: dict[Role, str] = {
     "moving": "MARKER_MOVING",

@@ -44,6 +44,7 @@ from slideviz.case.values import (
     steps_kind,
     whole,
 )
+from slideviz.case.view_keys import VIEW_ROWS
 from slideviz.rbf.kernels import KERNELS
 
 _ROWS = (
@@ -238,6 +239,7 @@ _ROWS = (
         "quality_metric",
         "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
     ),
+    *VIEW_ROWS,
 )
 _OURS = {
     "ZONE",
@@ -255,4 +257,6 @@ _OURS = {
     "DATA_RED_RELATIVE",
 }
 
-KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name not in _OURS) for row in _ROWS}
+KEYS: dict[str, Key] = {
+    row.name: replace(row, rbf_slide=row.rbf_slide and row.name not in _OURS) for row in _ROWS
+}

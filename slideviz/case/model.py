@@ -106,7 +106,8 @@ class Case:
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
     where that is left to the matching of the periodic markers; ``steps`` is 0 for as many as it
     takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
-    control nodes are used.
+    control nodes are used. ``view`` has how a window showed the case, by key: it changes no
+    result.
     """
 
     mesh_file: Path | None = None
@@ -130,6 +131,7 @@ class Case:
     quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
     generate_quality: bool = True
     source: Path | None = None
+    view: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def change(self, **values: Any) -> Case:

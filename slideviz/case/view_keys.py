@@ -90,7 +90,7 @@ def write_sections(sections: tuple[SectionText, ...]) -> str:
         f"({form}, {', '.join(repr(float(v)) for v in values)}, {'whole' if all_ else 'cut'})"
         for form, values, all_ in sections
     ]
-    return " ; \\\n    ".join(texts) or "( )"
+    return " ; ".join(texts) or "( )"
 
 
 SECTIONS = Kind(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -13,12 +13,27 @@ from slideviz.case.model import Case, FromFile, Motion, Reduction, Role
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.view.guess import guess_case, guess_roles
-from slideviz.view.state import Frame, Session, ViewState
+from slideviz.view.keep import kept_view
+from slideviz.view.state import Frame, Run, Session, ViewState
+
+if TYPE_CHECKING:
+    from slideviz.view.section import Section
 
 MANY_NODES = 20_000
 """Boundary nodes from which on a mesh is opened with data reduction."""
 
 RELATIVE_TOLERANCE = 1e-5
+
+TASTE = (
+    "edges",
+    "undeformed",
+    "motion_ghost",
+    "legend",
+    "triad",
+    "perspective",
+    "colour_map",
+)
+"""Settings of the view that suit any mesh, so that they stay when another is opened."""
 
 Place = Literal["open", "boundaries", "motion", "method"]
 
@@ -41,7 +56,10 @@ def open_mesh(
     listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
-    session = Session(mesh, path, chosen, guesses, tuple(pairs), (first,), saved=chosen)
+    view = kept_view(chosen, ViewState(), mesh.marker_names)
+    # From here on the view is the session's; it goes back into the case when that is saved.
+    chosen = chosen.change(view={})
+    session = Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
     return session if case is not None else _guess_reduction(session, mesh)
 
 
@@ -148,16 +166,110 @@ def show_frame(session: Session, index: int) -> Session:
     return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
 
 
+def add_section(session: Session, section: Section) -> Session:
+    """Return the session with one more section."""
+    return set_view(session, sections=(*session.view.sections, section))
+
+
+def replace_section(session: Session, index: int, section: Section) -> Session:
+    """Return the session with another section at that place."""
+    sections = list(session.view.sections)
+    sections[index] = section
+    return set_view(session, sections=tuple(sections))
+
+
+def remove_section(session: Session, index: int) -> Session:
+    """Return the session without the section at that place."""
+    sections = session.view.sections
+    return set_view(session, sections=sections[:index] + sections[index + 1 :])
+
+
+def mark(session: Session, cell: int | None) -> Session:
+    """Return the session with a cell marked, or none."""
+    return set_view(session, marked=cell)
+
+
 def start_run(session: Session) -> Session:
-    """Return the session without steps: those of the last run go when a new one starts."""
-    session = replace(session, frames=session.frames[:1], ran=session.case, unsaved_mesh=False)
+    """Return the session with one more run, of the settings there are, and it shown.
+
+    Runs that were cancelled or failed before their first step go.
+    """
+    kept = tuple(run for run in session.runs if run.frames)
+    number = 1 + max((run.number for run in session.runs), default=0)
+    session = replace(session, runs=(*kept, Run(number, session.case)), shown=number)
     return show_frame(session, 0)
 
 
 def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
-    """Return the session with steps just computed; the last is shown."""
-    every = (*session.frames, *frames)
-    return show_frame(replace(session, frames=every, unsaved_mesh=True), len(every) - 1)
+    """Return the session with steps just computed by the newest run; the last is shown."""
+    newest = session.runs[-1]
+    grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
+    session = replace(session, runs=(*session.runs[:-1], grown))
+    if session.shown != grown.number:
+        return session  # the user looks at another run meanwhile
+    return show_frame(session, len(grown.frames))
+
+
+def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
+    """Return the session with the newest run ended that way, if one was going on."""
+    if not session.runs or session.runs[-1].end:
+        return session
+    ended = replace(session.runs[-1], end=end)
+    return replace(session, runs=(*session.runs[:-1], ended))
+
+
+def show_run(session: Session, number: int) -> Session:
+    """Return the session with the last step of that run shown."""
+    run = session.run(number)
+    if run is None:
+        return session
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, shown=number), beside=beside)
+    return show_frame(session, len(run.frames))
+
+
+def show_beside(session: Session, number: int | None) -> Session:
+    """Return the session with another run in a second view beside the first; None: no such."""
+    if number == session.shown or (number is not None and session.run(number) is None):
+        number = None
+    return set_view(session, beside=number)
+
+
+def remove_run(session: Session, number: int) -> Session:
+    """Return the session without a run; one that goes on stays."""
+    run = session.run(number)
+    if run is None or not run.end:
+        return session
+    rest = tuple(other for other in session.runs if other.number != number)
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, runs=rest), beside=beside)
+    if session.shown != number:
+        return session
+    if not rest:
+        return show_frame(replace(session, shown=None), 0)
+    return show_run(session, rest[-1].number)
+
+
+def take_settings(session: Session, number: int) -> Session:
+    """Return the session with the settings of a run put back: roles, motions, method."""
+    run = session.run(number)
+    if run is None:
+        return session
+    return replace(session, case=run.case, guesses={}, reduction_guess="")
+
+
+def seen_beside(session: Session) -> Session:
+    """Return the session as the second view shows it: the other run, at the matching step."""
+    run, other = session.run_shown, session.run(session.view.beside)
+    if other is None:
+        return session
+    last = len(run.frames) if run is not None else 0
+    at = session.view.frame
+    # Runs of different numbers of steps: the same part of the displacement.
+    frame = round(at * len(other.frames) / last) if last else 0
+    if at:
+        frame = max(frame, 1)
+    return show_frame(replace(session, shown=other.number), frame)
 
 
 def saved_case(session: Session, case: Case) -> Session:
@@ -166,16 +278,16 @@ def saved_case(session: Session, case: Case) -> Session:
 
 
 def saved_mesh(session: Session) -> Session:
-    """Return the session with the deformed mesh on disk."""
-    return replace(session, unsaved_mesh=False)
+    """Return the session with the deformed mesh of the run that is shown on disk."""
+    runs = tuple(
+        replace(run, saved=True) if run.number == session.shown else run for run in session.runs
+    )
+    return replace(session, runs=runs)
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened with the taste of the one before: edges, legend, ghosts."""
-    kept = {
-        name: getattr(old, name)
-        for name in ("edges", "undeformed", "motion_ghost", "legend", "perspective")
-    }
+    """Return a session just opened with the taste of the one before: edges, legend, colours."""
+    kept = {name: getattr(old, name) for name in TASTE}
     return set_view(session, **kept)
 
 

@@ -16,6 +16,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.view.changes import open_mesh
+from slideviz.view.keep import Camera, kept_camera
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface, find_surfaces
 
@@ -43,10 +44,15 @@ class Doing:
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """The outcome of `open_file`: the session, and the boundaries ready to be drawn."""
+    """The outcome of `open_file`: the session, and the boundaries ready to be drawn.
+
+    ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
+    """
 
     session: Session
     surfaces: tuple[Surface, ...]
+    kept: bool = False
+    camera: Camera | None = None
 
 
 def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
@@ -90,7 +96,10 @@ def prepare(
     report(Doing("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
     first = Frame(mesh, quality(mesh, metric=metric))
-    return Opened(open_mesh(first, path, pairs, case), surfaces)
+    session = open_mesh(first, path, pairs, case)
+    if case is None:
+        return Opened(session, surfaces)
+    return Opened(session, surfaces, bool(case.view), kept_camera(case))
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:

@@ -1,13 +1,82 @@
-"""The one place where the session changes: holds it, and tells those who listen."""
+"""The one place where the session changes: holds it, tells those who listen, undoes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
-from slideviz.view.state import Session
+from slideviz.case.model import Case
+from slideviz.view.state import Guess, Session, ViewState
 
 Listener = Callable[[Session, Session], None]
+
+TOGETHER_S = 1.0
+"""Changes of one kind that follow each other so closely are undone as one."""
+DEEPEST = 200
+"""Changes that can be undone."""
+
+WORDS: dict[str, str] = {
+    "set_role": "role",
+    "confirm": "confirming guesses",
+    "add_motion": "new motion",
+    "replace_motion": "motion",
+    "remove_motion": "removing a motion",
+    "move_motion": "order of motions",
+    "add_section": "new section",
+    "replace_section": "section",
+    "remove_section": "removing a section",
+    "show": "hidden boundaries",
+    "isolate": "hidden boundaries",
+    "take_settings": "settings of a run",
+    "set_case": "settings",
+    "set_view": "view",
+}
+"""What the menu calls a change, by the name of its function; others cannot be undone."""
+
+
+@dataclass(frozen=True)
+class Memento:
+    """What undo brings back: roles, motions, settings, and the style of the view."""
+
+    case: Case
+    guesses: Mapping[str, Guess]
+    reduction_guess: str
+    style: ViewState
+
+    @classmethod
+    def of(cls, session: Session) -> Memento:
+        """Return that of a session."""
+        return cls(session.case, session.guesses, session.reduction_guess, session.view.style)
+
+    def put_into(self, session: Session) -> Session:
+        """Return the session with it; the step that is shown and the like stay."""
+        view, style = session.view, self.style
+        # Where the case was saved to does not come back: it is on disk, undone or not.
+        case = self.case.change(
+            source=session.case.source,
+            mesh_out=session.case.mesh_out,
+            warnings=session.case.warnings,
+        )
+        passing = {name: getattr(view, name) for name in ("selected", "frame", "marked", "beside")}
+        return replace(
+            session,
+            case=case,
+            guesses=self.guesses,
+            reduction_guess=self.reduction_guess,
+            view=replace(style, **passing),
+        )
+
+
+@dataclass(frozen=True)
+class _Done:
+    """A change that can be undone: what was before, what it was, and when."""
+
+    before: Memento
+    words: str
+    kind: tuple[object, ...]
+    at_s: float
 
 
 class Store:
@@ -16,12 +85,24 @@ class Store:
     Listeners are called with the old and the new session, in the order in which they came.
     A change made by a listener is told after the present one has been told to everybody, so
     that nobody hears of the newer one first.
+
+    Parameters
+    ----------
+    session : Session, optional
+        The first one.
+    clock : callable
+        Tells the seconds, for the changes that are undone together.
     """
 
-    def __init__(self, session: Session | None = None) -> None:
+    def __init__(
+        self, session: Session | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self.session = session or Session()
+        self._clock = clock
         self._listeners: list[Listener] = []
         self._waiting: list[tuple[Session, Session]] = []
+        self._undo: list[_Done] = []
+        self._redo: list[_Done] = []
 
     def listen(self, listener: Listener) -> None:
         """Call ``listener(old, new)`` after each change from now on."""
@@ -29,12 +110,25 @@ class Store:
 
     def change(self, function: Callable[..., Session], *values: Any, **named: Any) -> None:
         """Replace the session by ``function(session, ...)`` and tell the listeners."""
-        self.put(function(self.session, *values, **named))
+        old = self.session
+        new = function(old, *values, **named)
+        name = getattr(function, "__name__", "")
+        if name in WORDS:
+            # The first value says which boundary or motion it is, where there are several.
+            which = values[0] if values and isinstance(values[0], (int, str, tuple)) else None
+            self._remember(old, new, WORDS[name], (name, which, *sorted(named)))
+        self.put(new)
 
     def put(self, session: Session) -> None:
-        """Replace the session and tell the listeners; the same one again is no news."""
+        """Replace the session and tell the listeners; the same one again is no news.
+
+        Another mesh cannot be undone: what was done before is forgotten.
+        """
         if session is self.session:
             return
+        if session.mesh is not self.session.mesh:
+            self._undo.clear()
+            self._redo.clear()
         self._waiting.append((self.session, session))
         self.session = session
         if len(self._waiting) > 1:
@@ -46,3 +140,47 @@ class Store:
                 self._waiting.pop(0)
         finally:
             self._waiting.clear()
+
+    # Undo ------------------------------------------------------------------------------
+
+    @property
+    def can_undo(self) -> str:
+        """Return what would be undone, in words; empty when there is nothing."""
+        return self._undo[-1].words if self._undo else ""
+
+    @property
+    def can_redo(self) -> str:
+        """Return what would be done again, in words; empty when there is nothing."""
+        return self._redo[-1].words if self._redo else ""
+
+    def undo(self) -> None:
+        """Bring back what was before the last change, if there was one."""
+        self._step(self._undo, self._redo)
+
+    def redo(self) -> None:
+        """Make the change again that was undone last, if no other was made since."""
+        self._step(self._redo, self._undo)
+
+    def _step(self, source: list[_Done], target: list[_Done]) -> None:
+        if not source:
+            return
+        done = source.pop()
+        target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
+        self.put(done.before.put_into(self.session))
+
+    def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
+        if new is old or new.mesh is not old.mesh or new.mesh is None:
+            return
+        before = Memento.of(old)
+        if before == Memento.of(new):
+            return
+        self._redo.clear()
+        now = self._clock()
+        last = self._undo[-1] if self._undo else None
+        if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
+            self._undo.pop()
+            if last.before != Memento.of(new):
+                self._undo.append(replace(last, at_s=now))
+            return
+        self._undo.append(_Done(before, words, kind, now))
+        del self._undo[:-DEEPEST]

@@ -27,12 +27,12 @@ def square_mesh(n=4):
     return Mesh(points, Cells.from_blocks([(9, quads)]), markers, name="square")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def square():
     return square_mesh()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def session(square):
     return open_mesh(Frame(square, quality(square)), None)
 

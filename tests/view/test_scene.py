@@ -64,7 +64,7 @@ def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
     mesh = session.mesh.with_points(points)
     frame = Frame(mesh, quality(mesh, session.mesh))
     session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
-    session = changes.add_frames(session, [frame])
+    session = changes.add_frames(changes.start_run(session), [frame])
     scene.update(session)
     table = pv.LookupTable(COLOUR_MAP, scalar_range=(0.0, 1.0))
     for cell, middle in ((0, (0.3, 0.3, 0)), (10, (2.75, 2.75, 0)), (5, (1.5, 1.5, 0))):
@@ -82,7 +82,7 @@ def test_an_inverted_cell_has_its_own_colour(scene, session):
     session = changes.set_view(opened(scene, session), colour_by="skew", edges=False)
     scene.update(session)
     assert count(image(scene), INVERTED_COLOUR) == 0
-    scene.update(changes.add_frames(session, [frame]))
+    scene.update(changes.add_frames(changes.start_run(session), [frame]))
     assert count(image(scene), INVERTED_COLOUR) > 50
 
 
@@ -90,7 +90,9 @@ def test_steps_move_the_points_in_place(scene, session):
     session = opened(scene, session)
     shape = scene.drawn["top"].shape
     mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
-    session = changes.add_frames(session, [Frame(mesh, quality(mesh, session.mesh))])
+    session = changes.add_frames(
+        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+    )
     scene.update(session)
     assert scene.drawn["top"].shape is shape
     assert np.allclose(np.asarray(shape.points)[:, 1], 2.0)
@@ -157,7 +159,9 @@ def test_the_motion_ghost_is_where_the_motion_leads(scene, session):
 def test_the_undeformed_ghost_stays_where_the_boundary_was(scene, session):
     session = opened(scene, changes.set_role(session, ("top",), "moving"))
     mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
-    session = changes.add_frames(session, [Frame(mesh, quality(mesh, session.mesh))])
+    session = changes.add_frames(
+        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+    )
     scene.update(session)
     plain = pixel(scene, (2.0, 4.0, 0.0))
     scene.update(changes.set_view(session, undeformed=True))

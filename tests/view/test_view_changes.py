@@ -85,7 +85,8 @@ def test_hide_show_isolate(session):
 
 
 def test_frames_are_kept_shown_and_limited(session):
-    session = changes.start_run(changes.add_frames(session, [moved(session)]))
+    session = changes.add_frames(changes.start_run(session), [moved(session)])
+    session = changes.start_run(session)
     assert len(session.frames) == 1
     session = changes.add_frames(session, [moved(session), moved(session, 0.3)])
     assert session.view.frame == 2

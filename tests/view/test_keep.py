@@ -1,0 +1,96 @@
+"""A session is a case file: how it was looked at comes back."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slideviz.case.model import Case
+from slideviz.case.view_keys import MAPS, read_sections, write_sections
+from slideviz.errors import CaseError
+from slideviz.view import changes
+from slideviz.view.keep import keep_view, kept_camera, kept_view
+from slideviz.view.section import Section
+from slideviz.view.state import COLOUR_BY, POINTS, ViewState
+
+number = st.floats(-1e3, 1e3)
+triple = st.tuples(number, number, number)
+direction = triple.filter(any)
+sections = st.one_of(
+    st.builds(Section, st.just("plane"), triple, direction, whole=st.booleans()),
+    st.builds(Section, st.just("cylinder"), triple, direction, st.floats(1e-3, 1e3), st.booleans()),
+)
+rising = st.none() | st.tuples(st.floats(-5, 0.4), st.floats(0.5, 5))
+views = st.builds(
+    ViewState,
+    st.sampled_from(list(COLOUR_BY)),
+    rising,
+    st.sampled_from(MAPS),
+    rising,
+    st.sampled_from(list(POINTS)),
+    *[st.booleans()] * 6,
+    st.lists(sections, max_size=3).map(tuple),
+    st.integers(-1, 5),
+    st.sets(st.sampled_from(["left", "top"])).map(frozenset),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(views)
+def test_a_view_comes_back_from_the_file(session, tmp_path_factory, view):
+    file = tmp_path_factory.mktemp("keep") / "a.cfg"
+    camera = (1.0, 2.0, 3.0, 0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.7)
+    kept = keep_view(replace(session, view=view), camera)
+    kept.change(source=file).write(file)
+    again = Case.read(file)
+    assert kept_view(again, ViewState(), session.mesh.marker_names) == view
+    assert kept_camera(again) == camera
+
+
+def test_a_fresh_view_needs_no_key(session):
+    assert keep_view(session).view == {}
+    assert kept_camera(keep_view(session)) is None
+
+
+def test_a_view_is_no_setting_of_the_run(session):
+    session = changes.add_frames(changes.start_run(session), [session.first])
+    case = keep_view(changes.set_view(session, colour_by="skew"))
+    assert not changes.set_case(session, view=case.view).outdated
+
+
+def test_hidden_boundaries_of_another_mesh_are_passed_by():
+    case = Case(view={"VIEW_HIDDEN": ("gone", "left")})
+    assert kept_view(case, ViewState(), ("left", "top")).hidden == {"left"}
+
+
+def test_sections_are_read_as_written():
+    text = "(plane, 0, 0, 1, 0, 0, 0.5, whole) ; (cylinder, 0.25, 0, 0, 1, 0, 0, 0, cut)"
+    found = read_sections(text)
+    assert found == (
+        ("plane", (0.0, 0.0, 1.0, 0.0, 0.0, 0.5), True),
+        ("cylinder", (0.25, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), False),
+    )
+    assert read_sections(write_sections(found)) == found
+    assert read_sections(write_sections(())) == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("VIEW_SECTIONS", "(sphere, 1, cut)", "does not begin with plane or cylinder"),
+        ("VIEW_SECTIONS", "(plane, 1, 0, 0, cut)", "a plane has 6 numbers, 3 are given"),
+        ("VIEW_SECTIONS", "(plane, 0, 0, 0, 1, 1, 1, cut)", "its direction has no length"),
+        ("VIEW_SECTIONS", "(cylinder, 0, 0, 0, 1, 0, 0, 0, cut)", "the radius 0 is not above 0"),
+        ("VIEW_RANGE", "(1, 0)", "does not rise"),
+        ("VIEW_RANGE", "(1, 2, 3)", "has 3 numbers"),
+        ("VIEW_SHOW", "( edges, egdes )", "'egdes' is not one of"),
+        ("VIEW_MAP", "jet", "is not one of viridis"),
+    ],
+)
+def test_mistakes_in_view_keys_are_told(key, value, message, tmp_path):
+    file = tmp_path / "a.cfg"
+    file.write_text(f"MESH_FILENAME= a.su2\n{key}= {value}\n")
+    with pytest.raises(CaseError, match=message) as error:
+        Case.read(file)
+    assert "a.cfg:2:" in str(error.value)
