@@ -83,9 +83,12 @@ def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
     shape.GetPoints().Modified()
 
 
-def shown_values(frame: Frame, what: ColourBy) -> FloatArray:
-    """Return the numbers to colour the cells by, (m,); inverted cells are below the range."""
-    return np.where(frame.quality.status == INVERTED, -1.0, frame.values(what))
+def shown_values(frame: Frame, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
+    """Return the numbers to colour the cells by, (m,); inverted cells are below any range.
+
+    For displacements, ``undeformed`` says where the nodes were.
+    """
+    return np.where(frame.quality.status == INVERTED, -np.inf, frame.values(what, undeformed))
 
 
 def lookup_table() -> Any:

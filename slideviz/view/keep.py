@@ -82,9 +82,8 @@ def _plain(view: ViewState) -> dict[str, Any]:
 
 
 def _text(section: Section) -> SectionText:
-    numbers = (*section.direction, *section.origin)
-    if section.kind == "cylinder":
-        numbers = (section.radius, *numbers)
+    radius = (section.radius,) if section.kind == "cylinder" else ()
+    numbers = (*radius, *section.direction, *section.origin)
     return section.kind, tuple(float(n) for n in numbers), section.whole
 
 

@@ -70,14 +70,15 @@ def clear_legend(plotter: Any) -> None:
 def add_colour_bar(
     plotter: Any, mapper: Any, title: str, inverted: bool, style: tuple[Look, float]
 ) -> None:
-    """Draw the colour bar of 0 to 1 at the right edge, with ``inverted`` below when there are."""
+    """Draw the colour bar of a mapper at the right edge; below it ``inverted`` if wanted."""
     look, font_scale = style
     width = plotter.window_size[0]
+    low, high = mapper.lookup_table.scalar_range
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
         n_labels=6,
-        fmt="%.1f",
+        fmt="%.1f" if high - low >= 0.5 and high < 1000 else "%.2g",
         vertical=True,
         interactive=False,
         color=look.text,

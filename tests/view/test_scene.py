@@ -255,7 +255,7 @@ def test_triangles_and_quadrilaterals_become_vtk_faces():
 
 
 def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session, monkeypatch):
-    from slideviz.view import scene as module
+    from slideviz.view import layer_legend as module
 
     session, made = opened(scene, session), []
     for name in ("add_role_legend", "add_colour_bar"):
@@ -283,3 +283,47 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
     made.clear()
     scene.set_look(DARK)
     assert len(made) == 1, "its letters have another colour"
+
+
+def test_another_map_and_another_range_give_other_colours(scene, session):
+    session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
+    scene.update(session)
+    highest = np.array(pv.LookupTable("viridis").map_value(1.0)[:3]) * 255
+    assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - highest).max() < 12
+    scene.update(changes.set_view(session, colour_range=(0.0, 2.0)))
+    middle = np.array(pv.LookupTable("viridis").map_value(0.5)[:3]) * 255
+    assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - middle).max() < 12
+    scene.update(changes.set_view(session, colour_map="cividis"))
+    highest = np.array(pv.LookupTable("cividis").map_value(1.0)[:3]) * 255
+    assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - highest).max() < 12
+
+
+def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, session):
+    session = opened(scene, session)
+    for shift in (0.5, 1.0):
+        points = session.mesh.points.copy()
+        points[session.mesh.points[:, 1] > 3.5, 1] += shift
+        mesh = session.mesh.with_points(points)
+        frame = Frame(mesh, quality(mesh, session.mesh))
+        session = changes.add_frames(changes.start_run(session), [frame])
+    assert session.colour_range == (0.0, 1.0)
+    session = changes.set_view(session, colour_by="displacement", edges=False)
+    assert session.colour_range == (0.0, 1.0)
+    scene.update(session)
+    top = np.array(pv.LookupTable("viridis").map_value(0.5)[:3]) * 255
+    assert np.abs(pixel(scene, (1.5, 3.6, 0))[:3] - top).max() < 12
+    session = changes.show_run(session, 1)
+    assert session.colour_range == (0.0, 1.0)
+    scene.update(session)
+    half = np.array(pv.LookupTable("viridis").map_value(0.25)[:3]) * 255
+    assert np.abs(pixel(scene, (1.5, 3.6, 0))[:3] - half).max() < 12
+
+
+def test_a_camera_comes_back(scene, session):
+    opened(scene, session)
+    scene.zoom_at(100, 100, 2.0)
+    place = scene.eye.place
+    scene.fit()
+    assert scene.eye.place != place
+    scene.eye.go(place)
+    assert np.allclose(scene.eye.place, place)

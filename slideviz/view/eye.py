@@ -1,0 +1,148 @@
+"""Where the scene is looked at from: sides, fitting, zooming; in parallel or perspective."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from slideviz.view.stage import Stage
+
+FILL = 0.92
+"""How much of the free height or width a mesh takes."""
+
+SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
+    "+x": ((1, 0, 0), (0, 0, 1)),
+    "-x": ((-1, 0, 0), (0, 0, 1)),
+    "+y": ((0, 1, 0), (0, 0, 1)),
+    "-y": ((0, -1, 0), (0, 0, 1)),
+    "+z": ((0, 0, 1), (0, 1, 0)),
+    "-z": ((0, 0, -1), (0, 1, 0)),
+    "iso": ((1, -1, 0.8), (0, 0, 1)),
+}
+"""Direction from the mesh to the eye, and what is up."""
+
+
+class Eye:
+    """The camera of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+    shapes : callable
+        Returns the data sets that should be seen.
+    """
+
+    def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
+        self.stage = stage
+        self._shapes = shapes
+
+    @property
+    def _camera(self) -> Any:
+        return self.stage.plotter.camera
+
+    def look_from(self, side: str, parallel: bool) -> None:
+        """Look at everything from a side: a key of `SIDES`."""
+        towards, up = SIDES[side]
+        bounds = np.array(self.stage.plotter.bounds).reshape(3, 2)
+        centre = bounds.mean(axis=1)
+        camera = self._camera
+        camera.focal_point = centre
+        away = max(np.ptp(bounds, axis=1).max(), 1e-300)
+        camera.position = centre + np.asarray(towards, float) * away
+        camera.up = up
+        camera.parallel_projection = parallel
+        self.fit()
+
+    def fit(self) -> None:
+        """Make everything fill the view, from the present side, beside the legend's strip."""
+        width, height = self.stage.plotter.window_size
+        self.shift()
+        shapes = self._shapes()
+        if not shapes:
+            return
+        points = np.concatenate([np.asarray(shape.points) for shape in shapes])
+        axes = self._axes()
+        low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+        centre, extent = axes.T @ ((low + high) / 2.0), high - low
+        free = max(width - self.stage.strip(), 1.0)
+        half = max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
+        self.aim(centre, half, float(np.linalg.norm(extent)))
+
+    def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
+        """Look at a point, seeing ``half`` the height above and below it.
+
+        Parameters
+        ----------
+        centre : (3,)
+        half : float
+            In the length unit.
+        depth : float
+            Extent of what is seen along the line of sight.
+        """
+        camera = self._camera
+        direction = self._axes()[2]
+        away = max(depth, half)
+        if not camera.parallel_projection:
+            away = half / np.tan(np.radians(camera.view_angle / 2.0)) + depth / 2.0
+        camera.focal_point = centre
+        camera.position = centre - direction * away
+        camera.parallel_scale = half
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def _axes(self) -> Any:
+        """Return right, up and forward, (3, 3), as unit vectors."""
+        camera = self._camera
+        right = np.cross(camera.direction, np.array(camera.up))
+        up = np.cross(right, camera.direction)
+        return np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), camera.direction])
+
+    def shift(self) -> None:
+        """Keep the strip of the legend free: the picture shifts, the camera keeps its centre."""
+        width = self.stage.plotter.window_size[0]
+        self._camera.SetWindowCenter(self.stage.strip() / max(width, 1), 0.0)
+
+    def zoom_at(self, x: float, y: float, factor: float) -> None:
+        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
+        camera, renderer = self._camera, self.stage.plotter.renderer
+        if not camera.parallel_projection:
+            camera.Dolly(factor)
+            renderer.ResetCameraClippingRange()
+            return
+        width, height = self.stage.plotter.window_size
+        right = np.cross(camera.direction, camera.up)
+        middle = width / 2.0 * (1.0 - camera.GetWindowCenter()[0])
+        # Pixels from the camera's centre, in the world's length unit at the present scale.
+        unit = 2.0 * camera.parallel_scale / height
+        offset = ((x - middle) * right + (y - height / 2) * np.asarray(camera.up)) * unit
+        shift = offset * (1.0 - 1.0 / factor)
+        camera.focal_point = np.asarray(camera.focal_point) + shift
+        camera.position = np.asarray(camera.position) + shift
+        camera.parallel_scale = camera.parallel_scale / factor
+        renderer.ResetCameraClippingRange()
+
+    def take(self, other: Eye) -> None:
+        """Look from where another eye looks."""
+        camera, theirs = self._camera, other._camera
+        camera.position, camera.focal_point = theirs.position, theirs.focal_point
+        camera.up, camera.view_angle = theirs.up, theirs.view_angle
+        camera.parallel_projection = theirs.parallel_projection
+        camera.parallel_scale = theirs.parallel_scale
+        camera.SetWindowCenter(*theirs.GetWindowCenter())
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Return position, focal point, up, and half the height seen: ten numbers."""
+        camera = self._camera
+        numbers = (*camera.position, *camera.focal_point, *camera.up, camera.parallel_scale)
+        return tuple(float(number) for number in numbers)
+
+    def go(self, place: tuple[float, ...]) -> None:
+        """Look from a place that `place` returned."""
+        camera = self._camera
+        camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
+        camera.parallel_scale = place[9]
+        self.shift()
+        self.stage.plotter.renderer.ResetCameraClippingRange()

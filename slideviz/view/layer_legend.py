@@ -1,0 +1,70 @@
+"""The legend of the scene: the roles in use, or the colour bar; and the axes in a corner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pyvista as pv
+
+from slideviz.case.model import ROLES
+from slideviz.view.legend import add_colour_bar, add_role_legend, clear_legend
+from slideviz.view.stage import Stage
+from slideviz.view.state import COLOUR_BY, Session
+from slideviz.view.surfaces import Surface
+
+
+class LegendLayer:
+    """What the colours mean, in a strip at the right."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        # Of its own: that of an actor may be gone before the bar is.
+        self._mapper = pv.DataSetMapper()
+        self._mapper.lookup_table = stage.table
+        self._drawn: tuple[object, ...] = ()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        clear_legend(self.stage.plotter)
+        self._drawn = ()
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the legend has a place of its own."""
+        return []
+
+    def update(self, _old: Session | None, new: Session) -> None:
+        """Show another state; made anew only where it differs, which takes longer than the rest."""
+        stage, mesh, what = self.stage, new.mesh, new.view.colour_by
+        key = self._key(new)
+        if key == self._drawn:
+            return
+        self._drawn = key
+        clear_legend(stage.plotter)
+        if not new.view.legend or mesh is None:
+            return
+        if what == "role":
+            used = {new.role(name) for name in mesh.marker_names}
+            roles = [role for role in ROLES if role in used]
+            add_role_legend(stage.plotter, roles, stage.look, stage.font_scale)
+        else:
+            style = (stage.look, stage.font_scale)
+            title, bad = COLOUR_BY[what], has_inverted(new)
+            add_colour_bar(stage.plotter, self._mapper, title, bad, style)
+
+    def _key(self, session: Session) -> tuple[object, ...]:
+        """Return all that the legend depends on."""
+        mesh, view = session.mesh, session.view
+        names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
+        said = frozenset(session.role(name) for name in names) or has_inverted(session)
+        place = tuple(self.stage.plotter.window_size)
+        colours = (view.colour_by, view.colour_map, session.colour_range)
+        return (id(mesh), view.legend, colours, said, self.stage.look, place)
+
+
+def has_inverted(session: Session) -> bool:
+    """Tell whether the frame that is shown has inverted cells."""
+    return session.frame is not None and session.frame.quality.inverted > 0

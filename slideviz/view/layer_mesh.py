@@ -1,0 +1,168 @@
+"""The mesh in the scene: its boundaries, and the cells of a 2D mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray
+from slideviz.view import actors
+from slideviz.view.actors import VALUES, Drawn
+from slideviz.view.look import ROLE_COLOURS, SELECTED_COLOUR
+from slideviz.view.stage import Stage
+from slideviz.view.state import Session
+from slideviz.view.surfaces import Surface
+
+
+def recoloured(old: Session | None, new: Session) -> bool:
+    """Tell whether cells have other values than before."""
+    return (
+        old is None
+        or old.frame is not new.frame
+        or old.view.colour_by != new.view.colour_by
+        or old.mesh is not new.mesh
+    )
+
+
+class CellLayer:
+    """All cells of a 2D mesh, or the outside of a 3D mesh without markers."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.shape: Any = None
+        self.actor: Any = None
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+        mesh = session.mesh
+        assert mesh is not None
+        if mesh.dim == 2:
+            shape = actors.cell_shape(mesh)
+        elif not surfaces:
+            shape = actors.volume(mesh).extract_surface(algorithm="geometry")
+            shape.cell_data[VALUES] = np.zeros(shape.n_cells)
+        else:
+            return
+        self.shape = shape
+        self.actor = self.stage.add(shape, "cells", lighting=mesh.dim == 3)
+        self.actor.prop.line_width = 1.0
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.shape = self.actor = None
+
+    def shapes(self) -> list[Any]:
+        """Return the data set of the cells."""
+        return [] if self.shape is None else [self.shape]
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        if self.actor is None or new.mesh is None or new.frame is None:
+            return
+        by_value = new.view.colour_by != "role"
+        if old is None or old.frame is not new.frame:
+            if new.mesh.dim == 2:
+                actors.place(self.shape, new.frame.mesh.points)
+            else:
+                ids = self.shape.point_data["vtkOriginalPointIds"]
+                actors.place(self.shape, new.frame.mesh.points[ids])
+        if by_value and recoloured(old, new):
+            values = self.stage.values(new)
+            if new.mesh.dim == 3:
+                values = values[self.shape.cell_data["vtkOriginalCellIds"]]
+            self.shape.cell_data[VALUES] = values
+        self.actor.mapper.scalar_visibility = by_value
+        self.actor.prop.color = self.stage.look.cell
+        self.stage.edges(self.actor.prop, new.view.edges)
+
+
+class BoundaryLayer:
+    """The boundaries, each an actor, with a band around those that are selected.
+
+    Attributes
+    ----------
+    drawn : dict of str to Drawn
+        By name.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.drawn: dict[str, Drawn] = {}
+        self._lift = 0.0
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+        assert session.mesh is not None
+        self._lift = self.stage.lift(session.mesh)
+        for surface in surfaces:
+            self.drawn[surface.name] = self._add(surface, session.mesh.points)
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.drawn = {}
+
+    def shapes(self) -> list[Any]:
+        """Return the data sets of all boundaries."""
+        return [one.shape for one in self.drawn.values()]
+
+    def _add(self, surface: Surface, points: FloatArray) -> Drawn:
+        flat = surface.facets.shape[1] == 2
+        shape = actors.surface_shape(surface, points, 2 * self._lift)
+        rim = actors.rim_shape(surface, points, self._lift)
+        actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not flat)
+        band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
+        band.prop.color = SELECTED_COLOUR
+        band.prop.line_width = 11 if flat else 6
+        band.prop.opacity = 1.0
+        band.visibility = False
+        if not flat:
+            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
+            # Lines on a face flicker unless they are drawn a little nearer.
+            band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
+        return Drawn(surface, shape, rim, actor, band)
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        if new.mesh is None or new.frame is None or not self.drawn:
+            return
+        if old is None or old.frame is not new.frame:
+            self._place(new.frame.mesh.points)
+        by_value = new.view.colour_by != "role" and new.mesh.dim == 3
+        if by_value and recoloured(old, new):
+            values = self.stage.values(new)
+            for one in self.drawn.values():
+                one.shape.cell_data[VALUES] = values[one.surface.owner]
+        for name, one in self.drawn.items():
+            self._style(name, one, new, by_value)
+
+    def _place(self, points: FloatArray) -> None:
+        for one in self.drawn.values():
+            at = points[one.surface.nodes]
+            actors.place(one.shape, at, 2 * self._lift)
+            actors.place(one.rim, at, self._lift)
+
+    def _style(self, name: str, one: Drawn, session: Session, by_value: bool) -> None:
+        view = session.view
+        shown = name not in view.hidden
+        one.actor.visibility = shown
+        one.band.visibility = shown and name in view.selected
+        one.actor.prop.color = ROLE_COLOURS[session.role(name)]
+        one.actor.mapper.scalar_visibility = by_value
+        if one.surface.facets.shape[1] == 2:
+            one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
+        else:
+            self.stage.edges(one.actor.prop, view.edges)
+            inside = looks_inside(session)
+            one.actor.prop.opacity = 0.12 if inside else 1.0
+            if inside:
+                one.actor.prop.show_edges = False
+
+
+def looks_inside(session: Session) -> bool:
+    """Tell whether cells inside a 3D mesh are shown, so that its boundaries must let see them."""
+    view = session.view
+    if session.mesh is None or session.mesh.dim == 2:
+        return False
+    return view.threshold is not None or any(section.shown for section in view.sections)
