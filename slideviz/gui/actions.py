@@ -71,6 +71,7 @@ class Actions:
             menu.addAction(self._add(name, text, function, keys, image))
         menu.addSeparator()
         menu.addAction(self._add("quit", "&Quit", window.close, standard.Quit))
+        self._make_edit()
         run = window.menuBar().addMenu("&Run")
         run.addAction(self._add("run", "&Run", window.start_run, "F5", "run"))
         run.addAction(self._add("cancel", "&Cancel", window.cancel, "", "cancel"))
@@ -82,6 +83,13 @@ class Actions:
             act.triggered.connect(lambda _=False, path=path: self.window.files.open_path(path))
         if self.recent.isEmpty():
             self.recent.addAction("(none yet)").setEnabled(False)
+
+    def _make_edit(self) -> None:
+        store, standard = self.window.store, QKeySequence.StandardKey
+        menu = self.window.menuBar().addMenu("&Edit")
+        menu.addAction(self._add("undo", "&Undo", store.undo, standard.Undo, "undo"))
+        menu.addAction(self._add("redo", "&Redo", store.redo, standard.Redo, "redo"))
+        self.edit = menu
 
     def _make_view(self) -> None:
         window = self.window
@@ -122,9 +130,12 @@ class Actions:
         self.panels = menu.addMenu("&Panels")
 
     def add_panels(self, docks) -> None:
-        """Offer to show and hide the docks."""
+        """Offer to show and hide the docks, and to put them back."""
         for dock in docks:
             self.panels.addAction(dock.toggleViewAction())
+        self.panels.addSeparator()
+        restore = self._add("restore_layout", "&Restore layout", self.window.restore_layout)
+        self.panels.addAction(restore)
 
     def _toggle(self, name: str, checked: bool) -> None:
         if getattr(self.window.store.session.view, name) != checked:
@@ -139,6 +150,9 @@ class Actions:
         window.addToolBar(bar)
         self.bar = bar
         for name in ("open", "save_mesh", "save_case", "save_picture"):
+            bar.addAction(self.by_name[name])
+        bar.addSeparator()
+        for name in ("undo", "redo"):
             bar.addAction(self.by_name[name])
         bar.addSeparator()
         bar.addWidget(QLabel(" Colour by "))
@@ -188,6 +202,12 @@ class Actions:
         self.by_name["perspective"].setEnabled(opened and not flat)
         for side in (*SIDE_KEYS, "iso"):
             self.by_name[f"side{side}"].setEnabled(opened and not flat)
+        store = self.window.store
+        for name, what in (("undo", store.can_undo), ("redo", store.can_redo)):
+            act = self.by_name[name]
+            act.setEnabled(bool(what))
+            act.setText(f"{name.capitalize()} {what}".rstrip())
+            act.setToolTip(f"{act.text()} ({act.shortcut().toString()})")
         for name in ("save_case", "save_picture", "fit", "show_all"):
             self.by_name[name].setEnabled(opened)
         self.by_name["save_mesh"].setEnabled(opened and not busy)

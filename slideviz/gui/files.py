@@ -14,6 +14,7 @@ from qtpy.QtWidgets import QDialog
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
 from slideviz.view import changes, jobs
+from slideviz.view.keep import keep_view
 
 log = logging.getLogger("slideviz")
 RECENT = 10
@@ -159,7 +160,7 @@ class Files(QObject):
         if self._saved_to is not None and self._saved_to.suffix == ".su2":
             case = case.change(mesh_out=self._saved_to)
         try:
-            case.write(path)
+            keep_view(replace(session, case=case), self.window.scene.eye.place).write(path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return False
@@ -179,7 +180,7 @@ class Files(QObject):
         if path is None:
             return
         try:
-            self.window.write_picture(path, dialog.size_px, dialog.transparent.isChecked())
+            self.window.viewing.write_picture(path, dialog.size_px, dialog.transparent.isChecked())
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return

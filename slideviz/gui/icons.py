@@ -13,6 +13,8 @@ from slideviz.view.look import ROLE_COLOURS
 _STROKES = {
     "open": '<path d="M3 19V5h6l2 3h8v3"/><path d="M3 19l3-8h16l-3 8z"/>',
     "save": '<path d="M4 4h12l4 4v12H4z"/><path d="M8 4v5h7V4M7 20v-7h10v7"/>',
+    "undo": '<path d="M8 5L4 9l4 4"/><path d="M4 9h10a5.5 5.5 0 0 1 0 11h-4"/>',
+    "redo": '<path d="M16 5l4 4-4 4"/><path d="M20 9H10a5.5 5.5 0 0 0 0 11h4"/>',
     "picture": '<rect x="3" y="5" width="18" height="14" rx="1.5"/>'
     '<path d="M3 16l5-5 4 4 3-3 6 5"/><circle cx="16" cy="9.5" r="1.4"/>',
     "case": '<path d="M6 3h8l4 4v14H6z"/><path d="M14 3v4h4M9 12h6M9 16h6"/>',

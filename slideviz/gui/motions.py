@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui.icons import icon
 from slideviz.gui.motion_editor import KINDS, MotionEditor, describe, new_motion
 from slideviz.view import changes
+from slideviz.view.look import Look
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
@@ -89,7 +90,7 @@ class MotionPanel(QWidget):
         button.clicked.connect(function)
         return button
 
-    def set_icon_colour(self, colour: str) -> None:
+    def take_theme(self, _look: Look, colour: str) -> None:
         """Redraw the icons in another colour."""
         self.add.setIcon(icon("add", colour))
         for button, name in ((self.up, "up"), (self.down, "down"), (self.remove, "remove")):

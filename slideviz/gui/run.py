@@ -10,6 +10,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBox
 from slideviz.gui.icons import icon
 from slideviz.view.changes import is_missing
 from slideviz.view.jobs import Doing
+from slideviz.view.look import Look
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
@@ -93,7 +94,7 @@ class RunPanel(QWidget):
         else:
             self.text.setText(_ended(session))
 
-    def take_theme(self) -> None:
+    def take_theme(self, _look: Look, _colour: str) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
         text = self.text.text()
         self.text.clear()

@@ -8,6 +8,7 @@ from slideviz.mesh.quality import quality
 from slideviz.view import changes
 from slideviz.view.look import COLOUR_MAP
 from slideviz.view.picture import picture, picture_of
+from slideviz.view.portrait import Detail, _seen, tiny_motion
 from slideviz.view.state import Frame
 from slideviz.view.surfaces import find_surfaces
 
@@ -35,14 +36,11 @@ def test_a_2d_mesh_is_shown_whole_on_white_with_its_quality(tmp_path, square):
 
 
 def test_the_half_of_a_3d_mesh_shows_the_hole_that_moved(tmp_path, cube):
-    from slideviz.view.actors import volume
-    from slideviz.view.picture import _half
-
     points = cube.points.copy()
     points[cube.marker("BLOCK").nodes] += [0.0, 0.06, 0.02]
     moved = cube.with_points(points)
-    half, towards, up = _half(volume(moved), moved, cube)
-    assert 0 < half.n_cells < len(cube.cells)
+    cells, towards, up = _seen(moved, cube)
+    assert 0 < len(cells) < len(cube.cells)
     across = int(np.argmax(np.abs(towards)))
     assert across == 0, "cut along the motion"
     assert up[across] == 0
@@ -72,3 +70,45 @@ def test_the_view_can_be_drawn_at_any_size_and_without_background(tmp_path, squa
     assert image.shape == (500, 320, 4)
     assert image[2, 2, 3] == 0
     assert image[250, 100, 3] == 255
+
+
+def far_field(half_width):
+    """A square hole of unit width in the middle of a wide square, and the same with it moved."""
+    from slideviz.mesh.model import Cells, Marker, Mesh
+
+    inner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2.0
+    points = np.concatenate([inner, 2.0 * half_width * inner])
+    ring = np.arange(4)
+    after = (ring + 1) % 4
+    quads = np.stack([ring + 4, after + 4, after, ring], axis=1)
+    markers = (
+        Marker("body", Cells.from_blocks([(3, np.stack([ring, after], 1))])),
+        Marker("far", Cells.from_blocks([(3, np.stack([ring + 4, after + 4], 1))])),
+    )
+    mesh = Mesh(points, Cells.from_blocks([(9, quads)]), markers, name="far")
+    moved = points.copy()
+    moved[:4, 0] += 0.2
+    return mesh, mesh.with_points(moved)
+
+
+def test_what_moves_is_shown_in_detail_when_it_is_tiny_in_the_mesh(tmp_path):
+    mesh, moved = far_field(50.0)
+    detail = tiny_motion(moved, mesh)
+    assert detail.centre == pytest.approx((0.1, 0.0))
+    assert 2.0 < detail.width < 6.0
+    assert tiny_motion(far_field(5.0)[1], far_field(5.0)[0]) is None
+    assert tiny_motion(mesh, mesh) is None
+    points = mesh.points.copy()
+    points[4:] *= 1.1
+    assert tiny_motion(mesh.with_points(points), mesh) is None, "the outer boundary moved"
+    holes = {}
+    for zoom in ("auto", "all", Detail((0.1, 0.0), 2.4)):
+        picture(moved, tmp_path / "a.png", mesh, size=(600, 400), zoom=zoom)
+        image = pixels(tmp_path / "a.png")
+        holes[str(zoom)] = has(image[60:, 100:400], [255, 255, 255], 0)
+        if zoom == "auto":
+            assert has(image[10:30, :560], [255, 255, 255], 0) > 5_000, "a title on white"
+            assert has(image[60:, 590:], [255, 255, 255], 0) == 10 * 340, "a bar on white"
+    assert 5 * 5 < holes["auto"] < holes[str(Detail((0.1, 0.0), 2.4))]
+    wide = 500 / 2.4
+    assert holes[str(Detail((0.1, 0.0), 2.4))] == pytest.approx(wide**2, rel=0.25)

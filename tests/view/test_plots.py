@@ -70,7 +70,7 @@ def test_steps_show_minimum_and_mean_of_each_run(axes):
         StepRun("b", np.arange(2), np.array([1.0, 0.5]), np.array([1.0, 0.7])),
     ]
     quality_by_step(axes, runs)
-    drawn = {line.get_gid(): line.get_ydata().tolist() for line in axes.lines}
+    drawn = {line.get_gid(): line.get_ydata().tolist() for line in axes.lines if line.get_gid()}
     assert drawn == {
         "minimum:a": [1.0, 0.8, 0.6],
         "mean:a": [1.0, 0.9, 0.8],
@@ -146,6 +146,22 @@ def test_letters_are_large_enough_and_stand_out(axes, style):
         assert np.abs(np.array(to_rgb(text.get_color())) - background).max() > 0.4
 
 
+@pytest.mark.parametrize(
+    ("draw", "run"),
+    [
+        (histogram, QualityRun("a", np.array([0.5]), series=4)),
+        (quality_by_step, StepRun("a", np.arange(1), np.ones(1), np.ones(1), 4)),
+        (convergence, GreedyRun("a", np.arange(1), np.ones(1), np.ones(1), None, 4)),
+        (against_steps, Outcome("a", 1, 0.5, 0.5, series=4)),
+    ],
+)
+def test_a_run_can_keep_its_look_when_others_are_left_out(axes, draw, run):
+    draw(axes, [run])
+    artist = axes.patches[0] if draw is histogram else axes.lines[0]
+    colour = artist.get_edgecolor() if draw is histogram else artist.get_color()
+    assert to_rgb(colour) == to_rgb(PRINT.series(4).colour)
+
+
 def test_a_style_without_legend_leaves_it_to_the_figure(axes):
     from dataclasses import replace
 
@@ -168,5 +184,5 @@ def test_series_differ_without_their_colour(style):
 def test_an_empty_plot_is_only_empty(axes, draw):
     draw(axes, [])
     axes.figure.canvas.draw()
-    assert not axes.lines
+    assert not any(len(line.get_xdata()) for line in axes.lines)
     assert axes.get_xlabel()

@@ -1,0 +1,113 @@
+"""The docks around the view: which there are, where they stand, and how they share the room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
+
+from slideviz.gui.boundaries import BoundariesPanel
+from slideviz.gui.log import LogPanel
+from slideviz.gui.method import MethodPanel
+from slideviz.gui.motions import MotionPanel
+from slideviz.gui.run import RunPanel
+
+LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
+LEFT_WIDTH, RIGHT_WIDTH = 350, 300
+"""Pixels that the panels at the sides need at least."""
+
+
+@dataclass(frozen=True)
+class DockRow:
+    """One dock: its name and title, where it stands, and how its panel is made.
+
+    ``after`` names the dock that it shares a place with, as a tab; ``bare`` has no title bar:
+    the tab, or the button in it, names it already, and the height is needed.
+    """
+
+    name: str
+    title: str
+    area: Qt.DockWidgetArea
+    make: Callable[[Any], QWidget]
+    after: str = ""
+    bare: bool = False
+    shown: bool = True
+
+
+DOCKS: tuple[DockRow, ...] = (
+    DockRow("boundaries", "Boundaries", LEFT, lambda w: BoundariesPanel(w.store)),
+    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), bare=True),
+    DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion", bare=True),
+    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), bare=True),
+    DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
+)
+"""Every dock; the panels get the window and take from it what they need."""
+
+
+class Docks:
+    """The docks of a window, by name in ``by_name``; their panels in ``panels``."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self.window = window
+        window.setDockOptions(
+            QMainWindow.DockOption.AnimatedDocks | QMainWindow.DockOption.AllowTabbedDocks
+        )
+        window.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
+        window.setCorner(Qt.Corner.BottomLeftCorner, LEFT)
+        window.setCorner(Qt.Corner.BottomRightCorner, RIGHT)
+        self.by_name: dict[str, QDockWidget] = {}
+        self.panels: dict[str, QWidget] = {}
+        for row in DOCKS:
+            self._make(row)
+        self.arrange()
+
+    def _make(self, row: DockRow) -> None:
+        dock = QDockWidget(row.title, self.window)
+        dock.setObjectName(row.title.lower())
+        panel = row.make(self.window)
+        dock.setWidget(panel)
+        # A window once made small must not leave names and fields cut off for ever.
+        if row.area != BOTTOM:
+            dock.setMinimumWidth(LEFT_WIDTH if row.area == LEFT else RIGHT_WIDTH)
+        if row.bare:
+            dock.setTitleBarWidget(QWidget())
+        self.by_name[row.name] = dock
+        self.panels[row.name] = panel
+        self.window.addDockWidget(row.area, dock)
+
+    def arrange(self) -> None:
+        """Put every dock where it belongs at first."""
+        window = self.window
+        for row in DOCKS:
+            dock = self.by_name[row.name]
+            dock.setFloating(False)
+            window.addDockWidget(row.area, dock)
+            dock.setVisible(row.shown)
+        for row in DOCKS:
+            if row.after:
+                window.tabifyDockWidget(self.by_name[row.after], self.by_name[row.name])
+        for row in DOCKS:
+            if not row.after and any(other.after == row.name for other in DOCKS):
+                self.by_name[row.name].raise_()
+
+    def share_room(self) -> None:
+        """Give every dock the room it needs."""
+        window = self.window
+        heights = {"boundaries": 240, "motion": 330, "run": 90}
+        docks = [self.by_name[name] for name in heights]
+        window.resizeDocks(docks[:1], [372], Qt.Orientation.Horizontal)
+        window.resizeDocks(docks, list(heights.values()), Qt.Orientation.Vertical)
+        right = [self.by_name[row.name] for row in DOCKS if row.area == RIGHT and not row.after]
+        if right:
+            window.resizeDocks(right[:1], [320], Qt.Orientation.Horizontal)
+
+    def lead_to(self, name: str) -> None:
+        """Bring a dock to the front."""
+        dock = self.by_name[name]
+        dock.show()
+        dock.raise_()
+        dock.widget().setFocus()

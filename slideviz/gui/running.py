@@ -1,0 +1,140 @@
+"""The jobs of a window: one after the other, each with one end, and what is told about them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from qtpy.QtCore import QObject, Signal
+
+from slideviz.gui.dialogs import Banner
+from slideviz.gui.worker import JobRunner
+from slideviz.view import changes, jobs
+from slideviz.view.state import Frame
+from slideviz.view.store import Store
+
+log = logging.getLogger("slideviz")
+
+
+class Running(QObject):
+    """Starts jobs, keeps what they report, and tells how they end.
+
+    Signals
+    -------
+    began(str), doing(Doing), ended()
+        A job started, with its name; is so far; ended, however it did.
+    said(str)
+        Something for the status bar.
+    """
+
+    began = Signal(str)
+    doing = Signal(object)
+    ended = Signal()
+    said = Signal(str)
+
+    def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self.banner = banner
+        self.runner = JobRunner(self)
+        self._finish: Callable[[Any], None] | None = None
+        self._next: Callable[[], None] | None = None
+        self._deforms = False
+        self.runner.doing.connect(self.doing)
+        self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
+        self.runner.finished.connect(self._finished)
+        self.runner.cancelled.connect(self._cancelled)
+        self.runner.failed.connect(self._failed)
+
+    def start_job(self, text: str, finish: Callable[[Any], None], function, *values) -> None:
+        """Start a job beside the window; one that still runs is cancelled first."""
+        if self.runner.busy:
+            self._next = partial(self.start_job, text, finish, function, *values)
+            self.cancel()
+            return
+        self._finish = finish
+        self.runner.start(function, *values)
+        self.began.emit(text)
+        self.said.emit(text)
+
+    def start_run(self) -> None:
+        """Deform the mesh with the settings there are."""
+        session = self.store.session
+        if self.runner.busy or changes.is_missing(session):
+            return
+        self.banner.hide()
+        self.store.change(changes.start_run)
+        if session.view.colour_by == "role":
+            self.store.change(changes.set_view, colour_by="size_skew")
+        case = session.case
+        steps = case.steps or "automatic"
+        log.info("run: sliding %s, periodic %s, %s steps", case.sliding, case.periodic, steps)
+        self._deforms = True
+        self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
+
+    def cancel(self) -> None:
+        """Ask the job that runs to stop."""
+        if self.runner.busy:
+            self.runner.cancel()
+
+    def close(self) -> None:
+        """End the job; nothing is signalled any more."""
+        self._next = None
+        self.runner.close()
+
+    def _end(self, how: str) -> None:
+        self._finish = None
+        if self._deforms:
+            self._deforms = False
+            self.store.change(changes.end_run, how)
+        self.ended.emit()
+        follow, self._next = self._next, None
+        if follow is not None:
+            follow()
+
+    def _finished(self, value: Any) -> None:
+        finish = self._finish
+        self._end("done")
+        if finish is not None:
+            finish(value)
+
+    def _cancelled(self) -> None:
+        steps = len(self.store.session.frames) - 1
+        kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
+        self.said.emit(f"Cancelled{kept}")
+        log.info("cancelled%s", kept)
+        self._end("cancelled")
+
+    def _failed(self, error: Exception) -> None:
+        self.banner.tell_error(error)
+        log.error("%s", error)
+        self.said.emit("")
+        self._end("failed")
+
+    def _run_done(self, _: Any) -> None:
+        run = self.store.session.runs[-1]
+        if run.last is None:
+            return
+        quality = run.last.quality
+        text = (
+            f"{_steps_text(run.last)}min {quality.min:.4f}, mean {quality.mean:.4f}, "
+            f"{quality.inverted} inverted"
+        )
+        log.info("done: %s", text)
+        warnings = run.last.step.warnings
+        for warning in warnings:
+            log.warning("%s", warning)
+        if warnings:
+            self.banner.tell("\n".join(warnings))
+        self.said.emit(f"Done: {text}")
+
+
+def _steps_text(frame: Frame) -> str:
+    """Return how many steps an automatic run took, and what else it tried; else nothing."""
+    if frame.step is None or not frame.step.tried:
+        return ""
+    count = frame.step.total
+    tried = ", ".join(str(trial.steps) for trial in frame.step.tried)
+    return f"{count} step{'s' if count > 1 else ''} (automatic, tried {tried}); "
