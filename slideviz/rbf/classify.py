@@ -222,34 +222,44 @@ def directions(
     node = classes.cluster_node
     slid, starts = np.unique(node, return_index=True)
     stops = np.append(starts, len(node))[1:]
-    spans = {int(i): (int(a), int(b)) for i, a, b in zip(slid, starts, stops, strict=True)}
+    size = stops - starts
     if images:
-        total = _averaged(total, spans, images)
-    for start, stop in spans.values():
-        if stop - start == 2:
-            total[start + 1] -= (total[start + 1] @ total[start]) * total[start]
-            total[start + 1] = unit(total[start + 1])
+        total = _averaged(total, (slid, starts, size), images)
+    first = starts[size == 2]
+    share = np.einsum("pd,pd->p", total[first + 1], total[first])
+    total[first + 1] = unit(total[first + 1] - share[:, None] * total[first])
     keep = np.ones(len(node), bool)
-    for start, stop in spans.values():
-        if stop - start > 2:
-            # More than two normals of rank 2: the two leading right singular vectors.
-            total[start : start + 2] = np.linalg.svd(total[start:stop])[2][:2]
-            keep[start + 2 : stop] = False
+    for start, stop in zip(starts[size > 2], stops[size > 2], strict=True):
+        # More than two normals of rank 2: the two leading right singular vectors.
+        total[start : start + 2] = np.linalg.svd(total[start:stop])[2][:2]
+        keep[start + 2 : stop] = False
     return node[keep], total[keep]
 
 
 def _averaged(
-    total: FloatArray, spans: Mapping[int, tuple[int, int]], images: Mapping[int, int]
+    total: FloatArray, spans: tuple[IntArray, IntArray, IntArray], images: Mapping[int, int]
 ) -> FloatArray:
-    """Return cluster normals averaged with those of the periodic partner where they are alike."""
+    """Return cluster normals averaged with those of the periodic partner where they are alike.
+
+    Parameters
+    ----------
+    spans
+        Each node, its first row in ``total``, and the number of its rows.
+    """
+    slid, starts, size = spans
+    pairs = np.array([(a, b) for a, b in images.items()], np.int64).reshape(-1, 2)
+    pairs = pairs[np.isin(pairs, slid).all(axis=1)]
+    own, other = np.searchsorted(slid, pairs).T
+    row = starts[own].repeat(size[own])
+    row += np.arange(len(row)) - (np.cumsum(size[own]) - size[own]).repeat(size[own])
+    partner = other.repeat(size[own])
+    most, like = np.full(len(row), 0.5), np.full(len(row), -1)
+    for k in range(int(size.max(initial=0))):
+        at = np.minimum(starts[partner] + k, len(total) - 1)
+        along = np.einsum("rd,rd->r", total[row], total[at])
+        closer = (k < size[partner]) & (along > most)
+        most[closer], like[closer] = along[closer], at[closer]
+    alike = like >= 0
     out = total.copy()
-    for node, partner in images.items():
-        if node not in spans or partner not in spans:
-            continue
-        start, stop = spans[node]
-        other = total[slice(*spans[partner])]
-        for row in range(start, stop):
-            along = other @ total[row]
-            if along.max() > 0.5:
-                out[row] = total[row] + other[np.argmax(along)]
+    out[row[alike]] += total[like[alike]]
     return unit(out)

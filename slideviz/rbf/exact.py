@@ -5,14 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch, linear_terms
-from slideviz.rbf.solve import condition, enough_threads, factorise, saddle_condition, solve_saddle
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch, linear_terms
+from slideviz.rbf.rows import Rows, blocks
+from slideviz.rbf.solve import (
+    NOTHING,
+    Factor,
+    condition,
+    enough_threads,
+    extend,
+    saddle_condition,
+    solve_saddle,
+)
 
 
 class ExactFit:
-    """Solves ``G w = b`` with G_ab = phi_ab (n_a . n_b) anew whenever rows are added.
+    """Solves ``G w = b`` with G_ab = phi_ab (n_a . n_b) whenever rows are added.
+
+    The systems of pseudo sliding are leading blocks of each other: one factor grows.
 
     Attributes
     ----------
@@ -25,15 +36,16 @@ class ExactFit:
         d = problem.values.shape[1]
         self._problem, self._watch = problem, watch
         self._rows: Rows | None = None
-        self._lower: FloatArray | None = None
+        self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         self.dropped: IntArray = np.empty(0, np.int64)
 
     def add(self, rows: Rows) -> None:
         """Solve with these rows and all before them."""
+        done = 0
         if self._rows is not None:
-            rows = self._rows.followed_by(rows)
+            done, rows = len(self._rows.nodes), self._rows.followed_by(rows)
         self._rows = rows
         problem = self._problem
         with self._watch.phase("solve") as tick:
@@ -41,26 +53,50 @@ class ExactFit:
                 self.found, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
                 return
-            place = problem.features[:, rows.nodes], rows.normals
-            system = matrix(problem.basis, place, tick=tick)
-            with enough_threads(len(system) ** 3 / 3):
-                factor = factorise(system, tick)
-                weights = factor.solve(rows.right)
-        self._lower = factor.lower
-        self.dropped = np.unique(rows.nodes[factor.dropped])
+            weights = np.zeros_like(rows.right)
+            dropped = [self._solve(rows, part, done, weights, tick) for part in _parts(rows)]
+        self.dropped = np.unique(rows.nodes[np.concatenate(dropped)])
         self.found = gathered(rows, weights)
+
+    def _solve(
+        self, rows: Rows, part: IntArray, done: int, weights: FloatArray, tick: Tick
+    ) -> IntArray:
+        """Write the weights of one block of rows, of which those below ``done`` are factorised.
+
+        Returns the rows that the pivot guard left out.
+        """
+        problem, new = self._problem, part[part >= done]
+
+        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
+            normals = None if rows.normals is None else rows.normals[index]
+            return problem.features[:, rows.nodes[index]], normals
+
+        system = matrix(problem.basis, place(new), place(part), tick)
+        first = int(part[0])
+        with enough_threads(len(system) * len(part) ** 2 / 3):
+            factor = extend(self._factors.get(first, NOTHING), system, tick)
+            weights[part] = factor.solve(rows.right[part])
+        self._factors[first] = factor
+        return part[factor.dropped]
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the last system."""
-        if self._lower is not None:
-            with enough_threads(20.0 * len(self._lower) ** 2):
-                return condition(self._lower)
+        if self._factors:
+            factors = [factor.lower for factor in self._factors.values()]
+            with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
+                return condition(*factors)
         if self._rows is None:
             return 1.0
         place = self._problem.features[:, self._rows.nodes], self._rows.normals
         return saddle_condition(
             matrix(self._problem.basis, place), row_terms(self._problem, self._rows)
         )
+
+
+def _parts(rows: Rows) -> list[IntArray]:
+    """Return the rows of each block of the system."""
+    block = blocks(rows)
+    return [np.flatnonzero(block == k) for k in np.unique(block)]
 
 
 def gathered(rows: Rows, weights: FloatArray, tail: FloatArray | None = None) -> Interpolant:

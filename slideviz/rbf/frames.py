@@ -17,14 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair, axis_basis, in_axis_frame
-
-Distance = Literal["euclidean", "rotational"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +56,6 @@ class Frame:
     def cylindrical(self) -> bool:
         """Tell whether the coordinates are (r, rho theta[, z])."""
         return self.axis is not None
-
-    @property
-    def distance(self) -> Distance:
-        """Return the rule that the features serve."""
-        return "rotational" if self.cylindrical and self.period else "euclidean"
 
     def coords(self, points: FloatArray) -> FloatArray:
         """Return coordinates (n, d) of Cartesian points (n, d)."""

@@ -23,8 +23,10 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
+from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Rows, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
+from slideviz.rbf.rows import Rows, blocks
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, solve_lower
 
 POOL = 768
@@ -70,26 +72,31 @@ class GreedyFit:
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._level = history[-1].level if history else 1
         self._rows = Rows(np.empty(0, np.int64), None, np.empty((0, d)))
-        self._candidate = np.empty(0, np.int64)
+        self._candidate = self._block = np.empty(0, np.int64)
         self._new_level()
 
     def _new_level(self) -> None:
         """Begin a level: an empty factor for what the levels before left."""
         self._settled = self.found
         self._now = Interpolant(np.empty(0, np.int64), self.found.weights[:0])
-        self._factor = self._store = np.empty((0, 0))
-        self._half = np.empty((0, self._rows.right.shape[1]))
+        self._grown = self._empty()
         self._chosen = np.empty(0, np.int64)
         self._barred = np.zeros(len(self._rows.nodes), bool)
+
+    def _empty(self) -> list[Growing]:
+        """Return a factor without rows for each block."""
+        count = int(self._block.max(initial=0)) + 1
+        return [Growing(self._rows.right.shape[1]) for _ in range(count)]
 
     def add(self, rows: Rows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""
         rows = self._sorted(rows)
-        if len(self._rows.nodes):
-            rows = self._rows.followed_by(rows)
-        else:
-            self._half = np.empty((0, rows.right.shape[1]))
-        self._rows = rows
+        first = not len(self._rows.nodes)
+        self._rows = rows if first else self._rows.followed_by(rows)
+        rows = self._rows
+        self._block = blocks(rows)
+        if first:
+            self._grown = self._empty()
         new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
         self._candidate = np.cumsum(new) - 1
         self._first = np.flatnonzero(new)
@@ -183,8 +190,10 @@ class GreedyFit:
         if self._tailed:
             found, self._singular = saddle_fit(self._problem, rows)
             return found
-        w = solve_lower(self._factor, self._half, transposed=True)
-        return gathered(rows, w)
+        weights = np.empty_like(rows.right)
+        for factor in self._grown:
+            weights[factor.turn] = factor.weights()
+        return gathered(rows, weights)
 
     def _values(self, sum_: Interpolant) -> FloatArray:
         """Return an interpolant in each row, (r, m)."""
@@ -204,7 +213,8 @@ class GreedyFit:
         count, pool = self._pool(np.where(open_, errors, -1.0), residual)
         while len(pool):
             rows = np.flatnonzero(np.isin(self._candidate, pool) & ~self._barred)
-            flops = 4.0 * (len(self._chosen) + count) * len(rows) * len(self._chosen)
+            done = len(self._chosen) / len(self._grown)
+            flops = 4.0 * (done + count) * len(rows) * done
             with enough_threads(flops):
                 picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
                 if picked:
@@ -260,90 +270,46 @@ class GreedyFit:
         largest: float,
         target: FloatArray,
     ) -> bool:
-        """Run the Newton greedy on the pool's rows and append what it picks to the factor."""
-        features, normals = self._problem.features, self._rows.normals
-        basis, old = self._basis, self._chosen
-
-        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
-            nodes = self._rows.nodes[index]
-            return features[:, nodes], None if normals is None else normals[index]
-
-        schur = matrix(basis, place(rows))
-        left: FloatArray = np.empty((0, len(rows)))
-        if len(old):
-            left = solve_lower(self._factor, matrix(basis, place(old), place(rows)))
-            schur -= left.T @ left
+        """Run the Newton greedy on the pool's rows and append what it picks to the factors."""
+        order = np.argsort(self._block[rows], kind="stable")
+        rows, residual = rows[order], residual[order]
+        parts = [rows[self._block[rows] == b] for b in range(len(self._grown))]
+        left, schur = [], []
+        for factor, part in zip(self._grown, parts, strict=True):
+            beside, rest = self._remaining(factor, part)
+            left.append(beside)
+            schur.append(rest)
         floor = 0.0 if self._settings.pick != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
-        picked, basis_part = _newton(schur, residual, self._candidate[rows], (count, floor))
-        self._barred[rows[np.diag(schur) <= PIVOT_GUARD]] = True
-        if not len(picked):
-            return False
-        self._append(rows[picked], left[:, picked], basis_part[picked, : len(picked)], target)
-        return True
+        picked, bases = newton(schur, residual, self._candidate[rows], (count, floor))
+        diagonal = np.concatenate([np.diag(s) for s in schur])
+        self._barred[rows[diagonal <= PIVOT_GUARD]] = True
+        turn, start = len(self._chosen) + np.arange(len(picked)), 0
+        for k, factor in enumerate(self._grown):
+            mine = (picked >= start) & (picked < start + len(parts[k]))
+            at = picked[mine] - start
+            factor.append(parts[k][at], turn[mine], (left[k][:, at].T, bases[k][at]))
+            factor.follow(target)
+            start += len(parts[k])
+        self._chosen = np.concatenate([self._chosen, rows[picked]])
+        self._barred[rows[picked]] = True
+        return len(picked) > 0
 
-    def _append(
-        self, rows: IntArray, left: FloatArray, corner: FloatArray, target: FloatArray
-    ) -> None:
-        """Append rows (L21, L22) to the factor, and their entries to L^-1 b."""
-        n, more = len(self._chosen), len(rows)
-        if n + more > len(self._store):
-            # Room for twice as much: copying the factor in every cycle would cost as much as
-            # computing it.
-            self._store = np.zeros((2 * (n + more), 2 * (n + more)))
-            self._store[:n, :n] = self._factor
-        self._store[n : n + more, :n] = left.T
-        self._store[n : n + more, n : n + more] = corner
-        factor = self._store[: n + more, : n + more]
-        rest = target[rows] - left.T @ self._half
-        half = solve_lower(corner, rest)
-        self._factor, self._half = factor, np.concatenate([self._half, half])
-        self._chosen = np.concatenate([self._chosen, rows])
-        self._barred[rows] = True
+    def _remaining(self, factor: Growing, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""
+
+        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
+            nodes, normals = self._rows.nodes[index], self._rows.normals
+            return self._problem.features[:, nodes], None if normals is None else normals[index]
+
+        schur = matrix(self._basis, place(rows))
+        if not len(factor.rows):
+            return np.empty((0, len(rows))), schur
+        left = solve_lower(factor.lower, matrix(self._basis, place(factor.rows), place(rows)))
+        return left, schur - left.T @ left
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the last level's system."""
-        with enough_threads(20.0 * len(self._factor) ** 2):
-            return condition(self._factor)
-
-
-def _newton(
-    schur: FloatArray, residual: FloatArray, candidate: IntArray, limits: tuple[int, float]
-) -> tuple[IntArray, FloatArray]:
-    """Return the rows picked by the one-node Newton greedy, and the Newton basis (p, k).
-
-    Parameters
-    ----------
-    schur : (p, p)
-        What remains of the pool's matrix after the nodes chosen before.
-    residual : (p, m)
-    candidate : (p,)
-        The node of each row; all rows of a node are picked together.
-    limits
-        Number of nodes, and the error below which to stop (the first is always taken).
-    """
-    count, floor = limits
-    pivot = np.diag(schur).copy()
-    rest = residual.copy()
-    basis = np.zeros((len(schur), min(len(schur), count * 3)))
-    open_ = pivot > PIVOT_GUARD
-    picked: list[int] = []
-    names, group = np.unique(candidate, return_inverse=True)
-    for turn in range(count):
-        squares = np.where(open_, np.einsum("pm,pm->p", rest, rest), 0.0)
-        error = np.sqrt(np.bincount(group, squares, len(names)))
-        best = int(np.argmax(error))
-        if error[best] <= 0 or (turn and error[best] < floor):
-            break
-        for row in np.flatnonzero((group == best) & open_):
-            if pivot[row] <= PIVOT_GUARD:
-                continue
-            k = len(picked)
-            v = schur[:, row] - basis[:, :k] @ basis[row, :k]
-            v /= np.sqrt(pivot[row])
-            rest -= np.outer(v, rest[row] / np.sqrt(pivot[row]))
-            pivot -= v * v
-            basis[:, k] = v
-            picked.append(int(row))
-        open_ &= (group != best) & (pivot > PIVOT_GUARD)
-    return np.array(picked, np.int64), basis
+        factors = [factor.lower for factor in self._grown]
+        with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
+            return condition(*factors)

@@ -1,7 +1,7 @@
 """The three methods, one function each, on one deformation step.
 
 Every condition is a scalar constraint "the displacement of node i along n is b" (see
-``problem.Rows``). Regular interpolation has all axes of all boundary nodes as constraints,
+``rows.Rows``). Regular interpolation has all axes of all boundary nodes as constraints,
 direct sliding only the normals of the nodes that slide (thesis section 2.4.1), and pseudo
 sliding (2.4.2) finds their displacement by projection first. How the constraints are met, by
 all of them at once or by a greedy selection, is the business of the fit.
@@ -18,18 +18,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.correction import correct
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.problem import (
-    AGREE,
-    Cycle,
-    Interpolant,
-    Problem,
-    Rows,
-    Solution,
-    Watch,
-    full_rows,
-    merge,
-    sliding_rows,
-)
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Solution, Watch
+from slideviz.rbf.rows import AGREE, Rows, full_rows, merge, sliding_rows
 
 
 class Fit(Protocol):
@@ -83,7 +73,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     nodes = np.concatenate([problem.known, sliding])
     free = _at(problem, watch, fit, sliding)
     if not problem.curved:
-        free = _within(problem, sliding, free)
+        free = within(problem, sliding, free)
     with watch.phase("project"):
         slid = problem.project(sliding, free)
     gap = np.abs(slid - free).max(initial=0.0)
@@ -95,7 +85,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     return _finish(problem, watch, second, nodes, values)
 
 
-def _within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
+def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
     """Return the displacements (m, d) of sliding nodes without their part along the normals."""
     row = np.full(len(problem.features[0]), -1)
     row[nodes] = np.arange(len(nodes))
@@ -135,7 +125,7 @@ def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatAr
     """
     free = _at(problem, watch, fit, level)
     if problem.curved:
-        free = _within(problem, level, free)
+        free = within(problem, level, free)
     with watch.phase("project"):
         return problem.project(level, free)
 

@@ -6,16 +6,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 
-from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
-
-AGREE = 1e-7
-"""Largest difference of the data of coinciding nodes, as a fraction of the support radius."""
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
 
@@ -142,6 +138,8 @@ class Solution:
         Estimated condition number of the final system.
     history : tuple of Cycle
         Convergence of the selection; empty without data reduction.
+    warnings : tuple of str
+        What the user should know.
     """
 
     displacement: FloatArray
@@ -150,6 +148,7 @@ class Solution:
     dropped: IntArray
     condition: float
     history: tuple[Cycle, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,103 +208,3 @@ def linear_terms(basis: Basis, features: FloatArray) -> FloatArray:
     else:
         rows += list(features)
     return np.stack(rows, axis=1)
-
-
-def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return nodes (m,) and values (m, d) with coinciding nodes taken once.
-
-    Raises
-    ------
-    DeformError
-        Coinciding nodes are asked to move differently.
-    """
-    controls, group = np.unique(problem.same_as[nodes], return_inverse=True)
-    data = np.zeros((len(controls), values.shape[1]))
-    data[group] = values
-    gap = np.abs(data[group] - values).max(axis=1, initial=0.0)
-    if gap.max(initial=0.0) > AGREE * problem.basis.radius:
-        row = int(np.argmax(gap))
-        disagree(problem, nodes, row, float(gap[row]))
-    return controls, data
-
-
-def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoReturn:
-    """Raise the error for two coinciding nodes that are asked to move differently."""
-    node = int(nodes[row])
-    group = nodes[problem.same_as[nodes] == problem.same_as[node]]
-    other = next((int(n) for n in group if n != node), node)
-    raise DeformError(
-        f"nodes {node} and {other} coincide (in the same place, or one period apart) but are "
-        f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "
-        "periodic sides (in a rotational case: about the axis of periodicity) and may not reach "
-        "into the next passage; or choose PERIODIC_MODE= none"
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``.
-
-    Attributes
-    ----------
-    nodes : (r,) int64
-        Rows of one node are neighbours.
-    normals : (r, d) float64 or None
-        None: every row stands for all axes, and ``right`` has a column for each.
-    right : (r, m) float64
-        m = d without normals, and 1 with them.
-    """
-
-    nodes: IntArray
-    normals: FloatArray | None
-    right: FloatArray
-
-    def followed_by(self, more: Rows) -> Rows:
-        """Return these rows and then others, both without normals."""
-        nodes = np.concatenate([self.nodes, more.nodes])
-        return Rows(nodes, None, np.concatenate([self.right, more.right]))
-
-
-def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Rows:
-    """Return the rows of nodes with known displacement, coinciding ones merged."""
-    merged, data = merge(problem, nodes, values)
-    return Rows(merged, None, data)
-
-
-def sliding_rows(problem: Problem) -> Rows:
-    """Return the rows of direct sliding: all axes of known nodes, normals of sliding ones."""
-    d = problem.values.shape[1]
-    nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
-    normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
-    right = np.concatenate([problem.values.ravel(), np.zeros(len(problem.normal_nodes))])
-    stands = problem.same_as[nodes]
-    order = np.argsort(stands, kind="stable")
-    nodes, stands, normals, right = nodes[order], stands[order], normals[order], right[order]
-    _, starts = np.unique(stands, return_index=True)
-    stops = np.append(starts, len(nodes))[1:]
-    mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
-    keep = np.ones(len(nodes), bool)
-    for start, stop in zip(starts[mixed], stops[mixed], strict=True):
-        span = slice(start, stop)
-        keep[span] = _independent(problem, nodes[span], normals[span], right[span])
-    return Rows(stands[keep], normals[keep], right[keep, None])
-
-
-def _independent(
-    problem: Problem, nodes: IntArray, normals: FloatArray, right: FloatArray
-) -> list[bool]:
-    """Orthonormalise the constraints of coinciding nodes in place; tell which ones remain."""
-    keep: list[bool] = []
-    for row in range(len(normals)):
-        for other in np.flatnonzero(keep):
-            share = normals[row] @ normals[other]
-            normals[row] -= share * normals[other]
-            right[row] -= share * right[other]
-        length = np.linalg.norm(normals[row])
-        keep.append(bool(length > 1e-6))
-        if keep[row]:
-            normals[row] /= length
-            right[row] /= length
-        elif abs(right[row]) > AGREE * problem.basis.radius:
-            disagree(problem, nodes, row, abs(float(right[row])))
-    return keep

@@ -74,6 +74,10 @@ class Factor:
         return out
 
 
+NOTHING = Factor(np.empty((0, 0)), np.empty(0, np.int64), np.empty(0, np.int64))
+"""The factor of a matrix without rows."""
+
+
 def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) -> FloatArray:
     """Return ``L^-1 B`` (or ``L^-T B``) for a lower triangular L (n, n) and B (n, m).
 
@@ -95,11 +99,21 @@ def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) 
     return out
 
 
-def condition(lower: FloatArray) -> float:
-    """Return an estimate of the condition number (1-norm) of L L^T, by Higham and Tisseur."""
+def condition(*factors: FloatArray) -> float:
+    """Return an estimate of the condition number (1-norm), by Higham and Tisseur.
+
+    Of a matrix with the blocks L L^T of one or more factors L.
+    """
+    sizes = np.array([_norms(lower) for lower in factors if len(lower)])
+    return float(np.prod(sizes.max(axis=0))) if len(sizes) else 1.0
+
+
+def _norms(lower: FloatArray) -> tuple[float, float]:
+    """Return the 1-norms of L L^T and of its inverse, the latter estimated."""
     n = len(lower)
     if n < 5:
-        return float(np.linalg.cond(lower @ lower.T, 1)) if n else 1.0
+        full = lower @ lower.T
+        return float(np.linalg.norm(full, 1)), float(np.linalg.norm(np.linalg.inv(full), 1))
 
     def product(x: FloatArray) -> FloatArray:
         return lower @ (lower.T @ x)
@@ -111,38 +125,62 @@ def condition(lower: FloatArray) -> float:
     for apply in (product, inverse):
         operator = LinearOperator((n, n), matvec=apply, rmatvec=apply, matmat=apply, dtype=float)
         sizes.append(float(onenormest(operator)))
-    return sizes[0] * sizes[1]
+    return sizes[0], sizes[1]
 
 
 def factorise(matrix: FloatArray, tick: Tick = no_tick) -> Factor:
     """Return the factor of a symmetric matrix (n, n) with unit diagonal.
-
-    Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
-    few tens of milliseconds even for 10,000 unknowns.
 
     Raises
     ------
     DeformError
         The matrix has numbers that are not finite.
     """
-    _require_finite(matrix)
-    n = len(matrix)
-    lower = np.zeros((n, n), order="F")
-    dropped = np.zeros(n, bool)
-    for start in range(0, n, BLOCK):
-        stop = min(n, start + BLOCK)
-        panel = matrix[start:, start:stop] - lower[start:, :start] @ lower[start:stop, :start].T
+    return extend(NOTHING, matrix, tick)
+
+
+def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
+    """Return the factor of a matrix of which the leading block has the factor ``before``.
+
+    Left-looking by blocks of columns, so that ``tick`` is called, and may stop the work, every
+    few tens of milliseconds even for 10,000 unknowns.
+
+    Parameters
+    ----------
+    rows : (m, n + m)
+        The last m rows of the symmetric matrix; ``before`` is of the first n.
+
+    Raises
+    ------
+    DeformError
+        The matrix has numbers that are not finite.
+    """
+    _require_finite(rows)
+    done, old, more = len(before.lower), rows.shape[1] - len(rows), len(rows)
+    corner, dropped = rows[:, old:], np.zeros(more, bool)
+    lower = np.zeros((done + more, done + more), order="F")
+    lower[:done, :done] = before.lower
+    if done:
+        lower[done:, :done] = solve_lower(before.lower, rows[:, before.kept].T).T
+    for start in range(0, more, BLOCK):
+        stop = min(more, start + BLOCK)
+        here, below = slice(done + start, done + stop), slice(done + stop, None)
+        panel = corner[start:, start:stop] - (
+            lower[done + start :, : here.start] @ lower[here, : here.start].T
+        )
         head = _cholesky(panel[: stop - start], dropped[start:stop])
-        lower[start:stop, start:stop] = head
-        if stop < n:
-            below = solve_lower(head, panel[stop - start :].T)
-            below[dropped[start:stop]] = 0.0
-            lower[stop:, start:stop] = below.T
-        tick((stop / n) ** 2)
+        lower[here, here] = head
+        if stop < more:
+            rest = solve_lower(head, panel[stop - start :].T)
+            rest[dropped[start:stop]] = 0.0
+            lower[below, here] = rest.T
+        tick((stop / more) ** 2)
+    kept = np.concatenate([before.kept, old + np.flatnonzero(~dropped)])
     if not dropped.any():
-        return Factor(lower, np.arange(n), np.empty(0, np.int64))
-    kept = np.flatnonzero(~dropped)
-    return Factor(np.asfortranarray(lower[np.ix_(kept, kept)]), kept, np.flatnonzero(dropped))
+        return Factor(lower, kept, before.dropped)
+    stay = np.concatenate([np.arange(done), done + np.flatnonzero(~dropped)])
+    left_out = np.concatenate([before.dropped, old + np.flatnonzero(dropped)])
+    return Factor(np.asfortranarray(lower[np.ix_(stay, stay)]), kept, left_out)
 
 
 def _cholesky(block: FloatArray, dropped: NDArray[np.bool_]) -> FloatArray:

@@ -97,7 +97,6 @@ def test_a_period_along_any_direction(dim):
 
 def test_what_is_not_periodic_has_no_shift():
     assert not Frame(3).shift().any()
-    assert Frame(2).distance == "euclidean"
     mesh = builders.sector(6)
     frame = make_frame(mesh.points, [match(mesh, "per1", "per2")], periodic_distance=False)
     assert frame.cylindrical

@@ -1,0 +1,152 @@
+"""The conditions of a step as scalar constraints, with coinciding nodes taken once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.problem import Problem
+
+AGREE = 1e-7
+"""Largest difference of the data of coinciding nodes, as a fraction of the support radius."""
+
+INDEPENDENT = 1e-6
+"""Length of what remains of a unit direction, from which it counts as a further one."""
+
+ALIGNED = 1e-10
+"""Components of unit directions below this are rounding: far above that of normals of flat
+boundaries, far below any angle that a mesh could mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``.
+
+    Attributes
+    ----------
+    nodes : (r,) int64
+        Rows of one node are neighbours.
+    normals : (r, d) float64 or None
+        None: every row stands for all axes, and ``right`` has a column for each.
+    right : (r, m) float64
+        m = d without normals, and 1 with them.
+    """
+
+    nodes: IntArray
+    normals: FloatArray | None
+    right: FloatArray
+
+    def followed_by(self, more: Rows) -> Rows:
+        """Return these rows and then others, both without normals."""
+        nodes = np.concatenate([self.nodes, more.nodes])
+        return Rows(nodes, None, np.concatenate([self.right, more.right]))
+
+
+def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Rows:
+    """Return the rows of nodes with known displacement, coinciding ones merged."""
+    merged, data = merge(problem, nodes, values)
+    return Rows(merged, None, data)
+
+
+def sliding_rows(problem: Problem) -> Rows:
+    """Return the rows of direct sliding: all axes of known nodes, normals of sliding ones."""
+    d = problem.values.shape[1]
+    nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
+    normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
+    right = np.concatenate([problem.values.ravel(), np.zeros(len(problem.normal_nodes))])
+    order = np.argsort(problem.same_as[nodes], kind="stable")
+    nodes, normals, right = nodes[order], normals[order], right[order]
+    stands = problem.same_as[nodes]
+    starts = np.flatnonzero(np.r_[True, stands[1:] != stands[:-1]])
+    count = np.diff(np.r_[starts, len(nodes)])
+    mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
+    keep = np.ones(len(nodes), bool)
+    for size in np.unique(count[mixed]):
+        rows = starts[mixed & (count == size), None] + np.arange(size)
+        _orthonormalise(problem, (nodes, normals, right), rows, keep)
+    return Rows(stands[keep], normals[keep], right[keep, None])
+
+
+def blocks(rows: Rows) -> IntArray:
+    """Return the block of each row, (r,): rows of different blocks are perpendicular.
+
+    G_ab = phi_ab (n_a . n_b) is zero between them. Known nodes have a row for each axis of the
+    frame, and where the sliding boundaries lie along axes too (the walls of a box; hub, inflow
+    and periodic sides of an annular passage in its cylindrical frame), the system falls apart
+    into one for each axis: a ninth of the work, with the same result.
+    """
+    if rows.normals is None or not len(rows.nodes):
+        return np.zeros(len(rows.nodes), np.int64)
+    along = np.abs(rows.normals) > ALIGNED
+    met = along.T.astype(float) @ along
+    of_axis = connected_components(met, directed=False)[1].astype(np.int64)
+    return of_axis[np.argmax(along, axis=1)]
+
+
+def _orthonormalise(
+    problem: Problem,
+    system: tuple[IntArray, FloatArray, FloatArray],
+    rows: IntArray,
+    keep: np.ndarray,
+) -> None:
+    """Orthonormalise the constraints of coinciding nodes in place, and mark those to leave out.
+
+    Parameters
+    ----------
+    system
+        Nodes (r,), normals (r, d) and right-hand sides (r,).
+    rows : (g, k)
+        The k rows of each group of coinciding nodes.
+    keep : (r,) bool
+    """
+    nodes, normals, right = system
+    for k, row in enumerate(rows.T):
+        n, b = normals[row], right[row]
+        for other in rows.T[:k]:
+            share = np.einsum("gd,gd->g", n, normals[other]) * keep[other]
+            n = n - share[:, None] * normals[other]
+            b = b - share * right[other]
+        length = np.linalg.norm(n, axis=1)
+        new = length > INDEPENDENT
+        wrong = np.flatnonzero(~new & (np.abs(b) > AGREE * problem.basis.radius))
+        if len(wrong):
+            group = wrong[0]
+            disagree(problem, nodes[rows[group]], k, abs(float(b[group])))
+        scale = np.where(new, length, 1.0)
+        keep[row], normals[row], right[row] = new, n / scale[:, None], b / scale
+
+
+def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return nodes (m,) and values (m, d) with coinciding nodes taken once.
+
+    Raises
+    ------
+    DeformError
+        Coinciding nodes are asked to move differently.
+    """
+    controls, group = np.unique(problem.same_as[nodes], return_inverse=True)
+    data = np.zeros((len(controls), values.shape[1]))
+    data[group] = values
+    gap = np.abs(data[group] - values).max(axis=1, initial=0.0)
+    if gap.max(initial=0.0) > AGREE * problem.basis.radius:
+        row = int(np.argmax(gap))
+        disagree(problem, nodes, row, float(gap[row]))
+    return controls, data
+
+
+def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoReturn:
+    """Raise the error for two coinciding nodes that are asked to move differently."""
+    node = int(nodes[row])
+    group = nodes[problem.same_as[nodes] == problem.same_as[node]]
+    other = next((int(n) for n in group if n != node), node)
+    raise DeformError(
+        f"nodes {node} and {other} coincide (in the same place, or one period apart) but are "
+        f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "
+        "periodic sides (in a rotational case: about the axis of periodicity) and may not reach "
+        "into the next passage; or choose PERIODIC_MODE= none"
+    )
