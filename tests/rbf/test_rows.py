@@ -78,7 +78,8 @@ def test_blocks_change_no_result(tmp_path, monkeypatch, name, periodic, reductio
     for one, other in zip(apart, sv.deform(case, mesh), strict=True):
         np.testing.assert_allclose(one.mesh.points, other.mesh.points, atol=1e-12)
         assert one.control_nodes == other.control_nodes
-        assert one.condition == pytest.approx(other.condition, rel=0.5)
+        # An estimate from below, with random vectors: better for the smaller systems.
+        assert 0.5 < one.condition / other.condition < 5
 
 
 def test_slanted_walls_are_solved_together(tmp_path, monkeypatch):
