@@ -25,7 +25,10 @@ COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
 
 
 def deform(
-    case: Case, mesh: Mesh, progress: Callable[[Progress], None] | None = None
+    case: Case,
+    mesh: Mesh,
+    progress: Callable[[Progress], None] | None = None,
+    plan: Plan | None = None,
 ) -> Iterator[Step]:
     """Yield the deformed mesh of each step.
 
@@ -37,6 +40,9 @@ def deform(
         The undeformed mesh.
     progress
         Called often with a ``Progress``; an exception it raises ends the run at once.
+    plan
+        What ``make_plan`` returned for this mesh and a case that differs in the number of steps
+        alone; it is made when there is none.
 
     Raises
     ------
@@ -53,8 +59,9 @@ def deform(
     """
     tell = progress or (lambda _: None)
     watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))
-    with watch.phase("classify"):
-        plan = make_plan(case, mesh)
+    if plan is None:
+        with watch.phase("classify"):
+            plan = make_plan(case, mesh)
     _require_memory(plan, case.sliding)
     climb = Climb(case, mesh, plan, tell, watch.seconds)
     yield from climb.steps(case.steps) if case.steps else _automatic(climb)

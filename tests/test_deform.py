@@ -113,6 +113,21 @@ def test_a_callback_that_raises_ends_the_run_at_once_wherever_it_is(method):
     assert last(case, mesh).index == 2
 
 
+@pytest.mark.parametrize("steps", [1, 3])
+def test_a_plan_made_before_gives_the_same_mesh(steps, monkeypatch):
+    from slideviz.case.plan import make_plan
+    from slideviz.case.samples import sample
+
+    made = sample("square", 10, "motion")
+    case, mesh = made.case.change(steps=steps), made.mesh
+    *_, alone = sv.deform(case, mesh)
+    plan = make_plan(case.change(steps=7), mesh)
+    monkeypatch.setattr(staircase, "make_plan", None)
+    *_, shared = sv.deform(case, mesh, plan=plan)
+    assert np.array_equal(shared.mesh.points, alone.mesh.points)
+    assert shared.warnings == alone.warnings
+
+
 def test_the_generator_can_be_closed_in_the_middle():
     mesh = builders.square(6)
     heard = []

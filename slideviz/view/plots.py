@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.view.plots_style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, dress
+from slideviz.view.plots_style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, dress, place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,8 +44,8 @@ LABELS: dict[What, str] = {
     "control_nodes": "control nodes [-]",
     "max_error": "largest error [mesh unit]",
 }
-_BAND = 0.07
-"""Width of the strip left of 0 where inverted cells are counted."""
+_BAND, _STEMS = 0.13, 0.07
+"""Width of the strip left of 0 where inverted cells are counted, and of the part for counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +59,14 @@ class QualityRun:
         0 to 1.
     inverted : (m,) bool, optional
         Cells to count apart instead of at 0.
+    series : int, optional
+        Number of its look; its place in the sequence when left out.
     """
 
     label: str
     values: FloatArray
     inverted: NDArray[np.bool_] | None = None
+    series: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +79,15 @@ class StepRun:
     steps : (k,) int64
         Numbers of the steps; 0 is the undeformed mesh.
     minimum, mean : (k,) float64
+    series : int, optional
+        Number of its look; its place in the sequence when left out.
     """
 
     label: str
     steps: IntArray
     minimum: FloatArray
     mean: FloatArray
+    series: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +103,8 @@ class GreedyRun:
     level : (c,) int64
         Number of the level of each cycle.
     tolerance : float or None
+    series : int, optional
+        Number of its look; its place in the sequence when left out.
     """
 
     label: str
@@ -104,6 +112,7 @@ class GreedyRun:
     error: FloatArray
     level: IntArray
     tolerance: float | None = None
+    series: int | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +132,8 @@ class Outcome:
     control_nodes : int
     max_error : float
         In the mesh's length unit.
+    series : int, optional
+        Number of the look of its label; the place of the label among all when left out.
     """
 
     label: str
@@ -133,6 +144,7 @@ class Outcome:
     seconds: float = float("nan")
     control_nodes: int = 0
     max_error: float = float("nan")
+    series: int | None = None
 
 
 def histogram(
@@ -160,10 +172,12 @@ def histogram(
     dress(axes, style, f"{metric} quality [-]", "cells [-]")
     folded = [_inverted(run) for run in runs]
     for index, (run, bad) in enumerate(zip(runs, folded, strict=True)):
-        look = style.series(index)
+        look = style.series(place(run.series, index))
         counts, edges = np.histogram(run.values[~bad], bins, range=(0.0, 1.0))
         number = int(bad.sum())
-        label = f"{run.label} ({number} inverted)" if number else run.label
+        # A legend elsewhere serves several axes, with other numbers of inverted cells.
+        told = number > 0 and style.legend
+        label = f"{run.label} ({number} inverted)" if told else run.label
         axes.stairs(
             counts,
             edges,
@@ -175,7 +189,7 @@ def histogram(
             fill=False,
         )
         if number:
-            at = -_BAND * (index + 1) / (len(runs) + 1)
+            at = -_STEMS * (index + 1) / (len(runs) + 1)
             axes.plot(
                 [at, at],
                 [0.5 if log else 0.0, number],
@@ -210,7 +224,7 @@ def _inverted_band(axes: Axes, style: Style) -> None:
     axes.set_xlim(-_BAND, 1.0)
     axes.axvspan(-_BAND, 0.0, color=style.alarm, alpha=0.13, linewidth=0)
     axes.text(
-        -_BAND / 2,
+        -(_BAND + _STEMS) / 2,
         0.97,
         "inverted",
         transform=axes.get_xaxis_transform(),
@@ -225,32 +239,26 @@ def _inverted_band(axes: Axes, style: Style) -> None:
 
 def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:
     """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
-    from matplotlib.lines import Line2D
-
     dress(axes, style, "step [-]", "quality [-]")
-    handles = []
     for index, run in enumerate(runs):
-        look = style.series(index)
-        for values, hollow, what in ((run.minimum, False, "minimum"), (run.mean, True, "mean")):
-            axes.plot(
-                run.steps, values, **_line(style, index, hollow=hollow), gid=f"{what}:{run.label}"
-            )
-        if len(runs) > 1:
-            shown = {"color": look.colour, "linestyle": look.dash, "linewidth": style.width}
-            handles.append(
-                Line2D([], [], marker=look.marker, markersize=4, label=run.label, **shown)
-            )
-    grey = style.look.text
-    for hollow, what in ((False, "minimum"), (True, "mean")):
-        face = style.look.background if hollow else grey
-        handles.append(
-            Line2D(
-                [], [], marker="o", markersize=5, ls="", mfc=face, mec=grey, color=grey, label=what
-            )
-        )
+        look = _line(style, place(run.series, index))
+        # Of many steps some markers do, those of each run at other steps.
+        every = max(1, len(run.steps) // 6)
+        look["markevery"] = (index % every, every)
+        hollow = {**look, "markerfacecolor": style.look.background}
+        axes.plot(run.steps, run.minimum, label=run.label, gid=f"minimum:{run.label}", **look)
+        axes.plot(run.steps, run.mean, gid=f"mean:{run.label}", **hollow)
+    for what, face in (("minimum", style.look.text), ("mean", style.look.background)):
+        dot: dict[str, Any] = {
+            "marker": "o",
+            "markersize": 5,
+            "linestyle": "",
+            "color": style.look.text,
+        }
+        axes.plot([], [], label=what, markerfacecolor=face, **dot)
     _quality_limits(axes, [v for run in runs for v in (*run.minimum, *run.mean)])
     _whole_ticks(axes)
-    add_legend(axes, style, handles)
+    add_legend(axes, style)
 
 
 def convergence(
@@ -266,7 +274,7 @@ def convergence(
     for index, run in enumerate(runs):
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
-        line = _line(style, index)
+        line = _line(style, place(run.series, index))
         line["markevery"] = np.flatnonzero(first[shown]).tolist()
         line["markersize"] = 3.5
         axes.plot(run.control_nodes[shown], run.error[shown], label=run.label, **line)
@@ -295,7 +303,6 @@ def against_steps(
     rows: Sequence[Outcome],
     what: What = "minimum",
     style: Style = PRINT,
-    first: int = 0,
 ) -> None:
     """Draw what runs came to against their number of steps, a line for each label.
 
@@ -306,17 +313,15 @@ def against_steps(
         In any order. Runs with inverted cells are crosses that no line joins.
     what : {"minimum", "mean", "seconds", "control_nodes", "max_error"}
     style : Style
-    first : int
-        Number of the first series' look, to keep looks apart between axes.
     """
     dress(axes, style, "deformation steps [-]", LABELS[what])
     labels = list(dict.fromkeys(row.label for row in rows))
-    for index, label in enumerate(labels, first):
+    for index, label in enumerate(labels):
         mine = sorted((row for row in rows if row.label == label), key=lambda row: row.steps)
         steps = np.array([row.steps for row in mine])
         values = np.array([float(getattr(row, what)) for row in mine])
         bad = np.array([row.inverted > 0 for row in mine]) & (what in ("minimum", "mean"))
-        line = _line(style, index)
+        line = _line(style, place(mine[0].series, index))
         axes.plot(steps, np.where(bad, np.nan, values), label=label, **line)
         if bad.any():  # an empty line that is not clipped would spoil the layout
             cross = {"color": line["color"], "linestyle": "", "marker": "x", "markersize": 6}
@@ -332,7 +337,7 @@ def against_steps(
     add_legend(axes, style)
 
 
-def _line(style: Style, index: int, hollow: bool = False) -> dict[str, Any]:
+def _line(style: Style, index: int) -> dict[str, Any]:
     """Return the arguments of ``Axes.plot`` of a series."""
     look = style.series(index)
     return {
@@ -341,7 +346,7 @@ def _line(style: Style, index: int, hollow: bool = False) -> dict[str, Any]:
         "linewidth": style.width,
         "marker": look.marker,
         "markersize": 4.5,
-        "markerfacecolor": style.look.background if hollow else look.colour,
+        "markerfacecolor": look.colour,
         "markeredgewidth": 1.0,
     }
 

@@ -87,6 +87,11 @@ class Style:
         return "#ff5d6c" if self.dark else INVERTED_COLOUR
 
 
+def place(given: int | None, index: int) -> int:
+    """Return the number of a look: the given one, or else the place in the sequence."""
+    return index if given is None else given
+
+
 def _brightness(colour: str) -> int:
     """Return the sum of the parts of a colour ``#rrggbb``."""
     return sum(bytes.fromhex(colour[1:]))
@@ -117,13 +122,11 @@ def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
         letters.set_color(text)
 
 
-def add_legend(axes: Axes, style: Style, handles: Any = None, **options: Any) -> None:
+def add_legend(axes: Axes, style: Style, **options: Any) -> None:
     """Add a legend if the style wants one and there is something to tell apart."""
-    found = axes.get_legend_handles_labels()[0] if handles is None else handles
-    if not style.legend or len(found) < 2:
+    if not style.legend or len(axes.get_legend_handles_labels()[0]) < 2:
         return
     axes.legend(
-        handles=found,
         fontsize=max(style.size, SMALLEST),
         labelcolor=style.look.text,
         facecolor=style.look.background,

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.periodic import in_axis_frame
-from slideviz.view.plots_style import PRINT, Style, add_legend, dress
+from slideviz.view.plots_style import PRINT, Style, add_legend, dress, place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,6 +40,8 @@ class Profile:
         NaN in a layer without cells.
     count : (k,) int64
         Cells in each layer.
+    series : int, optional
+        Number of its look; its place in the sequence when left out.
     """
 
     label: str
@@ -48,6 +50,7 @@ class Profile:
     minimum: FloatArray
     mean: FloatArray
     count: IntArray
+    series: int | None = None
 
     @property
     def position(self) -> FloatArray:
@@ -179,7 +182,7 @@ def spanwise(
     dress(axes, style, f"{what} quality [-]", label)
     ends = []
     for index, profile in enumerate(profiles):
-        look = style.series(index)
+        look = style.series(place(profile.series, index))
         values: FloatArray = getattr(profile, what)
         height = profile.fraction if fraction else profile.position
         there = np.isfinite(values)
