@@ -8,8 +8,9 @@ from pathlib import Path
 
 from slideviz import __version__
 from slideviz.cli import commands
+from slideviz.cli.film_command import add_film, add_zoom, size
 
-COMMANDS = ("run", "info", "quality", "sample", "keys", "shots")
+COMMANDS = ("run", "info", "quality", "film", "sample", "keys", "shots")
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -70,6 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(calls)
     _add_info(calls)
     _add_quality(calls)
+    add_film(calls)
     _add_sample(calls)
     keys = calls.add_parser("keys", help="reference of all case keys")
     keys.set_defaults(command=commands.keys)
@@ -103,6 +105,8 @@ def _add_run(calls: argparse._SubParsersAction) -> None:
     )
     run.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
     run.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
+    run.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
+    add_zoom(run)
     run.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
     run.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     run.add_argument("--force", action="store_true", help="allow writing over the input mesh")

@@ -45,14 +45,19 @@ class Bar:
             return
         self._next = now + _EVERY
         done = (progress.step - 1) / progress.total
-        filled = round(24 * done)
         left = ""
         if progress.step > 1:
             rest = (now - self._start) / done * (1 - done)
             left = f", about {rest:.0f} s left"
         word = _PHASES.get(progress.phase, progress.phase)
-        text = (
-            f"[{'#' * filled}{'.' * (24 - filled)}] step {progress.step} of {progress.total}: "
-            f"{word}{left}"
-        )
-        print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+        self._draw(done, f"step {progress.step} of {progress.total}: {word}{left}")
+
+    def count(self, done: int, total: int, what: str) -> None:
+        """Draw the bar for ``done`` of ``total`` things."""
+        if self.enabled:
+            self._draw(done / total, f"{what} {done} of {total}")
+
+    def _draw(self, done: float, text: str) -> None:
+        filled = round(24 * done)
+        bar = f"[{'#' * filled}{'.' * (24 - filled)}] {text}"
+        print(f"\r\033[K{bar}", end="", file=sys.stderr, flush=True)

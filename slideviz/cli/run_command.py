@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.errors import CaseError
 
     begin = time.perf_counter()
-    case = _case(arguments)
+    case = read_case(arguments)
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
@@ -48,10 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
     if arguments.picture:
-        from slideviz.view.picture import picture
+        from slideviz.view.picture import SIZE, picture
 
         named = replace(last.mesh, name=output.name)
-        picture(named, arguments.picture, reference=mesh, quality=found)
+        size = arguments.picture_size or SIZE
+        picture(named, arguments.picture, mesh, found, size, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
     report = run_report(case, mesh, steps, found, seconds)
     if arguments.history:
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _case(arguments: argparse.Namespace) -> Case:
+def read_case(arguments: argparse.Namespace) -> Case:
     """Return the case of the file with the changes of ``--set`` and ``--zone``."""
     from slideviz import Case
     from slideviz.case.cfg import set_key
@@ -109,7 +110,6 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
     from slideviz.errors import CaseError
-    from slideviz.rbf.compiled import is_cached
 
     steps: list[Step] = []
     folder = arguments.steps_dir
@@ -118,8 +118,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
             raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
-    if not (arguments.quiet or is_cached()):
-        print("slideviz: first run: compiling the kernels, some seconds, once", file=sys.stderr)
+    tell_compiling(arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:
@@ -131,6 +130,14 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
                 steps[-2] = replace(steps[-2], mesh=mesh)
     return steps
+
+
+def tell_compiling(quiet: bool) -> None:
+    """Say that the first run compiles, when this is it."""
+    from slideviz.rbf.compiled import is_cached
+
+    if not (quiet or is_cached()):
+        print("slideviz: first run: compiling the kernels, some seconds, once", file=sys.stderr)
 
 
 def _write_qualities(path: Path, found: Quality) -> None:

@@ -108,7 +108,7 @@ def test_what_moves_is_shown_in_detail_when_it_is_tiny_in_the_mesh(tmp_path):
         holes[str(zoom)] = has(image[60:, 100:400], [255, 255, 255], 0)
         if zoom == "auto":
             assert has(image[10:30, :560], [255, 255, 255], 0) > 5_000, "a title on white"
-            assert has(image[60:, 590:], [255, 255, 255], 0) == 10 * 340, "a bar on white"
+            assert has(image[60:, 590:], [255, 255, 255], 0) > 0.95 * 10 * 340, "a bar on white"
     assert 5 * 5 < holes["auto"] < holes[str(Detail((0.1, 0.0), 2.4))]
     wide = 500 / 2.4
     assert holes[str(Detail((0.1, 0.0), 2.4))] == pytest.approx(wide**2, rel=0.25)

@@ -1,0 +1,287 @@
+"""The steps of a deformation as a film: MP4, GIF, or one picture each.
+
+`film` draws the quality of the steps, `film_of` what a view shows. Both are generators that draw
+one image between two pulls: whoever pulls them owns progress and cancel. Closing one early
+leaves no file. They must be pulled in the thread that may draw.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.errors import SlidevizError
+from slideviz.mesh.quality import quality
+from slideviz.view.encode import FASTEST, Pixels, Take, kind_of, targets, writer
+from slideviz.view.look import PAPER, Look
+from slideviz.view.offscreen import check_size, font_scale, image_of, offscreen, write_title
+from slideviz.view.portrait import Portrait, Zoom, caption
+from slideviz.view.state import ColourBy, Frame, Session
+from slideviz.view.surfaces import Surface
+
+if TYPE_CHECKING:
+    from slideviz.view.scene import Scene
+
+SIZES = {".mp4": (1280, 800), ".gif": (800, 500), ".png": (1600, 1000)}
+"""Width and height in pixels unless others are asked for."""
+FPS, SECONDS = 10.0, 3.0
+"""Images a second unless asked for; fewer of them where a film would be shorter than this."""
+_CAPTION_AT = 0.02
+
+
+@dataclass(frozen=True)
+class Reel:
+    """How a film is made.
+
+    Attributes
+    ----------
+    size : (int, int) or None
+        Width and height in pixels, even for an MP4; None is what suits the kind of file.
+    fps : float or None
+        Images a second; None is ten, and fewer where there are few, so that it lasts 3 s.
+    hold : float
+        Seconds that the last image stays.
+    between : int
+        Images put between two steps, with the nodes on straight lines from one to the next and
+        the quality of that mesh.
+    """
+
+    size: tuple[int, int] | None = None
+    fps: float | None = None
+    hold: float = 1.5
+    between: int = 0
+
+    def pixels(self, file: Path) -> tuple[int, int]:
+        """Return width and height for this file."""
+        return self.size or SIZES[kind_of(file)]
+
+    def count(self, frames: int) -> int:
+        """Return how many images come of so many frames."""
+        return frames + (frames - 1) * self.between
+
+    def pace(self, frames: int) -> float:
+        """Return the images a second for so many frames."""
+        return self.fps or min(FPS, max(1.0, self.count(frames) / SECONDS))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """How far a film is: images written, of so many in all."""
+
+    done: int
+    total: int
+
+
+def check_film(
+    file: Path, reel: Reel, *, frames: int | None = None, overwrite: bool = False
+) -> None:
+    """Raise SlidevizError when a film cannot be made like that; the message says what helps.
+
+    Parameters
+    ----------
+    file : Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    reel : Reel
+        How it is made.
+    frames : int, optional
+        The number of frames, when it is known already.
+    overwrite : bool
+        Allow files that exist.
+    """
+    kind, size = kind_of(file), reel.pixels(file)
+    check_size(size)
+    if kind == ".mp4" and (size[0] % 2 or size[1] % 2):
+        raise SlidevizError(
+            f"an MP4 of {size[0]}x{size[1]} pixels cannot be made: width and height must be even; "
+            f"take {size[0] + size[0] % 2}x{size[1] + size[1] % 2}"
+        )
+    if reel.fps is not None and not 0.1 <= reel.fps <= FASTEST[kind]:
+        raise SlidevizError(
+            f"{reel.fps:g} images a second cannot be shown; 0.1 to {FASTEST[kind]:g} can ({kind})"
+        )
+    if not 0.0 <= reel.hold <= 600.0:
+        raise SlidevizError(f"the last image cannot stay for {reel.hold:g} s; 0 to 600 s can")
+    if not 0 <= reel.between <= 1000:
+        raise SlidevizError(f"{reel.between} images between two steps; 0 to 1000 are possible")
+    paths = targets(file, reel.count(frames) if frames else 2)
+    existing = [path for path in paths if path.exists()]
+    if existing and not overwrite:
+        raise SlidevizError(
+            f"{existing[0]} exists already; choose another name, or allow it to be replaced"
+        )
+    folder = paths[0].parent
+    if folder == file and not folder.exists():
+        folder = folder.parent  # it will be made
+    if not folder.is_dir():
+        raise SlidevizError(f"{file}: the folder {folder} does not exist; create it first")
+    if not os.access(folder, os.W_OK):
+        raise SlidevizError(f"{file}: no permission to write there; choose another folder")
+
+
+def film(
+    frames: Sequence[Frame],
+    file: str | Path,
+    reel: Reel = Reel(),
+    *,
+    colour_by: ColourBy = "size_skew",
+    zoom: Zoom = "auto",
+    overwrite: bool = False,
+) -> Generator[Drawn, None, None]:
+    """Yield after each image of a film that shows the quality of the steps.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        The undeformed mesh and every step.
+    file : str or Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    reel : Reel
+        Size, speed, and images in between.
+    colour_by : {"size_skew", "size", "skew", "displacement"}
+        What the colours say; their range is the same in all images.
+    zoom : Detail, "auto" or "all"
+        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
+    overwrite : bool
+        Allow files that exist.
+
+    Raises
+    ------
+    SlidevizError
+        There are no steps, the film cannot be made like that, or the file cannot be written.
+    """
+    path = Path(file)
+    _check(frames, path, reel, overwrite)
+    with offscreen(reel.pixels(path)) as plotter:
+        portrait = Portrait(plotter, frames[-1].mesh, frames[0].mesh, colour_by, zoom)
+
+        def draw(shot: _Shot) -> Pixels:
+            portrait.show(shot.frame)
+            words = portrait.caption(shot.words, shot.frame.quality)
+            write_title(plotter, words, PAPER, _CAPTION_AT)
+            return image_of(plotter)
+
+        yield from _expose(frames, path, reel, draw)
+
+
+def film_of(
+    session: Session,
+    surfaces: Sequence[Surface],
+    file: str | Path,
+    reel: Reel = Reel(),
+    *,
+    like: Scene | None = None,
+    overwrite: bool = False,
+) -> Generator[Drawn, None, None]:
+    """Yield after each image of a film of what a view shows, step by step.
+
+    Parameters
+    ----------
+    session : Session
+        What is shown and how; its frames are the steps.
+    surfaces : sequence of Surface
+        The boundaries of its mesh.
+    file : str or Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    reel : Reel
+        Size, speed, and images in between.
+    like : Scene, optional
+        The view whose camera, colours and ghosts are taken.
+    overwrite : bool
+        Allow files that exist.
+
+    Raises
+    ------
+    SlidevizError
+        There are no steps, the film cannot be made like that, or the file cannot be written.
+    """
+    from slideviz.view.scene import Scene
+
+    path, size = Path(file), reel.pixels(Path(file))
+    frames = session.frames
+    _check(frames, path, reel, overwrite)
+    look: Look = like.look if like is not None else PAPER
+    with offscreen(size) as plotter:
+        scene = Scene(plotter, look, font_scale(size))
+        scene.open(_showing(session, frames[0]), surfaces)
+        if like is not None:
+            scene.set_motion_ghosts(like.motion_ghosts)
+            scene.take_camera(like)
+
+        def draw(shot: _Shot) -> Pixels:
+            scene.update(_showing(session, shot.frame))
+            words = caption(shot.words, shot.frame.quality, session.view.colour_by)
+            write_title(plotter, words, look, _CAPTION_AT)
+            return image_of(plotter)
+
+        yield from _expose(frames, path, reel, draw)
+
+
+def _showing(session: Session, frame: Frame) -> Session:
+    """Return the session with one frame in the place of all its steps, colours as they are."""
+    run = session.run_shown
+    assert run is not None
+    runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
+    # The range of the whole run: that of one frame would change from image to image.
+    view = replace(session.view, frame=1, colour_range=session.colour_range)
+    return replace(session, runs=runs, view=view)
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """A frame, and the words for where in the film it is."""
+
+    frame: Frame
+    words: str
+
+
+def _check(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
+    if len(frames) < 2:
+        raise SlidevizError("there are no steps to make a film of; run the case first")
+    check_film(file, reel, frames=len(frames), overwrite=overwrite)
+
+
+def _expose(
+    frames: Sequence[Frame], file: Path, reel: Reel, draw: Callable[[_Shot], Pixels]
+) -> Generator[Drawn, None, None]:
+    """Yield after each image that ``draw`` made and the encoder took."""
+    total, pace = reel.count(len(frames)), reel.pace(len(frames))
+    take = Take(reel.pixels(file), total, pace, partial(_samples, frames, draw))
+    with writer(file, take) as add:
+        for done, shot in enumerate(_shots(frames, reel.between), start=1):
+            add(draw(shot), 1.0 / pace if done < total else max(reel.hold, 1.0 / pace))
+            yield Drawn(done, total)
+
+
+def _samples(frames: Sequence[Frame], draw: Callable[[_Shot], Pixels]) -> list[Pixels]:
+    """Return the first, the middle and the last image."""
+    chosen = sorted({0, len(frames) // 2, len(frames) - 1})
+    return [draw(_Shot(frames[k], _words(k, len(frames) - 1))) for k in chosen]
+
+
+def _shots(frames: Sequence[Frame], between: int) -> Iterator[_Shot]:
+    """Yield all frames and those in between, made when they are wanted."""
+    steps = len(frames) - 1
+    for step, frame in enumerate(frames):
+        yield _Shot(frame, _words(step, steps))
+        for k in range(1, between + 1) if step < steps else ():
+            part = k / (between + 1)
+            words = f"{_words(step + part, steps)}, interpolated"
+            yield _Shot(_blend(frame, frames[step + 1], part, frames[0]), words)
+
+
+def _words(position: float, steps: int) -> str:
+    if position == 0:
+        return "undeformed"
+    return f"step {position:.{0 if position == int(position) else 2}f} of {steps}"
+
+
+def _blend(start: Frame, end: Frame, part: float, first: Frame) -> Frame:
+    """Return the mesh on the way from one frame to the next, with its own quality."""
+    points = (1.0 - part) * start.mesh.points + part * end.mesh.points
+    mesh = end.mesh.with_points(points)
+    found = quality(mesh, reference=first.mesh, metric=end.quality.metric)
+    return Frame(mesh, found, end.step)
