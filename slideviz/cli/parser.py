@@ -8,9 +8,11 @@ from pathlib import Path
 
 from slideviz import __version__
 from slideviz.cli import commands
+from slideviz.cli.compare_command import add_compare
 from slideviz.cli.film_command import add_film, add_zoom, size
+from slideviz.cli.section_options import add_section, glued
 
-COMMANDS = ("run", "info", "quality", "film", "sample", "keys", "shots")
+COMMANDS = ("run", "info", "quality", "section", "film", "compare", "sample", "keys", "shots")
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -38,7 +40,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     """
     if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
         return _window_parser().parse_args(argv)
-    return _parser().parse_args(argv)
+    return _parser().parse_args(glued(argv))
 
 
 def _asks_help(argv: Sequence[str]) -> bool:
@@ -72,6 +74,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_info(calls)
     _add_quality(calls)
     add_film(calls)
+    add_section(calls)
+    add_compare(calls)
     _add_sample(calls)
     keys = calls.add_parser("keys", help="reference of all case keys")
     keys.set_defaults(command=commands.keys)

@@ -1,0 +1,131 @@
+"""What ``slideviz section`` does."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import FloatArray, Mesh
+    from slideviz.mesh.periodic import Pair
+    from slideviz.view.section import Section
+
+
+def section(arguments: argparse.Namespace) -> int:
+    """Draw a section of a mesh."""
+    from slideviz import Case, quality, read
+    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.report import save_json
+    from slideviz.errors import CaseError
+    from slideviz.view.copies import show_passages
+    from slideviz.view.section_cut import Cutter, joined
+    from slideviz.view.section_paint import paint
+    from slideviz.view.section_picture import SectionStyle, require_picture_name, section_picture
+
+    _check_usage(arguments)
+    require_picture_name(arguments.output)
+    case = Case.read(arguments.case) if arguments.case else None
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    base = read(arguments.reference, zone=arguments.zone) if arguments.reference else None
+    found = quality(mesh, reference=base, metric=arguments.metric)
+    painted = paint(mesh, found, arguments.color, base)
+    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
+    cutter = Cutter.of(mesh)
+    pieces = show_passages(cutter, mesh.points, chosen, matrices)
+    # Of the mesh itself, where it is cut: its copies have the same cells.
+    ids = pieces[0].cell_ids if len(pieces[0]) else joined(list(pieces.values())).cell_ids
+    if not len(ids):
+        why = _miss(mesh.points[cutter.used], chosen)
+        raise CaseError(f"{mesh.name}: the {chosen.describe()} {why}")
+    if arguments.range:
+        painted = painted.within(*arguments.range)
+    elif painted.label == "displacement":
+        painted = painted.up_to(ids)
+    name = Path(mesh.name).name
+    style = SectionStyle(
+        arguments.size, arguments.edges, arguments.in_space, f"{name}: {chosen.describe()}"
+    )
+    section_picture(pieces, chosen, painted, arguments.output, style)
+    summary = painted.summary(ids)
+    report: dict[str, Any] = {
+        "mesh": mesh.name,
+        "section": _as_json(chosen),
+        "color": painted.label,
+    }
+    report |= {"passages": len(pieces), "picture": str(arguments.output), **summary}
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    else:
+        print(f"{name}: {chosen.describe()}")
+        print(f"  {painted.sentence(ids)}, worst is cell {summary['worst_cell']}")
+        print(f"  {arguments.output}")
+    return INVERTED if summary["inverted"] else DONE
+
+
+def _check_usage(arguments: argparse.Namespace) -> None:
+    """Leave with code 2 where options contradict each other."""
+    if arguments.color == "displacement" and not arguments.reference:
+        arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
+    if arguments.unrolled and arguments.plane:
+        arguments.wrong_usage("--unrolled is for a --cylinder; a plane is flat already")
+
+
+def _section_and_passages(
+    arguments: argparse.Namespace, mesh: Mesh, base: Mesh | None, case: Case | None
+) -> tuple[Section, dict[int, FloatArray]]:
+    """Return the section that is asked for, and the transformation of each passage."""
+    import numpy as np
+
+    from slideviz.errors import CaseError
+    from slideviz.view.copies import find_period, passages
+
+    asked = arguments.plane or arguments.cylinder.section
+    chosen = replace(asked, whole=mesh.dim == 2 if arguments.whole is None else arguments.whole)
+    no_axis = arguments.cylinder is not None and not arguments.cylinder.given
+    pair: Pair | None = None
+    if no_axis or arguments.copies:
+        # The undeformed mesh, for a deformed one need not repeat exactly.
+        pair = find_period(base or mesh, case)
+    if no_axis and case is not None:
+        chosen = replace(chosen, direction=case.axis, origin=case.origin)
+    elif no_axis and pair is not None and pair.kind == "rotational":
+        chosen = replace(chosen, direction=pair.axis, origin=pair.origin)
+    if not arguments.copies:
+        return chosen, {0: np.eye(4)}
+    if pair is None:
+        raise CaseError(
+            f"{mesh.name}: no boundaries match each other, so there is no period for --copies; "
+            "name a case with MARKER_PERIODIC by --case"
+        )
+    return chosen, passages(pair, arguments.copies)
+
+
+def _miss(points: FloatArray, chosen: Section) -> str:
+    """Return why a section cuts no cell of these points (n, d), and where it would."""
+    import numpy as np
+
+    low, high = chosen.reach(points)
+    if chosen.kind == "cylinder":
+        return f"misses the mesh, which has radii {low:.6g} to {high:.6g} about this axis"
+    normal = np.abs(chosen.basis[2])
+    if not normal[: points.shape[1]].any():
+        return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
+    axis = int(np.argmax(normal))
+    if normal[axis] > 1.0 - 1e-12:
+        ends = points[:, axis].min(), points[:, axis].max()
+        return f"misses the mesh, which has {'xyz'[axis]} from {ends[0]:.6g} to {ends[1]:.6g}"
+    return f"misses the mesh; moved along its normal by {low:.6g} to {high:.6g} it would cut it"
+
+
+def _as_json(chosen: Section) -> dict[str, Any]:
+    return {
+        "kind": chosen.kind,
+        "origin": list(chosen.origin),
+        "direction": list(chosen.direction),
+        "radius": chosen.radius or None,
+        "whole": chosen.whole,
+    }

@@ -1,0 +1,189 @@
+"""The options of ``slideviz section``, and how its planes and cylinders are written."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from slideviz.view.section import Section
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+COLOURS = ("size-skew", "size", "skew", "displacement")
+"""As of `slideviz.view.section_paint`, which loads too much for a parser."""
+
+PLANE_HELP = (
+    "normal and a point: nx,ny,nz,x,y,z (2D: nx,ny,x,y); or an axis and a coordinate, as in z=0.5"
+)
+CYLINDER_HELP = (
+    "radius, then the axis: x, y, z, or its direction ax,ay,az, or direction and a point on it "
+    "ax,ay,az,cx,cy,cz; without axis that of the rotational period, else z"
+)
+EXAMPLES = """\
+examples:
+  slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
+  slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
+  slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
+"""
+
+
+def add_section(calls: argparse._SubParsersAction) -> None:
+    """Add the command to the parser's."""
+    from slideviz.cli.section_command import section as command
+
+    section = calls.add_parser(
+        "section",
+        help="picture of a plane or cylinder through a mesh",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    section.add_argument("mesh", type=Path)
+    add = section.add_argument
+    where = section.add_mutually_exclusive_group(required=True)
+    where.add_argument("--plane", type=plane, help=PLANE_HELP)
+    where.add_argument(
+        "--cylinder",
+        type=cylinder,
+        metavar="R[,AXIS]",
+        help=CYLINDER_HELP,
+    )
+    add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
+    add("--reference", type=Path, metavar="UNDEFORMED", help="mesh to compare with")
+    add("--color", choices=COLOURS, default="size-skew", help="(default: size-skew)")
+    add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
+    cells = section.add_mutually_exclusive_group()
+    cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
+    cells.add_argument("--cut", action="store_false", dest="whole", help="cut them (default in 3D)")
+    view = section.add_mutually_exclusive_group()
+    view.add_argument(
+        "--unrolled", action="store_true", help="cylinder laid flat to (z, r theta), the default"
+    )
+    view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
+    add(
+        "--copies",
+        type=neighbours,
+        metavar="N",
+        default=0,
+        help="neighbouring passages to draw on each side, or wheel for all of them",
+    )
+    add("--case", type=Path, metavar="CASE", help="case that names periodic boundaries and axis")
+    add("--size", type=pixels, metavar="WxH", default=(1600, 1000), help="pixels")
+    add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
+    add("--metric", choices=("knupp", "rbf-slide"), default="knupp", help="as for quality")
+    add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
+    section.set_defaults(command=command, wrong_usage=section.error)
+
+
+def glued(argv: Sequence[str]) -> list[str]:
+    """Return the words with lists that begin with a minus sign tied to their option.
+
+    argparse takes ``-1,0,0`` for an option of its own.
+    """
+    words: list[str] = []
+    for word in argv:
+        if (
+            words
+            and words[-1] in ("--plane", "--range", "--cylinder", "--zoom")
+            and re.match(r"-[\d.]", word)
+        ):
+            words[-1] += "=" + word
+        else:
+            words.append(word)
+    return words
+
+
+def plane(text: str) -> Section:
+    """Return the plane that a text like ``0,0,1,0,0,0.5`` or ``z=0.5`` means."""
+    word, sign, value = text.partition("=")
+    if sign:
+        if word.strip() not in _AXES:
+            raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z, as in z=0.5")
+        normal = _AXES[word.strip()]
+        (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
+        return _section("plane", [at * part for part in normal], normal)
+    values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z, as in 0,0,1,0,0,0.5")
+    half = len(values) // 2
+    return _section("plane", values[half:], values[:half])
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder as it was asked for; ``given`` is false where the axis was left out."""
+
+    section: Section
+    given: bool
+
+
+def cylinder(text: str) -> Cylinder:
+    """Return the cylinder that a text like ``0.25``, ``0.25,x`` or ``0.25,0,0,1`` means."""
+    radius, _, axis = text.partition(",")
+    (size,) = _numbers(radius, (1,), "a radius, as in 0.25 or 0.25,x")
+    if axis.strip() in _AXES:
+        return Cylinder(_section("cylinder", (), _AXES[axis.strip()], size), True)
+    if not axis:
+        return Cylinder(_section("cylinder", (), _AXES["z"], size), False)
+    values = _numbers(axis, (3, 6), "x, y, z, ax,ay,az or ax,ay,az,cx,cy,cz")
+    return Cylinder(_section("cylinder", values[3:], values[:3], size), True)
+
+
+def limits(text: str) -> tuple[float, float]:
+    """Return the two numbers of a text like ``0.2,0.9``."""
+    low, high = _numbers(text, (2,), "lowest,highest, as in 0.2,0.9")
+    return low, high
+
+
+def pixels(text: str) -> tuple[int, int]:
+    """Return width and height of a text like ``1600x1000``."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text.strip().lower())
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; write it as 1600x1000")
+    width, height = int(found[1]), int(found[2])
+    if not (300 <= width <= 20000 and 200 <= height <= 20000):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: pictures are 300x200 to 20000x20000 pixels large"
+        )
+    return width, height
+
+
+def neighbours(text: str) -> int | Literal["wheel"]:
+    """Return the number of passages on each side, or ``wheel``."""
+    if text == "wheel":
+        return "wheel"
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number, 0 or more, or the word wheel")
+    return int(text)
+
+
+def _section(
+    kind: Literal["plane", "cylinder"],
+    origin: Sequence[float],
+    direction: Sequence[float],
+    radius: float = 0.0,
+) -> Section:
+    """Return a section, whose mistakes are those of the command line."""
+    from slideviz.errors import CaseError
+    from slideviz.view.section import Section
+
+    x, y, z, *_ = *origin, 0.0, 0.0, 0.0
+    a, b, c, *_ = *direction, 0.0, 0.0, 0.0
+    try:
+        return Section(kind, (x, y, z), (a, b, c), radius)
+    except CaseError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from problem
+
+
+def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
+    """Return the numbers of a list with commas."""
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not {form}") from None
+    if len(values) not in counts:
+        raise argparse.ArgumentTypeError(f"{text!r} has {len(values)} numbers; write {form}")
+    return values

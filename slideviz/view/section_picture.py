@@ -1,0 +1,257 @@
+"""Pictures of sections, drawn with matplotlib: PNG, SVG and PDF alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.model import FloatArray
+from slideviz.view.look import INVERTED_COLOUR, PAPER
+from slideviz.view.section import Section
+from slideviz.view.section_cut import Polygons, joined
+from slideviz.view.section_layout import Layout, inches_of, lay_out
+from slideviz.view.section_paint import Paint
+from slideviz.view.section_shapes import colours_of, shapes_of
+from slideviz.view.section_space import in_space
+from slideviz.view.unroll import flat_labels, flatten, middle_angle
+
+SUFFIXES = (".png", ".svg", ".pdf")
+_TITLE, _LETTERS = 10.0, 9.0
+
+
+@dataclass(frozen=True)
+class SectionStyle:
+    """How a section is drawn.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the picture in pixels; SVG and PDF keep their ratio.
+    edges : bool
+        Draw the mesh lines.
+    in_space : bool
+        Show it in space instead of flat.
+    title : str
+        First line of the title; empty: the section in words.
+    """
+
+    size: tuple[int, int] = (1600, 1000)
+    edges: bool = True
+    in_space: bool = False
+    title: str = ""
+
+
+def require_picture_name(file: Path) -> None:
+    """Raise if no picture can have this name.
+
+    Raises
+    ------
+    CaseError
+        The end of the name is none of ``SUFFIXES``.
+    """
+    if file.suffix.lower() not in SUFFIXES:
+        raise CaseError(f"{file}: a section is drawn as {', '.join(SUFFIXES)}; end the name so")
+
+
+def section_picture(
+    pieces: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    file: str | Path,
+    style: SectionStyle | None = None,
+) -> None:
+    """Write the picture of a section.
+
+    Parameters
+    ----------
+    pieces : mapping of int to Polygons
+        What the section shows of each passage; 0 is the mesh itself (see
+        `slideviz.view.copies.show_passages`).
+    section : Section
+    paint : Paint
+        Its numbers are those of the cells that the pieces name.
+    file : str or Path
+        Ends with .png, .svg or .pdf.
+    style : SectionStyle, optional
+
+    Raises
+    ------
+    CaseError
+        There is nothing to draw, the name has another end, or the file cannot be written.
+    """
+    from matplotlib import rc_context
+
+    target, style = Path(file), style or SectionStyle()
+    require_picture_name(target)
+    figure, dpi = draw_section(pieces, section, paint, style)
+    data = BytesIO()
+    kind = target.suffix.lower()[1:]
+    # Without the date, and with names that are not random, the same section gives the same file.
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with rc_context({"svg.hashsalt": "slideviz"}):
+        figure.savefig(data, format=kind, dpi=dpi if kind == "png" else 300, metadata=metadata)
+    with atomic_write(target, CaseError) as out:
+        out.write(data.getvalue())
+
+
+def draw_section(
+    pieces: Mapping[int, Polygons], section: Section, paint: Paint, style: SectionStyle
+) -> tuple[Any, float]:
+    """Return the matplotlib figure of a section, and its pixels per inch.
+
+    Raises
+    ------
+    CaseError
+        There is nothing to draw.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    drawn = {number: piece for number, piece in pieces.items() if len(piece)}
+    if not drawn:
+        raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
+    flat, labels = _flat(drawn, section, style)
+    if not section.whole:
+        # Nothing is in front of another, but folded cells overlap: show them.
+        flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
+    corners = flat.points[flat.connectivity, :2]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    width, height, dpi = inches_of(style.size)
+    layout = lay_out((low, high), (width, height), bare=style.in_space)
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes(layout.axes)
+    shapes = shapes_of(flat, paint, layout.points_per_length, style.edges, lit=style.in_space)
+    axes.add_collection(shapes)
+    _dress(axes, layout, labels)
+    if style.in_space:
+        _triad(figure, drawn, section)
+    all_ids = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
+    ids = drawn[0].cell_ids if 0 in drawn else all_ids
+    _bar(figure, layout, paint, bool(paint.inverted[all_ids].any()))
+    _title(figure, layout, style.title or section.describe(), paint.sentence(ids))
+    return figure, dpi
+
+
+def _flat(
+    pieces: Mapping[int, Polygons], section: Section, style: SectionStyle
+) -> tuple[Polygons, tuple[str, str] | None]:
+    """Return the pieces as they lie on paper, the nearest last, and what the axes are called."""
+    if style.in_space:
+        return in_space(list(pieces.values()), section), None
+    if not any(piece.points[:, 2].any() for piece in pieces.values()):
+        # A 2D mesh, or a plane that lies flat already.
+        return joined(list(pieces.values())), ("x", "y")
+    found: dict[int, Polygons] = {}
+    for numbers in (
+        sorted(number for number in pieces if number >= 0),
+        sorted((number for number in pieces if number < 0), reverse=True),
+    ):
+        # Each passage beside the one before, from the mesh itself outwards.
+        near = _middle(found[min(found)], section) if found else None
+        for number in numbers:
+            found[number] = flatten(pieces[number], section, near)
+            near = _middle(found[number], section)
+    flat = joined([found[number] for number in sorted(found)])
+    return flat.by_depth(), flat_labels(section)
+
+
+def _middle(flat: Polygons, section: Section) -> float | None:
+    return middle_angle(flat, section) if section.kind == "cylinder" else None
+
+
+def _dress(axes: Any, layout: Layout, labels: tuple[str, str] | None) -> None:
+    """Set limits, ticks and labels of the axes."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xlim(layout.low[0], layout.high[0])
+    axes.set_ylim(layout.low[1], layout.high[1])
+    if labels is None:
+        axes.set_axis_off()
+        return
+    axes.set_xlabel(labels[0], fontsize=_LETTERS)
+    axes.set_ylabel(labels[1], fontsize=_LETTERS)
+    axes.tick_params(labelsize=_LETTERS - 1, width=0.6, length=3)
+    room = (layout.inches[0] / 0.65, layout.inches[1] / 0.4)
+    for axis, bins in zip((axes.xaxis, axes.yaxis), room, strict=True):
+        number = int(np.clip(bins, 2, 9))
+        axis.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1))
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.6)
+
+
+def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:
+    """Draw the directions of x, y and z in the lower left corner."""
+    from slideviz.view.section_space import camera
+
+    rows = camera(next(iter(pieces.values())), section)
+    size = figure.get_size_inches()
+    centre = np.array([0.55, 0.5])
+    for word, towards in zip("xyz", rows[:2].T, strict=True):
+        tip = centre + 0.3 * towards
+        figure.add_artist(_line(np.stack([centre, tip]) / size))
+        # An axis that points at the eye has no length, but its letter needs room all the same.
+        beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
+        at = (tip + 0.12 * beside) / size
+        figure.text(at[0], at[1], word, fontsize=_LETTERS, ha="center", va="center")
+
+
+def _line(ends: FloatArray) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D(ends[:, 0], ends[:, 1], color=PAPER.text, linewidth=1.0)
+
+
+def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
+    """Draw the colour bar, with the colour of inverted cells where there are some."""
+    from matplotlib.patches import Rectangle
+
+    axes = figure.add_axes(layout.bar)
+    direction = "vertical" if layout.upright_bar else "horizontal"
+    bar = figure.colorbar(colours_of(paint), cax=axes, orientation=direction)
+    bar.set_label(paint.label, fontsize=_LETTERS)
+    bar.ax.tick_params(labelsize=_LETTERS - 1, width=0.6, length=3)
+    bar.outline.set_linewidth(0.6)
+    bar.solids.set_rasterized(False)
+    bar.solids.set_edgecolor("face")
+    if not inverted:
+        return
+    width, height = figure.get_size_inches()
+    x, y, wide, high = layout.bar
+    if layout.upright_bar:
+        box, at = (x, y - 0.3 / height), (x + wide + 0.06 / width, y - 0.3 / height)
+        side = wide * width
+    else:
+        side = high * height
+        box = (x + wide + 0.2 / width, y)
+        at = (box[0] + (side + 0.06) / width, y)
+    figure.add_artist(
+        Rectangle(
+            box, side / width, side / height, color=INVERTED_COLOUR, transform=figure.transFigure
+        )
+    )
+    figure.text(
+        at[0], at[1] + side / height / 2, "inverted", fontsize=8, ha="left", va="center_baseline"
+    )
+
+
+def _title(figure: Any, layout: Layout, first: str, second: str) -> None:
+    """Write two lines above the axes, shortened in the middle where they do not fit."""
+    width, height = figure.get_size_inches()
+    renderer = figure.canvas.get_renderer()
+    top = min(layout.top + 0.16 / height, 1.0 - 0.46 / height)
+    for words, above, size in ((first, 0.22, _TITLE), (second, 0.0, _LETTERS)):
+        text = figure.text(
+            0.5, top + above / height, words, fontsize=size, ha="center", va="center"
+        )
+        kept = len(words)
+        while text.get_window_extent(renderer).width > (width - 0.2) * figure.dpi and kept > 8:
+            kept -= 2
+            text.set_text(f"{words[: kept // 2]}…{words[len(words) - kept // 2 :]}")

@@ -1,0 +1,244 @@
+"""``slideviz section``: how sections are written, its pictures, numbers, sentences and codes."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import slideviz as sv
+from slideviz.case.samples import sample, write_sample
+from slideviz.cli import run
+from slideviz.cli.section_options import COLOURS, cylinder, glued, plane
+from slideviz.view.section_paint import PAINT_BY
+from tests.builders import cube, passage, square
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A passage, a cube (also folded), a square, and the stator sample."""
+    folder = tmp_path_factory.mktemp("section")
+    sv.write(folder / "passage.su2", passage())
+    block = cube(6, block=False)
+    sv.write(folder / "cube.su2", block)
+    points = block.points.copy()
+    points[np.argmin(np.linalg.norm(points - 0.5, axis=1))] += 0.4
+    sv.write(folder / "folded.su2", block.with_points(points))
+    sv.write(folder / "square.su2", square(6, block=False))
+    return folder
+
+
+def call(folder, mesh, *options, out="x.png"):
+    return run(["section", str(folder / mesh), "-o", str(folder / out), *options])
+
+
+def report(capsys, folder, mesh, *options, out="x.png"):
+    code = call(folder, mesh, "--json", "-", *options, out=out)
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("text", "origin", "direction"),
+    [
+        ("0,0,1,1,2,0.5", (1, 2, 0.5), (0, 0, 1)),
+        ("1,2,3,4", (3, 4, 0), (1, 2, 0)),
+        ("z=0.5", (0, 0, 0.5), (0, 0, 1)),
+        ("y = -1e-3", (0, -1e-3, 0), (0, 1, 0)),
+    ],
+)
+def test_planes(text, origin, direction):
+    found = plane(text)
+    assert (found.kind, found.origin, found.direction) == ("plane", origin, direction)
+
+
+@pytest.mark.parametrize(
+    ("text", "origin", "direction", "given"),
+    [
+        ("0.25", (0, 0, 0), (0, 0, 1), False),
+        ("0.25,x", (0, 0, 0), (1, 0, 0), True),
+        ("0.25,0,1,1", (0, 0, 0), (0, 1, 1), True),
+        ("0.25,0,1,0,3,4,5", (3, 4, 5), (0, 1, 0), True),
+    ],
+)
+def test_cylinders(text, origin, direction, given):
+    found = cylinder(text)
+    section = found.section
+    assert (section.kind, section.radius, found.given) == ("cylinder", 0.25, given)
+    assert (section.origin, section.direction) == (origin, direction)
+
+
+def test_the_colours_of_the_parser_are_those_of_the_picture():
+    assert COLOURS == PAINT_BY
+
+
+def test_a_plane_section_tells_the_numbers_of_its_cells(folder, capsys):
+    code, found = report(capsys, folder, "cube.su2", "--plane", "0,0,1,0,0,0.4")
+    assert code == 0
+    assert found["section"]["kind"] == "plane"
+    assert found["section"]["radius"] is None
+    assert (found["cells"], found["inverted"], found["passages"]) == (36, 0, 1)
+    assert (found["min"], found["mean"]) == pytest.approx((1.0, 1.0))
+    assert Image.open(folder / "x.png").size == (1600, 1000)
+
+
+def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, capsys):
+    code, found = report(
+        capsys,
+        *(folder, "folded.su2", "--plane", "z=0.55"),
+        *("--reference", str(folder / "cube.su2")),
+    )
+    mesh, base = sv.read(folder / "folded.su2"), sv.read(folder / "cube.su2")
+    values = sv.quality(mesh, reference=base).values
+    heights = mesh.points[mesh.cells.by_type[12][1], 2] - 0.55
+    cut = (heights.min(axis=1) < 0) & (heights.max(axis=1) > 0)
+    assert code == 3
+    assert found["inverted"] > 0
+    assert found["cells"] == cut.sum()
+    assert found["min"] == values[cut].min()
+    assert found["mean"] == pytest.approx(values[cut].mean())
+    assert cut[found["worst_cell"]]
+    assert values[found["worst_cell"]] == 0
+
+
+def test_a_list_may_begin_with_a_minus_sign(folder, capsys):
+    code, found = report(capsys, folder, "cube.su2", "--plane", "-1,0,0,0.4,0,0")
+    assert code == 0
+    assert found["section"]["direction"] == [-1, 0, 0]
+    assert glued(["run", "-o", "-1,2"]) == ["run", "-o", "-1,2"]
+
+
+def test_a_cylinder_takes_axis_and_copies_from_the_period(folder, capsys):
+    # About x the passage has no period; turn it so that the axis must be found.
+    mesh = sv.read(folder / "passage.su2")
+    turned = mesh.with_points(np.roll(mesh.points, 1, axis=1))
+    sv.write(folder / "about_x.su2", turned)
+    code, found = report(capsys, folder, "about_x.su2", "--cylinder", "0.7", "--copies", "2")
+    assert code == 0
+    assert found["section"]["direction"] == [1, 0, 0]
+    assert found["passages"] == 5
+    assert call(folder, "about_x.su2", "--cylinder", "0.7", "--copies", "wheel", "--3d") == 0
+
+
+def test_the_case_names_period_and_axis(folder, tmp_path, capsys):
+    text = "MESH_FILENAME= passage.su2\nMARKER_MOVING= (blade)\nPERIODIC_MODE= moving\n"
+    axis = "PERIODIC_TYPE= rotational\nPERIODIC_AXIS= (0, 0, 1)\n"
+    (folder / "p.cfg").write_text(text + "MARKER_PERIODIC= (per1, per2)\n" + axis)
+    options = ("--cylinder", "0.7", "--copies", "1", "--case", str(folder / "p.cfg"))
+    code, found = report(capsys, folder, "passage.su2", *options)
+    assert (code, found["passages"], found["section"]["direction"]) == (0, 3, [0, 0, 1])
+    (folder / "p.cfg").write_text(text + "MARKER_PERIODIC= (hub, per2)\n" + axis)
+    assert call(folder, "passage.su2", *options) == 1
+    assert "do not match" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["a.svg", "a.pdf", "a.PNG"])
+def test_all_kinds_of_pictures(folder, name):
+    assert call(folder, "cube.su2", "--plane", "z=0.4", "--no-edges", out=name) == 0
+    assert (folder / name).stat().st_size > 1000
+
+
+def test_options_of_the_picture(folder, capsys):
+    options = ("--cylinder", "0.7,z", "--whole", "--size", "640x400", "--range", "0.2,0.9")
+    assert call(folder, "passage.su2", *options, "--color", "skew") == 0
+    assert Image.open(folder / "x.png").size == (640, 400)
+    out = capsys.readouterr().out
+    assert "passage.su2: cylinder r = 0.7 about z" in out
+    assert re.search(r"skew: min \d\.\d{4}, mean \d\.\d{4}; \d+ cells cut, worst is cell \d+", out)
+
+
+def test_a_2d_mesh_shows_the_cells_whole_unless_they_are_to_be_cut(folder, capsys):
+    _, whole = report(capsys, folder, "square.su2", "--plane", "y=0.4")
+    _, cut = report(capsys, folder, "square.su2", "--plane", "0,1,0,0.4", "--cut")
+    assert (whole["section"]["whole"], cut["section"]["whole"]) == (True, False)
+    assert whole["cells"] == cut["cells"] == 6
+
+
+def test_displacement_is_coloured_up_to_its_largest(folder, capsys):
+    write_sample("stator", folder / "stator", size=5000)
+    made = sample("stator", size=5000)
+    moved = made.mesh.with_points(made.mesh.points + np.array([0.0, 0.0, 0.002]))
+    sv.write(folder / "moved.su2", moved)
+    options = ("--color", "displacement", "--reference", str(folder / "stator" / "mesh.su2"))
+    code, found = report(capsys, folder, "moved.su2", "--cylinder", "0.275", *options)
+    assert code == 0
+    assert found["max"] == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "options", "words"),
+    [
+        (
+            "cube.su2",
+            ["--plane", "z=3"],
+            "the plane z = 3 misses the mesh, which has z from 0 to 1",
+        ),
+        ("cube.su2", ["--plane", "0,0,-1,7,8,3"], "which has z from 0 to 1"),
+        ("cube.su2", ["--plane", "1,1,0,3,0,0"], "by -2.12132 to -0.707107 it would cut it"),
+        ("passage.su2", ["--cylinder", "2"], "misses the mesh, which has radii 0.5 to 1 about"),
+        ("square.su2", ["--plane", "z=0"], "does not cut this 2D mesh; give a normal in x and y"),
+        ("square.su2", ["--cylinder", "0.5"], "a cylinder section needs a 3D mesh"),
+        ("cube.su2", ["--plane", "z=0.4", "--range", "1,0"], "the first number must be"),
+        ("cube.su2", ["--plane", "z=0.4", "--copies", "wheel"], "makes no whole wheel"),
+        ("none.su2", ["--plane", "z=0.4"], "none.su2"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(folder, mesh, options, words, capsys):
+    assert call(folder, mesh, *options, out="never.png") == 1
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+    assert not (folder / "never.png").exists()
+
+
+def test_copies_need_boundaries_that_match(folder, capsys):
+    mesh = sv.read(folder / "cube.su2")
+    from dataclasses import replace
+
+    sv.write(folder / "bare.su2", replace(mesh, markers=mesh.markers[:1], document=None))
+    assert call(folder, "bare.su2", "--plane", "z=0.4", "--copies", "1") == 1
+    assert "no boundaries match each other, so there is no period" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "one of the arguments --plane --cylinder is required"),
+        (["--plane", "z=0.4", "--cylinder", "1"], "not allowed with"),
+        (["--plane", "0,0,1,2,3"], "has 5 numbers; write nx,ny,nz,x,y,z"),
+        (["--plane", "0,0,one,0,0,0"], "is not nx,ny,nz,x,y,z"),
+        (["--plane", "w=1"], "the axis is x, y or z, as in z=0.5"),
+        (["--plane", "z=up"], "is not a coordinate"),
+        (["--plane", "0,0,0,1,1,1"], "the normal 0, 0, 0 has no direction"),
+        (["--plane", "0,0,1,0,0,nan"], "not finite"),
+        (["--cylinder", "0"], "the radius 0 is not positive"),
+        (["--cylinder", "-1"], "the radius -1 is not positive"),
+        (["--cylinder", "wide"], "is not a radius"),
+        (["--cylinder", "1,0,1"], "has 2 numbers; write x, y, z"),
+        (["--cylinder", "1", "--size", "big"], "is no size; write it as 1600x1000"),
+        (["--cylinder", "1", "--size", "10x10"], "300x200 to 20000x20000"),
+        (["--cylinder", "1", "--copies", "-1"], "expected one argument|give a number, 0 or more"),
+        (["--cylinder", "1", "--copies", "many"], "give a number, 0 or more, or the word wheel"),
+        (["--cylinder", "1", "--range", "1"], "has 1 numbers; write lowest,highest"),
+        (["--cylinder", "1", "--color", "red"], "invalid choice"),
+        (["--cylinder", "1", "--color", "displacement"], "needs --reference UNDEFORMED"),
+        (["--plane", "z=0", "--unrolled"], "--unrolled is for a --cylinder"),
+    ],
+)
+def test_wrong_usage_is_code_2(folder, options, words, capsys):
+    assert call(folder, "cube.su2", *options) == 2
+    assert re.search(words, capsys.readouterr().err)
+
+
+def test_pictures_that_cannot_be_written(folder, capsys):
+    assert call(folder, "cube.su2", "--plane", "z=0.4", out="x.jpg") == 1
+    assert "a section is drawn as .png, .svg, .pdf" in capsys.readouterr().err
+    assert call(folder, "cube.su2", "--plane", "z=0.4", out="no/x.png") == 1
+    assert "the folder does not exist" in capsys.readouterr().err
+
+
+def test_the_help_has_an_example(capsys):
+    assert run(["section", "--help"]) == 0
+    assert "slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png" in (
+        capsys.readouterr().out
+    )

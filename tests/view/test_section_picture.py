@@ -1,0 +1,276 @@
+"""Pictures of sections: what is drawn where, in which colour, and the files."""
+
+import re
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
+from PIL import Image
+
+from slideviz.errors import CaseError
+from slideviz.mesh.periodic import match
+from slideviz.mesh.quality import quality
+from slideviz.view import section_shapes
+from slideviz.view.copies import passages, show_passages
+from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.view.section import Section
+from slideviz.view.section_cut import Cutter
+from slideviz.view.section_layout import inches_of, lay_out
+from slideviz.view.section_paint import PAINT_BY, paint
+from slideviz.view.section_picture import SectionStyle, draw_section, section_picture
+from slideviz.view.section_space import in_space
+from tests.builders import cube, passage, square
+
+
+def bent(mesh):
+    """The mesh with its inside pushed along x, so that cells differ in quality."""
+    push = 0.1 * np.prod(np.sin(np.pi * mesh.points), axis=1)
+    return mesh.with_points(mesh.points + np.eye(mesh.dim)[0] * push[:, None])
+
+
+def folded(mesh):
+    """The mesh with the node nearest to the middle pulled beyond its neighbours."""
+    points = mesh.points.copy()
+    middle = np.argmin(np.linalg.norm(points - 0.5, axis=1))
+    points[middle] += 0.4
+    return mesh.with_points(points)
+
+
+def drawn(mesh, section, count=0, base=None, names=None, by="size-skew", **style):
+    """The figure, its collection, and the paint."""
+    painted = paint(mesh, quality(mesh, base), by, base)
+    matrices = passages(match(base or mesh, *names), count) if names else {0: np.eye(4)}
+    pieces = show_passages(Cutter.of(mesh), mesh.points, section, matrices)
+    figure, _ = draw_section(pieces, section, painted, SectionStyle(**style))
+    (shapes,) = figure.axes[0].collections
+    return figure, shapes, painted
+
+
+def words_of(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+def test_cells_have_the_colours_of_their_values():
+    base = cube(4, block=False)
+    mesh = bent(base)
+    section = Section("plane", (0, 0, 0.4))
+    _, shapes, painted = drawn(mesh, section, base=base)
+    assert isinstance(shapes, PolyCollection)
+    cells = Cutter.of(mesh).which_cells(mesh.points, section)
+    assert len(shapes.get_paths()) == len(cells) == 16
+    faces = shapes.get_facecolor()
+    assert np.ptp(painted.values[cells]) > 0.02
+    for path, face in zip(shapes.get_paths(), faces, strict=True):
+        at = np.array([*path.vertices[:4].mean(axis=0), 0.375])
+        nodes = mesh.points[mesh.cells.by_type[12][1]].mean(axis=1)
+        cell = cells[np.argmin(np.linalg.norm(nodes[cells] - at, axis=1))]
+        assert face == pytest.approx(mpl.colormaps[COLOUR_MAP](painted.values[cell]))
+
+
+def test_inverted_cells_are_red_on_top_and_explained():
+    base = cube(6, block=False)
+    mesh = folded(base)
+    section = Section("plane", (0.5, 0.5, 0.55), (0, 0, 1))
+    figure, shapes, painted = drawn(mesh, section, base=base)
+    ids = Cutter.of(mesh).which_cells(mesh.points, section)
+    number = int(painted.inverted[ids].sum())
+    assert number > 0
+    red = np.all(np.isclose(shapes.get_facecolor(), to_rgba(INVERTED_COLOUR)), axis=1)
+    assert red.sum() >= number
+    assert red[-number:].all()
+    assert "inverted" in words_of(figure)
+    assert f"{number} inverted" in words_of(figure)[-1]
+    whole, _, _ = drawn(base, section)
+    assert "inverted" not in words_of(whole)
+    assert "inverted" not in words_of(whole)[-1]
+
+
+def test_the_title_has_min_and_mean_of_the_cut_alone():
+    base = cube(6, block=False)
+    mesh = bent(base)
+    section = Section("plane", (0, 0, 0.1))
+    figure, _, painted = drawn(mesh, section, base=base)
+    values = painted.values[Cutter.of(mesh).which_cells(mesh.points, section)]
+    first, second = words_of(figure)
+    assert first == "plane z = 0.1"
+    assert second == (f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; 36 cells cut")
+    assert values.min() > painted.values.min()
+
+
+def test_copies_lie_side_by_side_and_count_once():
+    mesh = passage()
+    section = Section("cylinder", radius=0.7)
+    one, single, _ = drawn(mesh, section)
+    figure, shapes, _ = drawn(mesh, section, count=2, names=("per1", "per2"))
+    assert len(shapes.get_paths()) == 5 * len(single.get_paths())
+    assert words_of(figure) == words_of(one)
+    high = max(path.vertices[:, 1].max() for path in shapes.get_paths())
+    low = min(path.vertices[:, 1].min() for path in shapes.get_paths())
+    assert high - low == pytest.approx(5 * 0.7 * np.radians(30))
+    axes = figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("z", "r θ")
+
+
+def test_a_wheel_unrolls_to_its_circumference():
+    mesh = passage()
+    section = Section("cylinder", radius=0.7)
+    _, shapes, _ = drawn(mesh, section, count="wheel", names=("per1", "per2"))
+    around = np.concatenate([path.vertices[:, 1] for path in shapes.get_paths()])
+    assert np.ptp(around) == pytest.approx(0.7 * 2 * np.pi)
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (600, 400), (400, 1600), (3000, 600)])
+@pytest.mark.parametrize("box", [(1, 1), (8, 1), (1, 8), (1, 0)])
+def test_both_directions_have_one_scale_and_nothing_leaves_the_picture(size, box):
+    width, height, dpi = inches_of(size)
+    assert (width * dpi, height * dpi) == pytest.approx(size)
+    layout = lay_out((np.zeros(2), np.array(box, float)), (width, height))
+    scale = np.array(layout.inches) / (layout.high - layout.low)
+    assert scale[0] == pytest.approx(scale[1])
+    assert (layout.low <= 0).all()
+    assert (layout.high >= box).all()
+    for x, y, wide, high in (layout.axes, layout.bar):
+        assert min(x, y, wide, high) > 0
+        assert max(x + wide, y + high) < 1
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (600, 400)])
+def test_letters_are_not_smaller_than_8_points_and_inside(size):
+    mesh = passage()
+    section = Section("plane", (0.6, 0.3, 0.2), (1, 0.2, 0.3))
+    figure, _, _ = drawn(mesh, section, size=size, title="a_very_long_name_" * 12)
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    letters = [*figure.texts]
+    for axes in figure.axes:
+        letters += [axes.xaxis.label, axes.yaxis.label]
+        letters += [*axes.get_xticklabels(), *axes.get_yticklabels()]
+    for text in letters:
+        if not text.get_text() or not text.get_visible():
+            continue
+        assert text.get_fontsize() >= 8
+        if text in figure.texts:
+            box = text.get_window_extent(renderer)
+            assert box.x0 >= 0
+            assert box.x1 <= size[0]
+            assert box.y1 <= size[1]
+    assert "…" in words_of(figure)[0]
+
+
+def test_thin_cells_have_thin_lines_and_lines_can_be_left_out():
+    base = cube(6, block=False)
+    squeezed = base.with_points(base.points ** np.array([4.0, 1.0, 1.0]))
+    section = Section("plane", (0, 0, 0.4))
+    _, shapes, _ = drawn(squeezed, section)
+    widths = shapes.get_linewidths()
+    sizes = [np.ptp(path.vertices[:, 0]) for path in shapes.get_paths()]
+    assert widths[np.argmin(sizes)] < 0.3 * widths[np.argmax(sizes)]
+    _, bare, _ = drawn(squeezed, section, edges=False)
+    assert bare.get_edgecolor() == pytest.approx(bare.get_facecolor())
+
+
+def test_in_space_the_nearest_polygon_is_last_and_axes_are_named():
+    mesh = passage()
+    section = Section("cylinder", radius=0.7, whole=True)
+    figure, shapes, _ = drawn(mesh, section, in_space=True)
+    assert {"x", "y", "z"} <= set(words_of(figure))
+    seen = in_space([Cutter.of(mesh).show(mesh.points, section)], section)
+    depth = np.add.reduceat(seen.points[seen.connectivity, 2], seen.offsets[:-1]) / seen.sizes
+    assert (np.diff(depth) >= 0).all()
+    first = shapes.get_paths()[0].vertices[: seen.sizes[0]]
+    assert first == pytest.approx(seen.points[seen.connectivity[: seen.sizes[0]], :2])
+
+
+def test_a_2d_mesh_is_drawn_in_its_plane():
+    mesh = square(6, block=False)
+    section = Section("plane", (0, 0.4, 0), (0, 1, 0))
+    figure, shapes, _ = drawn(mesh, section)
+    assert isinstance(shapes, LineCollection)
+    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("x", "y")
+    _, shapes, _ = drawn(mesh, Section("plane", (0, 0.4, 0), (0, 1, 0), whole=True))
+    assert isinstance(shapes, PolyCollection)
+    assert len(shapes.get_paths()) == 6
+
+
+@pytest.mark.parametrize("by", PAINT_BY)
+def test_every_number_can_be_drawn(by):
+    base = cube(4, block=False)
+    mesh = bent(base)
+    figure, _, painted = drawn(mesh, Section("plane", (0, 0, 0.4)), base=base, by=by)
+    assert words_of(figure)[-1].startswith(f"{by}: ")
+    assert figure.axes[1].get_ylabel() == by
+    found = quality(mesh, base)
+    if by == "displacement":
+        length = np.linalg.norm(mesh.points - base.points, axis=1)
+        assert painted.values == pytest.approx(length[base.cells.by_type[12][1]].mean(axis=1))
+        assert painted.limits == (0.0, painted.values.max())
+    else:
+        wanted = {"size-skew": found.values, "size": found.size, "skew": found.skew}[by]
+        assert np.array_equal(painted.values, wanted)
+
+
+def test_a_range_ends_the_colours_but_no_valid_cell_turns_red():
+    base = cube(4, block=False)
+    painted = paint(base, quality(base), "size-skew").within(1.5, 2.0)
+    assert painted.shown(np.arange(5)).tolist() == [1.5] * 5
+    with pytest.raises(CaseError, match="colour range 2 to 1: the first number must be"):
+        painted.within(2.0, 1.0)
+
+
+def test_displacement_needs_the_undeformed_mesh():
+    mesh = cube(4, block=False)
+    for reference in (None, cube(5, block=False)):
+        with pytest.raises(CaseError, match="give that mesh as reference"):
+            paint(mesh, quality(mesh), "displacement", reference)
+
+
+def save(file, **style):
+    mesh = cube(4, block=False)
+    section = Section("plane", (0, 0, 0.4))
+    pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
+    painted = paint(mesh, quality(mesh), "size-skew")
+    section_picture(pieces, section, painted, file, SectionStyle(**style))
+
+
+@pytest.mark.parametrize("size", [(1600, 1000), (640, 481)])
+def test_a_png_has_the_size_that_was_asked_for(tmp_path, size):
+    save(tmp_path / "x.png", size=size)
+    image = Image.open(tmp_path / "x.png").convert("RGB")
+    assert image.size == size
+    yellow = np.array(mpl.colormaps[COLOUR_MAP](1.0)[:3]) * 255
+    near = np.abs(np.asarray(image, float) - yellow).max(axis=2) < 3
+    assert near.mean() > 0.1
+
+
+def test_svg_and_pdf_are_vectors_and_the_same_each_time(tmp_path):
+    for suffix in ("svg", "pdf"):
+        files = [tmp_path / f"{name}.{suffix}" for name in "ab"]
+        for file in files:
+            save(file)
+        assert files[0].read_bytes() == files[1].read_bytes()
+    svg = (tmp_path / "a.svg").read_text()
+    assert "<image" not in svg
+    assert len(re.findall("PolyCollection|<path", svg)) > 16
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_very_many_polygons_become_pixels(tmp_path, monkeypatch):
+    monkeypatch.setattr(section_shapes, "MANY", 10)
+    save(tmp_path / "x.svg")
+    assert "<image" in (tmp_path / "x.svg").read_text()
+
+
+def test_what_cannot_be_drawn_or_written_says_so(tmp_path):
+    with pytest.raises(CaseError, match=r"x\.jpg: a section is drawn as \.png, \.svg, \.pdf"):
+        save(tmp_path / "x.jpg")
+    with pytest.raises(CaseError, match="the folder does not exist"):
+        save(tmp_path / "no" / "x.png")
+    mesh = cube(4, block=False)
+    painted = paint(mesh, quality(mesh), "size-skew")
+    section = Section("plane", (0, 0, 3))
+    pieces = {0: Cutter.of(mesh).cut(mesh.points, section)}
+    with pytest.raises(CaseError, match="plane z = 3: it cuts no cell"):
+        section_picture(pieces, section, painted, tmp_path / "x.png")
+    assert not list(tmp_path.iterdir())
