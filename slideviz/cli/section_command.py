@@ -21,7 +21,8 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
     from slideviz.view.copies import show_passages
-    from slideviz.view.section_cut import Cutter, joined
+    from slideviz.view.polygons import joined
+    from slideviz.view.section_cut import Cutter
     from slideviz.view.section_paint import paint
     from slideviz.view.section_picture import SectionStyle, require_picture_name, section_picture
 
@@ -45,9 +46,7 @@ def section(arguments: argparse.Namespace) -> int:
     elif painted.label == "displacement":
         painted = painted.up_to(ids)
     name = Path(mesh.name).name
-    style = SectionStyle(
-        arguments.size, arguments.edges, arguments.in_space, f"{name}: {chosen.describe()}"
-    )
+    style = SectionStyle(arguments.size, arguments.edges, arguments.in_space, name)
     section_picture(pieces, chosen, painted, arguments.output, style)
     summary = painted.summary(ids)
     report: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -12,8 +12,9 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, axis_basis, find_pairs, pair_up
 from slideviz.view.guess import guess_by_name
+from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter, Polygons
+from slideviz.view.section_cut import Cutter
 from slideviz.view.surfaces import padded
 
 WHOLE_NUMBER = 1e-3
@@ -22,11 +23,14 @@ WHOLE_NUMBER = 1e-3
 _SAME = 1e-9
 
 
-def find_period(mesh: Mesh, case: Case | None = None) -> Pair | None:
+def find_period(
+    mesh: Mesh, case: Case | None = None, pairs: Sequence[Pair] | None = None
+) -> Pair | None:
     """Return the pair of boundaries whose transformation repeats the mesh, or None.
 
     A case with periodic boundaries says which. Otherwise it is a guess among the boundaries that
     match: names that say so come first, then rotations; the ends of every straight duct match.
+    ``pairs`` has those that match, when they are known already.
 
     Raises
     ------
@@ -42,7 +46,7 @@ def find_period(mesh: Mesh, case: Case | None = None) -> Pair | None:
         named = sum(guess is not None and guess.role == "periodic" for guess in guesses)
         return -named, pair.kind != "rotational"
 
-    return min(find_pairs(mesh), key=rank, default=None)
+    return min(find_pairs(mesh) if pairs is None else pairs, key=rank, default=None)
 
 
 def passages_around(pair: Pair) -> int | None:

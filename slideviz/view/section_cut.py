@@ -2,92 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.view.polygons import Polygons, offsets_of
 from slideviz.view.section import Section
 from slideviz.view.section_cases import cut_cases
 from slideviz.view.surfaces import padded
-
-CELL = "cell"
-"""Name of the cell data that holds the owner of a polygon."""
-
-
-@dataclass(frozen=True, eq=False)
-class Polygons:
-    """Polygons, or lines where the mesh is 2D, each with the cell it belongs to.
-
-    Attributes
-    ----------
-    points : (p, 3) float64
-    offsets : (q + 1,) int64
-        Polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``.
-    connectivity : (k,) int64
-        Indices into ``points``.
-    cells : (q,) int64
-        The cell of the mesh that each polygon is a part of; colour it by that cell's value.
-    """
-
-    points: FloatArray
-    offsets: IntArray
-    connectivity: IntArray
-    cells: IntArray
-
-    def __len__(self) -> int:
-        return len(self.cells)
-
-    @property
-    def sizes(self) -> IntArray:
-        """Return the number of corners of each polygon, (q,)."""
-        return np.diff(self.offsets)
-
-    @property
-    def cell_ids(self) -> IntArray:
-        """Return the cells that occur, sorted, each once."""
-        return np.unique(self.cells)
-
-    def with_points(self, points: FloatArray) -> Polygons:
-        """Return the same polygons at other points, (p, 3)."""
-        return replace(self, points=points)
-
-    def take(self, order: IntArray) -> Polygons:
-        """Return some of the polygons, or all in another order, (t,)."""
-        sizes = self.sizes[order]
-        corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ramps(sizes)]
-        return Polygons(self.points, _offsets(sizes), corners, self.cells[order])
-
-    def by_depth(self) -> Polygons:
-        """Return the polygons in the order of their middle's z, which may be towards an eye."""
-        depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
-        return self.take(np.argsort(depth, kind="stable"))
-
-    def polydata(self) -> Any:
-        """Return them as pyvista.PolyData, the owners in the cell data ``CELL``."""
-        import pyvista as pv
-
-        flat = np.insert(self.connectivity, self.offsets[:-1], self.sizes)
-        lines = len(self) and self.sizes.max() == 2
-        shape = pv.PolyData(self.points, **{"lines" if lines else "faces": flat})
-        shape.cell_data[CELL] = self.cells
-        return shape
-
-
-def joined(pieces: Sequence[Polygons]) -> Polygons:
-    """Return several as one; their points stay apart."""
-    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
-    corners = [piece.connectivity + start for piece, start in zip(pieces, starts, strict=False)]
-    return Polygons(
-        np.concatenate([piece.points for piece in pieces]),
-        _offsets(np.concatenate([piece.sizes for piece in pieces])),
-        np.concatenate(corners),
-        np.concatenate([piece.cells for piece in pieces]),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +36,7 @@ class Cutter:
 
     def __init__(self, cells: Cells) -> None:
         self.dim = max((ELEMENTS[vtk].dim for vtk in cells.by_type), default=3)
-        self.used = cells.nodes
+        self._cells = cells
         self._blocks = [
             _Block(vtk, ids, nodes, tuple(np.ascontiguousarray(nodes.T)))
             for vtk, (ids, nodes) in cells.by_type.items()
@@ -121,6 +46,11 @@ class Cutter:
     def of(cls, mesh: Mesh) -> Cutter:
         """Return the cutter of a mesh."""
         return cls(mesh.cells)
+
+    @property
+    def used(self) -> IntArray:
+        """Return the nodes of the cells, sorted, each once: what a section can reach."""
+        return self._cells.nodes
 
     def cut(self, points: FloatArray, section: Section) -> Polygons:
         """Return where the section cuts the cells; none where it misses them.
@@ -155,7 +85,7 @@ class Cutter:
         keys, corners = np.unique(low[keep] * len(points) + high[keep], return_inverse=True)
         a, b = np.divmod(keys, len(points))
         at = _crossings(points, a, b, level, section)
-        found = Polygons(at, _offsets(keep.sum(axis=1)), corners, owners)
+        found = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
         return found.take(np.argsort(owners, kind="stable"))
 
     def which_cells(self, points: FloatArray, section: Section) -> IntArray:
@@ -194,7 +124,7 @@ class Cutter:
         keep = np.ones(facets.shape, bool)
         keep[facets[:, 2] == facets[:, 3], 3] = False
         used, corners = np.unique(facets[keep], return_inverse=True)
-        return Polygons(padded(points[used]), _offsets(keep.sum(axis=1)), corners, owner)
+        return Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
         if self.dim == 2 and section.kind == "cylinder":
@@ -236,15 +166,6 @@ _EDGES = {vtk: np.array(row.edges) for vtk, row in ELEMENTS.items() if row.dim >
 
 def _wide(table: IntArray, width: int) -> IntArray:
     return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=-1)
-
-
-def _offsets(sizes: IntArray) -> IntArray:
-    return np.concatenate([[0], np.cumsum(sizes)])
-
-
-def _ramps(sizes: IntArray) -> IntArray:
-    """Return 0, 1, ... size - 1 of every size, one after the other."""
-    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
 
 def _single(facets: IntArray, n_points: int) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -14,8 +14,8 @@ from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray
 from slideviz.view.look import INVERTED_COLOUR, PAPER
+from slideviz.view.polygons import Polygons, joined
 from slideviz.view.section import Section
-from slideviz.view.section_cut import Polygons, joined
 from slideviz.view.section_layout import Layout, inches_of, lay_out
 from slideviz.view.section_paint import Paint
 from slideviz.view.section_shapes import colours_of, shapes_of
@@ -38,14 +38,14 @@ class SectionStyle:
         Draw the mesh lines.
     in_space : bool
         Show it in space instead of flat.
-    title : str
-        First line of the title; empty: the section in words.
+    name : str
+        What was cut: it stands before the section in words, shortened where there is no room.
     """
 
     size: tuple[int, int] = (1600, 1000)
     edges: bool = True
     in_space: bool = False
-    title: str = ""
+    name: str = ""
 
 
 def require_picture_name(file: Path) -> None:
@@ -136,7 +136,7 @@ def draw_section(
     all_ids = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
     ids = drawn[0].cell_ids if 0 in drawn else all_ids
     _bar(figure, layout, paint, bool(paint.inverted[all_ids].any()))
-    _title(figure, layout, style.title or section.describe(), paint.sentence(ids))
+    _title(figure, layout, (style.name, section.describe()), paint.sentence(ids))
     return figure, dpi
 
 
@@ -242,16 +242,22 @@ def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
     )
 
 
-def _title(figure: Any, layout: Layout, first: str, second: str) -> None:
-    """Write two lines above the axes, shortened in the middle where they do not fit."""
+def _title(figure: Any, layout: Layout, first: tuple[str, str], second: str) -> None:
+    """Write two lines above the axes; the name at the head of the first makes way for the rest."""
     width, height = figure.get_size_inches()
     renderer = figure.canvas.get_renderer()
     top = min(layout.top + 0.16 / height, 1.0 - 0.46 / height)
-    for words, above, size in ((first, 0.22, _TITLE), (second, 0.0, _LETTERS)):
-        text = figure.text(
-            0.5, top + above / height, words, fontsize=size, ha="center", va="center"
-        )
-        kept = len(words)
-        while text.get_window_extent(renderer).width > (width - 0.2) * figure.dpi and kept > 8:
-            kept -= 2
-            text.set_text(f"{words[: kept // 2]}…{words[len(words) - kept // 2 :]}")
+    for (name, words), above, size in ((first, 0.22, _TITLE), (("", second), 0.0, _LETTERS)):
+        text = figure.text(0.5, top + above / height, "", fontsize=size, ha="center", va="center")
+        for shown in _shorter(name):
+            text.set_text(f"{shown}: {words}" if shown else words)
+            if text.get_window_extent(renderer).width <= (width - 0.2) * figure.dpi:
+                break
+
+
+def _shorter(name: str) -> Iterator[str]:
+    """Yield a name with more and more of its middle left out, at last nothing."""
+    yield name
+    for kept in range(len(name) // 2 - 1, 3, -1):
+        yield f"{name[:kept]}…{name[-kept:]}"
+    yield ""

@@ -8,7 +8,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR, PAPER
-from slideviz.view.section_cut import Polygons
+from slideviz.view.polygons import Polygons
 from slideviz.view.section_paint import Paint
 
 MANY = 200_000

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
+from slideviz.view.polygons import Polygons, joined
 from slideviz.view.section import Section
-from slideviz.view.section_cut import Polygons, joined
 from slideviz.view.unroll import plane_axes
 
 _ASIDE, _ABOVE = 0.55, 0.4

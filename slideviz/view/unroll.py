@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
+from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
-from slideviz.view.section_cut import Polygons
 
 _TURN = 2.0 * np.pi
 

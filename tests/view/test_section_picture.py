@@ -140,7 +140,7 @@ def test_both_directions_have_one_scale_and_nothing_leaves_the_picture(size, box
 def test_letters_are_not_smaller_than_8_points_and_inside(size):
     mesh = passage()
     section = Section("plane", (0.6, 0.3, 0.2), (1, 0.2, 0.3))
-    figure, _, _ = drawn(mesh, section, size=size, title="a_very_long_name_" * 12)
+    figure, _, _ = drawn(mesh, section, size=size, name="a_very_long_name_" * 12)
     figure.canvas.draw()
     renderer = figure.canvas.get_renderer()
     letters = [*figure.texts]
@@ -157,6 +157,7 @@ def test_letters_are_not_smaller_than_8_points_and_inside(size):
             assert box.x1 <= size[0]
             assert box.y1 <= size[1]
     assert "…" in words_of(figure)[0]
+    assert words_of(figure)[0].endswith(section.describe())
 
 
 def test_thin_cells_have_thin_lines_and_lines_can_be_left_out():

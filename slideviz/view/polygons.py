@@ -1,0 +1,95 @@
+"""Polygons that belong to cells of a mesh, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+
+CELL = "cell"
+"""Name of the cell data that holds the owner of a polygon."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Polygons, or lines where the mesh is 2D, each with the cell it belongs to.
+
+    Attributes
+    ----------
+    points : (p, 3) float64
+    offsets : (q + 1,) int64
+        Polygon ``i`` has the corners ``connectivity[offsets[i]:offsets[i + 1]]``.
+    connectivity : (k,) int64
+        Indices into ``points``.
+    cells : (q,) int64
+        The cell of the mesh that each polygon is a part of; colour it by that cell's value.
+    """
+
+    points: FloatArray
+    offsets: IntArray
+    connectivity: IntArray
+    cells: IntArray
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    @property
+    def sizes(self) -> IntArray:
+        """Return the number of corners of each polygon, (q,)."""
+        return np.diff(self.offsets)
+
+    @property
+    def cell_ids(self) -> IntArray:
+        """Return the cells that occur, sorted, each once."""
+        return np.unique(self.cells)
+
+    def with_points(self, points: FloatArray) -> Polygons:
+        """Return the same polygons at other points, (p, 3)."""
+        return replace(self, points=points)
+
+    def take(self, order: IntArray) -> Polygons:
+        """Return some of the polygons, or all in another order, (t,)."""
+        sizes = self.sizes[order]
+        corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ramps(sizes)]
+        return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
+
+    def by_depth(self) -> Polygons:
+        """Return the polygons in the order of their middle's z, which may be towards an eye."""
+        depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
+        return self.take(np.argsort(depth, kind="stable"))
+
+    def polydata(self) -> Any:
+        """Return them as pyvista.PolyData, the owners in the cell data ``CELL``."""
+        import pyvista as pv
+
+        flat = np.insert(self.connectivity, self.offsets[:-1], self.sizes)
+        lines = len(self) and self.sizes.max() == 2
+        shape = pv.PolyData(self.points, **{"lines" if lines else "faces": flat})
+        shape.cell_data[CELL] = self.cells
+        return shape
+
+
+def joined(pieces: Sequence[Polygons]) -> Polygons:
+    """Return several as one; their points stay apart."""
+    starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
+    corners = [piece.connectivity + start for piece, start in zip(pieces, starts, strict=False)]
+    return Polygons(
+        np.concatenate([piece.points for piece in pieces]),
+        offsets_of(np.concatenate([piece.sizes for piece in pieces])),
+        np.concatenate(corners),
+        np.concatenate([piece.cells for piece in pieces]),
+    )
+
+
+def offsets_of(sizes: IntArray) -> IntArray:
+    """Return where each polygon begins, and the end, (q + 1,), of numbers of corners (q,)."""
+    return np.concatenate([[0], np.cumsum(sizes)])
+
+
+def _ramps(sizes: IntArray) -> IntArray:
+    """Return 0, 1, ... size - 1 of every size, one after the other."""
+    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
