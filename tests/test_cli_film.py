@@ -130,12 +130,20 @@ def test_a_picture_has_the_size_and_the_detail_asked_for(tmp_path):
             moved = sv.read(out)
             middle = moved.points[moved.marker("BLOCK").nodes].mean(axis=0)
             zoom = f"{middle[0]},{middle[1]},0.02"
-        assert run([*words, f"--zoom={zoom}"]) == 0
+        assert run([*words, "--zoom", zoom]) == 0
         with Image.open(file) as image:
             assert image.size == (400, 300)
             colours.append(np.asarray(image.convert("RGB"))[100:200, 50:250])
     assert (colours[0].min(axis=2) < 250).any(), "cells"
     assert (colours[1] == 255).all(), "inside the block"
+
+
+def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):
+    from slideviz.cli.parser import parse
+    from slideviz.view.moved import Detail
+
+    words = ["film", str(case), "-o", "a.gif", "--zoom", "-0.5,.25,-1e-3,2"]
+    assert parse(words).zoom == Detail((-0.5, 0.25, -1e-3), 2.0)
 
 
 def test_interrupted_it_leaves_nothing_and_says_so(case, tmp_path):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.view.portrait import Zoom
+    from slideviz.view.moved import Zoom
     from slideviz.view.state import Frame
 
 SMOOTH = 4
@@ -22,8 +22,8 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE, INVERTED
     from slideviz.cli.progress import Bar
     from slideviz.cli.run_command import read_case
-    from slideviz.view.film import Reel, check_film
     from slideviz.view.film import film as draw
+    from slideviz.view.reel import Reel, check_film
 
     file = arguments.output
     reel = Reel(arguments.size, arguments.fps, arguments.hold, arguments.between)
@@ -163,7 +163,7 @@ def zoom(text: str) -> Zoom:
         return "auto"
     if text == "all":
         return "all"
-    from slideviz.view.portrait import Detail
+    from slideviz.view.moved import Detail
 
     try:
         *centre, width = (float(word) for word in text.split(","))

@@ -140,7 +140,7 @@ def _start_ffmpeg(
     # The colours of high definition, and said so: otherwise players guess by the size.
     said = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
     colours = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
-    made = ["-vf", colours, "-c:v", "libx264", "-crf", "16", "-tune", "animation"]
+    made = ["-vf", colours, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
     made += ["-movflags", "+faststart", "-f", "mp4"]
     try:
         return subprocess.Popen(
@@ -171,7 +171,7 @@ def _gif(file: Path, take: Take) -> Iterator[Add]:
     """Write image by image, each only where it differs from the one before."""
     from PIL import GifImagePlugin, Image
 
-    palette = _palette([Image.fromarray(image) for image in take.samples()])
+    palette = _palette(take.samples())
     before: NDArray | None = None
     shown, ticks = 0.0, 0
     with atomic_write(file, SlidevizError) as out:
@@ -208,16 +208,20 @@ def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, i
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def _palette(samples: Sequence[Image]) -> Image:
-    """Return an image with the 256 colours that suit all samples best."""
+def _palette(samples: Sequence[Pixels]) -> Image:
+    """Return an image with 256 colours that suit all samples.
+
+    One half covers all colours there are, however rare (an inverted cell), the other those that
+    fill most of the images (shades of the colour map), which the first half would make coarse.
+    """
     from PIL import Image
 
-    sheet = Image.new("RGB", (samples[0].width, sum(image.height for image in samples)))
-    top = 0
-    for image in samples:
-        sheet.paste(image, (0, top))
-        top += image.height
-    return sheet.quantize(256, method=Image.Quantize.MAXCOVERAGE)
+    sheet = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples]))
+    rare = sheet.quantize(128, method=Image.Quantize.MAXCOVERAGE)
+    many = sheet.quantize(128, method=Image.Quantize.MEDIANCUT, kmeans=3)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette((rare.getpalette() or [])[:384] + (many.getpalette() or [])[:384])
+    return palette
 
 
 @contextmanager

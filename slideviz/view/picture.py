@@ -10,8 +10,9 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.quality import quality as measure
 from slideviz.view.look import PAPER, Look
+from slideviz.view.moved import Zoom
 from slideviz.view.offscreen import check_png, font_scale, offscreen, write_png, write_title
-from slideviz.view.portrait import Portrait, Zoom
+from slideviz.view.portrait import Portrait
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,35 +12,14 @@ from slideviz.mesh.quality import Quality
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
 from slideviz.view.legend import STRIP, add_colour_bar
 from slideviz.view.look import PAPER
+from slideviz.view.moved import Detail, Zoom, half_of, lengths, tiny_motion
 from slideviz.view.offscreen import font_scale
 from slideviz.view.state import COLOUR_BY, ColourBy, Frame
 from slideviz.view.surfaces import padded
 
-TINY = 0.05
-"""Moved boundaries smaller than this part of the mesh are shown in detail."""
-MARGIN = 2.5
-"""A detail is this many times as wide as the boundaries that moved."""
+FILL = 0.86
+"""How much of the free height or width a mesh takes; the rest is for title and margins."""
 _NODE, _CELL = "node", "cell"
-
-
-@dataclass(frozen=True)
-class Detail:
-    """A part of the mesh to show.
-
-    Attributes
-    ----------
-    centre : tuple of float
-        Its middle, two or three coordinates in the mesh's length unit.
-    width : float
-        How much of the mesh is seen from left to right, in the mesh's length unit.
-    """
-
-    centre: tuple[float, ...]
-    width: float
-
-
-Zoom = Detail | Literal["auto", "all"]
-"""A given detail, the whole mesh, or the whole unless what moved is tiny in it."""
 
 
 class Portrait:
@@ -62,6 +41,8 @@ class Portrait:
         What the colours say.
     zoom : Detail, "auto" or "all"
         What part of the mesh is seen.
+    seen : sequence of Mesh
+        More steps of it that the camera must see whole.
     """
 
     def __init__(
@@ -71,12 +52,13 @@ class Portrait:
         base: Mesh,
         colour_by: ColourBy = "size_skew",
         zoom: Zoom = "auto",
+        seen: Sequence[Mesh] = (),
     ) -> None:
         self.plotter = plotter
         self.colour_by = colour_by
         self._base = base
         moved = base if base.points.shape == mesh.points.shape else mesh
-        cells, towards, up = _seen(mesh, moved)
+        cells, towards, up = half_of(mesh, moved)
         shape = _outside(volume(mesh), cells)
         self._nodes = np.asarray(shape.point_data.pop(_NODE))
         self._owners = np.asarray(shape.cell_data.pop(_CELL))
@@ -84,11 +66,12 @@ class Portrait:
         self._shape = shape
         self._mapper = _add_cells(plotter, shape, flat=mesh.dim == 2).mapper
         if colour_by == "displacement":
-            top = float(_lengths(mesh, base).max()) or 1.0
+            top = float(lengths(mesh, base).max()) or 1.0
             self._mapper.lookup_table.scalar_range = self._mapper.scalar_range = (0.0, top)
         detail = tiny_motion(mesh, moved) if zoom == "auto" else zoom
         self.detail = detail if isinstance(detail, Detail) else None
-        _aim(plotter, shape, towards, up)
+        clouds = [padded(each.points)[self._nodes] for each in (mesh, *seen)]
+        _aim(plotter, np.concatenate(clouds), towards, up)
         if self.detail is not None:
             _approach(plotter, self.detail)
             width, height = plotter.window_size
@@ -124,80 +107,6 @@ def caption(name: str, found: Quality, colour_by: ColourBy = "size_skew") -> str
     return text
 
 
-def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
-    """Return the surroundings of what moved, when it would be a dot in a view of the whole.
-
-    That are the boundaries inside the mesh that moved: an airfoil in a wide far field. None
-    when they are large enough, or when it is an outer boundary that moved.
-    """
-    bodies = _inner_bodies(base, _lengths(mesh, base))
-    if not bodies:
-        return None
-    nodes = np.concatenate(bodies)
-    points = np.concatenate([base.points[nodes], mesh.points[nodes]])
-    low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    width = float(np.linalg.norm(extent))
-    if width >= TINY * float(np.linalg.norm(np.ptp(base.points, axis=0))):
-        return None
-    return Detail(tuple((low + extent / 2.0).tolist()), MARGIN * width)
-
-
-def _lengths(mesh: Mesh, base: Mesh) -> FloatArray:
-    return np.asarray(np.linalg.norm(mesh.points - base.points, axis=1))
-
-
-def _inner_bodies(base: Mesh, length: FloatArray) -> list[IntArray]:
-    """Return the nodes of each boundary that lies inside the mesh's box and moved."""
-    least = 0.05 * float(length.max())
-    bodies = [marker.nodes for marker in base.markers if len(marker.nodes)]
-    return [at for at in bodies if _is_inside(base, at) and length[at].max() > least]
-
-
-def _is_inside(base: Mesh, nodes: IntArray) -> bool:
-    """Tell whether nodes keep off the mesh's box in two directions or more, as a blade does."""
-    low, high = base.points.min(axis=0), base.points.max(axis=0)
-    at = base.points[nodes]
-    return int(((at.min(axis=0) > low) & (at.max(axis=0) < high)).sum()) >= 2
-
-
-def _seen(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the cells to show, the direction to the eye, and what is up."""
-    if mesh.dim == 2:
-        return np.arange(len(mesh.cells)), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
-    low, extent = base.points.min(axis=0), np.ptp(base.points, axis=0)
-    centre, across = low + extent / 2.0, int(np.argmin(extent))
-    length = _lengths(mesh, base)
-    if length.max() > 0:
-        strong = _moved_body(base, length)
-        centre = base.points[strong].mean(axis=0)
-        along = np.abs(mesh.points - base.points)[strong].mean(axis=0)
-        # Cut along the motion, and of such planes the one across the longest side.
-        free = along < 0.5 * along.max()
-        across = int(np.argmax(np.where(free, extent, -1.0))) if free.any() else int(along.argmin())
-    # By where the cells were: what lay in one layer of a structured mesh stays together.
-    middle = volume(base).cell_centers().points[:, across]
-    behind = np.flatnonzero(middle <= centre[across] + 1e-3 * extent[across])
-    normal = np.zeros(3)
-    normal[across] = 1.0
-    up = np.array([0.0, 1.0, 0.0]) if across == 2 else np.array([0.0, 0.0, 1.0])
-    cells = behind if len(behind) else np.arange(len(mesh.cells))
-    return cells, normal + 0.4 * np.cross(up, normal) + 0.3 * up, up
-
-
-def _moved_body(base: Mesh, length: FloatArray) -> IntArray:
-    """Return the nodes of the boundary to cut through: of those inside, what moved most.
-
-    A blade or a block lies inside the mesh's box in two directions or three; the outer
-    boundaries, which may slide further than it, in none.
-    """
-
-    def rank(nodes: IntArray) -> tuple[bool, float]:
-        return _is_inside(base, nodes), float(length[nodes].mean())
-
-    every = [marker.nodes for marker in base.markers if len(marker.nodes)]
-    return max(every, key=rank, default=np.flatnonzero(length > 0.7 * length.max()))
-
-
 def _outside(grid: Any, cells: IntArray) -> Any:
     """Return the faces of some cells as PolyData that know their nodes and cells."""
     grid.point_data[_NODE] = np.arange(grid.n_points)
@@ -231,15 +140,23 @@ def _strip(plotter: Any) -> float:
     return STRIP * font_scale(tuple(plotter.window_size))
 
 
-def _aim(plotter: Any, shape: Any, towards: FloatArray, up: FloatArray) -> None:
+def _aim(plotter: Any, points: FloatArray, towards: FloatArray, up: FloatArray) -> None:
+    """Look at all points from a direction, beside the colour bar and below the title."""
+    right = np.cross(up, towards)
+    axes = np.array([right, np.cross(towards, right), towards])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    extent = high - low
+    width, height = plotter.window_size
+    free = max(width - _strip(plotter), 1.0)
     camera = plotter.camera
-    centre = np.asarray(shape.center)
-    camera.focal_point = centre
-    camera.position = centre + towards * max(shape.length, 1e-300)
+    camera.focal_point = axes.T @ (low + extent / 2.0)
+    camera.position = camera.focal_point + axes[2] * max(np.linalg.norm(extent), 1e-300)
     camera.up = up
     camera.parallel_projection = True
-    camera.SetWindowCenter(_strip(plotter) / plotter.window_size[0], 0.06)
-    plotter.renderer.ResetCameraScreenSpace(0.8)
+    camera.SetWindowCenter(_strip(plotter) / width, 0.06)
+    half = max(extent[1] / height, extent[0] / free) * height / 2.0
+    camera.parallel_scale = max(half / FILL, 1e-300)
     plotter.renderer.ResetCameraClippingRange()
 
 

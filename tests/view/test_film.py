@@ -11,9 +11,10 @@ from PIL import Image
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
-from slideviz.view.film import Reel, check_film, film, film_of
+from slideviz.view.film import film, film_of
 from slideviz.view.look import PAPER
 from slideviz.view.offscreen import font_scale, offscreen
+from slideviz.view.reel import Reel, check_film
 from slideviz.view.scene import Scene
 from slideviz.view.state import Frame, Run
 from slideviz.view.surfaces import find_surfaces
@@ -109,6 +110,33 @@ def test_a_gif_repeats_for_ever_with_the_times_asked_for(tmp_path, frames):
         with Image.open(tmp_path / f"a{k}.png") as picture:
             away = np.abs(np.asarray(picture).astype(int) - image.astype(int)).max(axis=2)
         assert np.percentile(away, 99) < 32, f"image {k} from only its changes"
+
+
+def test_a_gif_keeps_the_shades_of_the_colour_map_and_rare_colours():
+    from slideviz.view.encode import _palette
+
+    sample = np.full((200, 320, 3), 255, np.uint8)
+    sample[:, :256, 0] = np.arange(256)
+    sample[:, :256, 1:] = 60
+    sample[:6, 300:306] = [232, 17, 45]  # one inverted cell
+    with_palette = Image.fromarray(sample).quantize(palette=_palette([sample] * 3), dither=0)
+    image = np.asarray(with_palette.convert("RGB")).astype(int)
+    assert len(np.unique(np.asarray(with_palette)[100, :256])) > 50
+    assert np.abs(image - sample).max() <= 20
+    assert np.abs(image[3, 303] - [232, 17, 45]).max() <= 10
+
+
+def test_the_camera_sees_every_step_whole(tmp_path, square):
+    frames = leaning(square, steps=2, by=3.0)
+    for name, order in (("out", frames), ("back", frames[::-1])):
+        shoot(order, tmp_path / f"{name}%d.png", Reel(SMALL))
+        for k in range(3):
+            with Image.open(tmp_path / f"{name}{k}.png") as picture:
+                drawn = np.asarray(picture)[20:, :255].min(axis=2) < 200
+            assert drawn.any()
+            assert not drawn[:, 0].any()
+            assert not drawn[:, -1].any()
+            assert not drawn[-1].any()
 
 
 def test_steps_that_do_not_change_are_images_of_a_gif_too(tmp_path, frames):

@@ -7,8 +7,8 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
 from slideviz.view.look import COLOUR_MAP
+from slideviz.view.moved import Detail, half_of, tiny_motion
 from slideviz.view.picture import picture, picture_of
-from slideviz.view.portrait import Detail, _seen, tiny_motion
 from slideviz.view.state import Frame
 from slideviz.view.surfaces import find_surfaces
 
@@ -39,7 +39,7 @@ def test_the_half_of_a_3d_mesh_shows_the_hole_that_moved(tmp_path, cube):
     points = cube.points.copy()
     points[cube.marker("BLOCK").nodes] += [0.0, 0.06, 0.02]
     moved = cube.with_points(points)
-    cells, towards, up = _seen(moved, cube)
+    cells, towards, up = half_of(moved, cube)
     assert 0 < len(cells) < len(cube.cells)
     across = int(np.argmax(np.abs(towards)))
     assert across == 0, "cut along the motion"
