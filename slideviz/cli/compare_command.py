@@ -1,0 +1,187 @@
+"""What ``slideviz compare`` does."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.cli.progress import Bar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+    from slideviz.view.compare import Combination, Row
+
+STEPS = (1, 5, 20)
+KEPT_BYTES = 1_500_000_000
+"""Meshes and qualities are kept for the pictures up to this size."""
+
+
+def add_compare(calls: argparse._SubParsersAction) -> None:
+    """Add the arguments of ``compare``."""
+    about = "one case by several methods: table, plots and pictures"
+    call = calls.add_parser(
+        "compare",
+        help=about,
+        description=f"Deform {about}. Combinations that cannot be are rows that say why.",
+        epilog="exit codes: 0 compared (also when cells are inverted: the table says it); 1 no "
+        "combination could be computed; 130 cancelled, what was finished is in the table",
+    )
+    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    call.add_argument("--methods", metavar="LIST", help="of none,ps,ds (default: none,ps,ds)")
+    call.add_argument(
+        "--periodic",
+        metavar="LIST",
+        help="of none,periodic,fixed,moving (default: all if the case has periodic markers)",
+    )
+    call.add_argument("--steps", metavar="LIST", help="numbers of steps, or auto (default: 1,5,20)")
+    call.add_argument(
+        "--span",
+        choices=("r", "x", "y", "z", "none"),
+        help="direction of the spanwise plots (default: r or z of a 3D mesh, none of a 2D one)",
+    )
+    call.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_compared)"
+    )
+    call.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a key of the case; may be repeated",
+    )
+    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    call.add_argument(
+        "--no-pictures", action="store_true", help="table and plots only, no quality pictures"
+    )
+    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    call.set_defaults(command=compare)
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    """Compare methods on a case, and write table, plots and pictures."""
+    from slideviz import read
+    from slideviz.cli import DONE
+    from slideviz.cli.run_command import read_case, tell_compiling
+    from slideviz.errors import CaseError
+    from slideviz.view.compare_table import terminal_head
+    from slideviz.view.warmup import warm_up
+
+    case = read_case(arguments)
+    if case.mesh_file is None:
+        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
+    wanted = _wanted(arguments, case)
+    folder = arguments.output or Path(f"{arguments.case.stem}_compared")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+    mesh = read(case.mesh_file, zone=case.zone)
+    tell_compiling(arguments.quiet)
+    # What is loaded once must not count as time of a run.
+    warm_up(lambda: None, lambda: False)
+
+    def say(text: str) -> None:
+        if not arguments.quiet:
+            print(text, flush=True)
+
+    say(terminal_head())
+    rows, files = _computed(arguments, (case, mesh, wanted), folder, say)
+    files += _drawn(arguments, case, mesh, rows, folder)
+    say("\n".join(map(str, files)))
+    if not any(row.result for row in rows):
+        raise CaseError(f"no combination could be computed; {files[0]} says why for each")
+    return DONE
+
+
+def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
+    """Return the combinations that the arguments name.
+
+    Raises
+    ------
+    CaseError
+        A name is unknown, or a number of steps is none.
+    """
+    from slideviz.case.model import PERIODIC_MODES
+    from slideviz.errors import CaseError
+    from slideviz.view.compare import AUTO, METHODS, combinations, wanted_methods, wanted_modes
+
+    def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
+        text = getattr(arguments, option)
+        found = _items(text) if text is not None else list(usual)
+        for name in found:
+            if name not in known:
+                raise CaseError(f"--{option}: {name!r} is not one of {', '.join(known)}")
+        if not found:
+            raise CaseError(f"--{option} names none of {', '.join(known)}")
+        return found
+
+    methods = names("methods", tuple(METHODS), wanted_methods(case))
+    modes = names("periodic", PERIODIC_MODES, wanted_modes(case))
+    steps = list(STEPS)
+    if arguments.steps is not None:
+        steps = []
+        for item in _items(arguments.steps):
+            if item != "auto" and not (item.isdecimal() and int(item) > 0):
+                raise CaseError(f"--steps: {item!r} is not a number of steps, 1 or more, or auto")
+            steps.append(AUTO if item == "auto" else int(item))
+        if not steps:
+            raise CaseError("--steps names no number; give some, such as 1,5,20")
+    return combinations(methods, [mode for mode in PERIODIC_MODES if mode in modes], steps)
+
+
+def _items(text: str) -> list[str]:
+    """Return the words of a list with commas, each once."""
+    return list(dict.fromkeys(word.strip().lower() for word in text.split(",") if word.strip()))
+
+
+def _computed(
+    arguments: argparse.Namespace,
+    asked: tuple[Case, Mesh, Sequence[Combination]],
+    folder: Path,
+    say: Callable[[str], None],
+) -> tuple[list[Row], list[Path]]:
+    """Return all rows and the tables written; after each row they have what was finished."""
+    from slideviz.view.compare import compare
+    from slideviz.view.compare_table import csv_text, history_text, save_text, terminal_line
+
+    table, histories = folder / "compare.csv", folder / "convergence.csv"
+    files = [table]
+    rows: list[Row] = []
+    case, mesh, wanted = asked
+    bars: list[Bar] = []
+    pulled = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
+    while len(rows) < len(wanted):
+        with Bar(not arguments.quiet) as bar:  # wiped away before the row is printed
+            bars.append(bar)
+            rows.append(next(pulled))
+        save_text(table, csv_text(rows))
+        if any(row.result is not None and row.result.history for row in rows):
+            save_text(histories, history_text(rows))
+            files = [table, histories]
+        say(terminal_line(rows[-1]))
+    return rows, files
+
+
+def _drawn(
+    arguments: argparse.Namespace, case: Case, mesh: Mesh, rows: Sequence[Row], folder: Path
+) -> list[Path]:
+    """Return the plots and pictures written."""
+    from slideviz.view.compare_plots import figures, profiler, save_figure, steps_name
+    from slideviz.view.compare_sheets import DPI, sheet
+
+    span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
+    files = []
+    for name, figure in figures(rows, span):
+        files += save_figure(figure, folder, name)
+    if not arguments.no_pictures:
+        for steps in dict.fromkeys(row.combination.steps for row in rows):
+            pictures = sheet([row for row in rows if row.combination.steps == steps], mesh)
+            if pictures is not None:
+                files += save_figure(
+                    pictures, folder, f"quality_{steps_name(steps)}", DPI, (".png",)
+                )
+    return files

@@ -1,0 +1,340 @@
+"""Figures of a comparison: against steps, step by step, histogram, span, convergence.
+
+Where both methods and periodic modes vary, each method has a panel and each mode a line, as in
+the thesis (Figures 5.5, 5.7, 5.8); otherwise there is one panel with a line for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import pair_up
+from slideviz.mesh.quality import INVERTED
+from slideviz.view import plots
+from slideviz.view.compare import METHODS, MODES, Result, Row
+from slideviz.view.plots_style import PRINT
+from slideviz.view.spanwise import Profile, along, along_radius, spanwise
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from slideviz.case.model import Case
+
+WIDTH = 7.0
+"""Inches; that of a page's text, at which letters are 8 points or more."""
+
+_MANY = 5000
+_LAST = ("minimum", "mean")
+_QUIET = replace(PRINT, legend=False)
+
+Span = Literal["r", "x", "y", "z"]
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A row with the name and the number of its line in a panel."""
+
+    label: str
+    series: int
+    row: Row
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Rows that are drawn together; ``title`` is empty where there is one panel only."""
+
+    title: str
+    lines: tuple[Line, ...]
+
+
+def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
+    """Return rows with a result in panels; a line has the same look in each."""
+    methods = list(dict.fromkeys(row.combination.method for row in rows))
+    modes = list(dict.fromkeys(row.combination.periodic for row in rows))
+    by_method = len(modes) == 1
+    done = [row for row in rows if row.result is not None]
+    if by_method:
+        every = [
+            Line(METHODS[row.combination.method][0], methods.index(row.combination.method), row)
+            for row in done
+        ]
+        return (Panel("", tuple(every)),) if every else ()
+    found = []
+    for method in methods:
+        mine = [row for row in done if row.combination.method == method]
+        lines = [
+            Line(MODES[row.combination.periodic], modes.index(row.combination.periodic), row)
+            for row in mine
+        ]
+        title = METHODS[method][0] if len(methods) > 1 else ""
+        if lines:
+            found.append(Panel(title, tuple(lines)))
+    return tuple(found)
+
+
+def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
+    """Yield the names and figures of a comparison.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Rows without a result are left out.
+    span : callable or None
+        What makes the profile of a row along the span; see `profiler`.
+    """
+    numbers = list(dict.fromkeys(row.combination.steps for row in rows))
+    if len({row.result.steps for row in rows if row.result}) > 1:
+        yield "steps", _grid(panels(rows), (_minimum, _mean, _seconds))
+    for number in numbers:
+        group = panels([row for row in rows if row.combination.steps == number])
+        lines = [line for panel in group for line in panel.lines]
+        if not lines:
+            continue
+        name = steps_name(number)
+        yield f"histogram_{name}", _grid(group, (_histogram,), across=True)
+        if any(len(_result(line).minimum) > 1 for line in lines):
+            yield f"by_step_{name}", _grid(group, (_by_step,), across=True)
+        if any(_result(line).history for line in lines):
+            yield f"convergence_{name}", _grid(group, (_convergence,), across=True)
+        if span is not None:
+            yield f"spanwise_{name}", _grid(group, (_span(span, "minimum"), _span(span, "mean")))
+
+
+def steps_name(number: int) -> str:
+    """Return the end of the names of files about a number of steps."""
+    return f"{number:02d}_steps" if number else "auto_steps"
+
+
+def save_figure(
+    figure: Figure,
+    folder: Path,
+    name: str,
+    dpi: int = 200,
+    suffixes: Sequence[str] = (".png", ".svg"),
+    tight: bool = False,
+) -> list[Path]:
+    """Write a figure as PNG and SVG, each whole or not at all; return the paths.
+
+    ``tight`` leaves out the white rim.
+
+    Raises
+    ------
+    CaseError
+        A file cannot be written.
+    """
+    paths = []
+    for suffix in suffixes:
+        data = BytesIO()
+        box = "tight" if tight else None
+        figure.savefig(data, format=suffix[1:], dpi=dpi, bbox_inches=box, pad_inches=0.05)
+        paths.append(folder / f"{name}{suffix}")
+        with atomic_write(paths[-1], CaseError) as file:
+            file.write(data.getvalue())
+    return paths
+
+
+Profiler = Callable[[Line], Profile]
+_Draw = Callable[["Axes", Sequence[Line]], None]
+
+
+def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
+    """Return what makes profiles along the span; None where nothing says what the span is.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : Mesh
+        The undeformed mesh. Its cells say which layer a cell is in, so that layers of cells stay
+        together while they bend.
+    span : {"r", "x", "y", "z"}, optional
+        When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
+        nothing of a 2D mesh.
+    """
+    axis, origin, turns = case.axis, case.origin, False
+    names = case.markers_with("periodic")
+    if names and span in (None, "r"):
+        try:
+            first = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+            turns = first.kind == "rotational"
+            axis, origin = (first.axis, first.origin) if turns else (axis, origin)
+        except (MeshError, CaseError):
+            pass  # the rows say it
+    if span is None and mesh.dim == 2:
+        return None
+    where = span or ("r" if turns else "z")
+
+    def profile(line: Line) -> Profile:
+        values = _result(line).quality.values
+        if where == "r":
+            made = along_radius(mesh, values, axis, origin, label=line.label)
+        else:
+            made = along(mesh, values, where, label=line.label)
+        return replace(made, series=line.series)
+
+    return profile
+
+
+def _result(line: Line) -> Result:
+    assert line.row.result is not None
+    return line.row.result
+
+
+def _outcomes(lines: Sequence[Line]) -> list[plots.Outcome]:
+    found = []
+    for line in lines:
+        result = _result(line)
+        found.append(
+            plots.Outcome(
+                line.label,
+                result.steps,
+                result.quality.min,
+                result.quality.mean,
+                result.quality.inverted,
+                result.processor_seconds,
+                result.control_nodes,
+                result.max_error,
+                line.series,
+            )
+        )
+    return found
+
+
+def _minimum(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
+
+
+def _mean(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
+
+
+def _seconds(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
+
+
+def _histogram(axes: Axes, lines: Sequence[Line]) -> None:
+    runs = [
+        plots.QualityRun(
+            line.label,
+            _result(line).quality.values,
+            _result(line).quality.status == INVERTED,
+            line.series,
+        )
+        for line in lines
+    ]
+    # Many cells: finer, and logarithmic to show the few bad ones.
+    many = max((len(run.values) for run in runs), default=0) > _MANY
+    plots.histogram(axes, runs, bins=50 if many else 25, log=many, style=_QUIET)
+
+
+def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
+    runs = []
+    for line in lines:
+        result = _result(line)
+        numbers = np.arange(1, result.steps + 1)
+        runs.append(plots.StepRun(line.label, numbers, result.minimum, result.mean, line.series))
+    plots.quality_by_step(axes, runs, _QUIET)
+
+
+def _convergence(axes: Axes, lines: Sequence[Line]) -> None:
+    runs = []
+    for line in lines:
+        if not _result(line).history:
+            continue
+        cycles = [cycle for step, cycle in _result(line).history if step == 1]
+        runs.append(
+            plots.GreedyRun(
+                line.label,
+                np.array([cycle.control_nodes for cycle in cycles]),
+                np.array([cycle.error for cycle in cycles]),
+                np.array([cycle.level for cycle in cycles]),
+                _result(line).tolerance,
+                line.series,
+            )
+        )
+    plots.convergence(axes, runs, style=_QUIET)
+
+
+def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
+    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+        spanwise(axes, [make(line) for line in lines], what, style=_QUIET)
+
+    return draw
+
+
+def _grid(group: Sequence[Panel], draws: Sequence[_Draw], across: bool = False) -> Figure:
+    """Return a figure with a row for each panel, or a column if ``across``, and one legend."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    count = len(group)
+    shape = (1, count) if across else (count, len(draws))
+    figure = Figure(figsize=(WIDTH, 0.9 + shape[0] * (3.0 if across else 2.1)))
+    figure.set_layout_engine("constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(*shape, squeeze=False)
+    for number, panel in enumerate(group):
+        for column, draw in enumerate(draws):
+            here = axes[0, number] if across else axes[number, column]
+            draw(here, panel.lines)
+            if panel.title and column == 0:
+                here.set_title(panel.title, fontsize=PRINT.size + 1, loc="left")
+            if across and number:
+                here.set_ylabel("")
+            if not across and number < count - 1:
+                here.set_xlabel("")
+    for together in [axes[0]] if across else axes.T:
+        _same_height(together)
+    for inner in axes[0, 1:] if across else ():
+        inner.tick_params(labelleft=False)
+    _one_legend(figure)
+    return figure
+
+
+def _one_legend(figure: Figure) -> None:
+    """Put one legend for all axes below them, lines first and what markers mean last."""
+    handles: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    labels = [name for name in handles if name not in _LAST]
+    labels += [name for name in _LAST if name in handles]
+    crosses = [
+        line for axes in figure.axes for line in axes.lines if _is_cross(str(line.get_gid()))
+    ]
+    if crosses:
+        labels.append("has inverted cells")
+        handles[labels[-1]] = crosses[0]
+    if labels:
+        figure.legend(
+            [handles[name] for name in labels],
+            labels,
+            loc="outside lower center",
+            ncols=len(labels) if len(labels) < 5 else 3,
+            fontsize=PRINT.size,
+            handlelength=3.2,
+            frameon=False,
+        )
+
+
+def _is_cross(gid: str) -> bool:
+    return gid.startswith("inverted:")
+
+
+def _same_height(together: Sequence[Axes]) -> None:
+    """Give axes the limits that hold all of them, so that they can be compared."""
+    scales = {axes.get_yscale() for axes in together}
+    for axes in together:
+        axes.set_yscale("log" if "log" in scales else "linear")
+    limits = [axes.get_ylim() for axes in together if axes.lines or axes.patches]
+    for axes in together:
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))

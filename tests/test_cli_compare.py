@@ -1,0 +1,148 @@
+"""slideviz compare: files, exit codes, sentences, and what a cancel leaves."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from slideviz.case.samples import write_sample
+from slideviz.cli import run
+
+
+@pytest.fixture
+def square(tmp_path: Path) -> Path:
+    """A case of 10 by 10 cells."""
+    write_sample("square", tmp_path / "square", 10, "motion")
+    return tmp_path / "square" / "square.cfg"
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "compare.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_all_files_are_written_and_the_table_is_printed(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "none,ps", "--steps", "1,2", "-o", str(out)]
+    assert run(argv) == 0
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "compare.csv",
+        *(f"steps.{end}" for end in ("png", "svg")),
+        *(f"histogram_0{n}_steps.{end}" for n in (1, 2) for end in ("png", "svg")),
+        *(f"by_step_02_steps.{end}" for end in ("png", "svg")),
+        *(f"quality_0{n}_steps.png" for n in (1, 2)),
+    }
+    printed = capsys.readouterr().out
+    rows = table(out)
+    assert len(rows) == 2 * 4 * 2
+    for row in rows:
+        if row["min"]:
+            assert f"{float(row['min']):.6f}" in printed
+    assert printed.count("not possible: ") == 2
+    assert str(out / "quality_02_steps.png") in printed
+
+
+def test_quiet_and_without_pictures(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "ps", "--periodic", "moving", "--steps", "2"]
+    assert run([*argv, "-o", str(out), "-q", "--no-pictures", "--set", "RBF_KERNEL=ctps-c1"]) == 0
+    assert capsys.readouterr().out == ""
+    assert not list(out.glob("quality*"))
+    (row,) = table(out)
+    assert (row["method"], row["periodic"], row["steps_made"]) == ("ps", "moving", "2")
+
+
+def test_the_default_folder_is_named_after_the_case(square, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    argv = ["compare", str(square), "--methods", "none", "--periodic", "none", "--steps", "1"]
+    assert run([*argv, "--no-pictures"]) == 0
+    assert (tmp_path / "square_compared" / "compare.csv").exists()
+
+
+def test_data_reduction_leaves_its_convergence(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "ps", "--periodic", "moving", "--steps", "1"]
+    reduced = ["--set", "DATA_REDUCTION=YES", "--set", "DATA_RED_TOLERANCE=0.01"]
+    assert run([*argv, *reduced, "-o", str(out), "--no-pictures"]) == 0
+    assert (out / "convergence_01_steps.png").exists()
+    with (out / "convergence.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert float(lines[-1]["error"]) <= 0.01 < float(lines[0]["error"])
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--methods", "ps,pz"], "--methods: 'pz' is not one of none, ps, ds"),
+        (["--periodic", "sometimes"], "--periodic: 'sometimes' is not one of none, periodic"),
+        (["--methods", ","], "--methods names none of none, ps"),
+        (["--steps", "1,0"], "--steps: '0' is not a number of steps"),
+        (["--steps", "-2"], "--steps: '-2' is not a number of steps"),
+        (["--steps", " "], "--steps names no number"),
+    ],
+)
+def test_what_cannot_be_compared_is_told_before_anything_is_done(
+    square, tmp_path, capsys, more, words
+):
+    out = tmp_path / "out"
+    arguments = [f"{more[0]}={more[1]}"]
+    assert run(["compare", str(square), "-o", str(out), *arguments]) == 1
+    assert words in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_when_nothing_can_be_computed_the_code_says_so(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "none", "--periodic", "moving", "-o", str(out)]
+    assert run(argv) == 1
+    assert "no combination could be computed" in capsys.readouterr().err
+    assert [row["problem"] != "" for row in table(out)] == [True] * 3
+
+
+def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_path, capsys):
+    empty = tmp_path / "empty.cfg"
+    empty.write_text("STEPS= 2\n")
+    assert run(["compare", str(empty)]) == 1
+    assert "MESH_FILENAME is missing" in capsys.readouterr().err
+    assert run(["compare", str(square), "-o", str(square)]) == 1
+    assert "cannot be made a folder" in capsys.readouterr().err
+
+
+def test_the_help_names_every_method(capsys):
+    from slideviz.case.model import PERIODIC_MODES
+    from slideviz.view.compare import METHODS
+
+    assert run(["compare", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert ",".join(METHODS) in text
+    assert ",".join(PERIODIC_MODES) in text
+
+
+def test_an_interrupt_leaves_what_was_finished(tmp_path):
+    write_sample("square", tmp_path / "square", 60, "motion")
+    out = tmp_path / "out"
+    argv = ["compare", str(tmp_path / "square" / "square.cfg"), "--methods", "ps", "-o", str(out)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "slideviz", *argv, "--periodic", "moving", "--steps", "1,2000"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    end = time.monotonic() + 60
+    while not (out / "compare.csv").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130, told
+    assert "cancelled" in told
+    (row,) = table(out)
+    assert row["steps"] == "1"
+    assert float(row["mean"]) > 0
+    assert [path.name for path in out.iterdir()] == ["compare.csv"]
