@@ -148,4 +148,5 @@ def _finish(
         fit.dropped,
         fit.condition(),
         fit.history,
+        control=fit.found.nodes,
     )

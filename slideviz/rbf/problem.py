@@ -140,6 +140,8 @@ class Solution:
         Convergence of the selection; empty without data reduction.
     warnings : tuple of str
         What the user should know.
+    control : (c,) int64
+        The nodes in the final system; empty where a method has no such system.
     """
 
     displacement: FloatArray
@@ -149,6 +151,7 @@ class Solution:
     condition: float
     history: tuple[Cycle, ...] = ()
     warnings: tuple[str, ...] = ()
+    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
