@@ -20,10 +20,12 @@ from slideviz.view.section_layout import Layout, inches_of, lay_out
 from slideviz.view.section_paint import Paint
 from slideviz.view.section_shapes import colours_of, shapes_of
 from slideviz.view.section_space import in_space
-from slideviz.view.unroll import flat_labels, flatten, middle_angle
+from slideviz.view.unroll import Label, flat_labels, flatten, middle_angle
 
 SUFFIXES = (".png", ".svg", ".pdf")
 _TITLE, _LETTERS = 10.0, 9.0
+_LETTER_WIDTH = 0.075
+"""Inches that a letter of a label takes."""
 
 
 @dataclass(frozen=True)
@@ -142,13 +144,13 @@ def draw_section(
 
 def _flat(
     pieces: Mapping[int, Polygons], section: Section, style: SectionStyle
-) -> tuple[Polygons, tuple[str, str] | None]:
+) -> tuple[Polygons, tuple[Label, Label] | None]:
     """Return the pieces as they lie on paper, the nearest last, and what the axes are called."""
     if style.in_space:
         return in_space(list(pieces.values()), section), None
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
         # A 2D mesh, or a plane that lies flat already.
-        return joined(list(pieces.values())), ("x", "y")
+        return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
     found: dict[int, Polygons] = {}
     for numbers in (
         sorted(number for number in pieces if number >= 0),
@@ -167,7 +169,7 @@ def _middle(flat: Polygons, section: Section) -> float | None:
     return middle_angle(flat, section) if section.kind == "cylinder" else None
 
 
-def _dress(axes: Any, layout: Layout, labels: tuple[str, str] | None) -> None:
+def _dress(axes: Any, layout: Layout, labels: tuple[Label, Label] | None) -> None:
     """Set limits, ticks and labels of the axes."""
     from matplotlib.ticker import MaxNLocator
 
@@ -176,8 +178,11 @@ def _dress(axes: Any, layout: Layout, labels: tuple[str, str] | None) -> None:
     if labels is None:
         axes.set_axis_off()
         return
-    axes.set_xlabel(labels[0], fontsize=_LETTERS)
-    axes.set_ylabel(labels[1], fontsize=_LETTERS)
+    for put, label, inches in zip(
+        (axes.set_xlabel, axes.set_ylabel), labels, layout.inches, strict=True
+    ):
+        fits = len(label.full) * _LETTER_WIDTH <= inches
+        put(label.full if fits else label.short, fontsize=_LETTERS)
     axes.tick_params(labelsize=_LETTERS - 1, width=0.6, length=3)
     room = (layout.inches[0] / 0.65, layout.inches[1] / 0.4)
     for axis, bins in zip((axes.xaxis, axes.yaxis), room, strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
 
 _TURN = 2.0 * np.pi
+
+_STEEP = 0.8
+"""Planes whose normal has this component along z are seen from above."""
 
 
 def unroll(polygons: Polygons, section: Section, near: float | None = None) -> Polygons:
@@ -77,6 +81,13 @@ def _seam(angle: FloatArray) -> float:
     return float(turned[widest] + gaps[widest] / 2.0)
 
 
+class Label(NamedTuple):
+    """What an axis is called: in full, and where there is no room."""
+
+    full: str
+    short: str
+
+
 @dataclass(frozen=True, eq=False)
 class Axes:
     """How a plane is looked at.
@@ -85,18 +96,18 @@ class Axes:
     ----------
     rows : (3, 3) float64
         Unit vectors to the right, up, and towards the eye.
-    labels : (str, str)
+    labels : (Label, Label)
         Of the first two.
     """
 
     rows: FloatArray
-    labels: tuple[str, str]
+    labels: tuple[Label, Label]
 
 
 def plane_axes(section: Section) -> Axes:
-    """Return how a plane section is looked at: z up where it can be, else y; x to the right."""
+    """Return how a plane section is looked at: z up, or y where z points to the eye; x right."""
     normal = section.basis[2]
-    up = np.eye(3)[1 if abs(normal[2]) > 1.0 - 1e-9 else 2]
+    up = np.eye(3)[1 if abs(normal[2]) > _STEEP else 2]
     up = up - (up @ normal) * normal
     up /= np.linalg.norm(up)
     right = np.cross(up, normal)
@@ -119,15 +130,17 @@ def flatten(polygons: Polygons, section: Section, near: float | None = None) -> 
     return polygons.with_points(points)
 
 
-def flat_labels(section: Section) -> tuple[str, str]:
+def flat_labels(section: Section) -> tuple[Label, Label]:
     """Return what the first two coordinates of `flatten` are."""
     if section.kind == "cylinder":
-        return _label(section.basis[2]), "r θ"
+        return _label(section.basis[2]), Label("r θ", "r θ")
     return plane_axes(section).labels
 
 
-def _label(direction: FloatArray) -> str:
-    for word, axis in zip("xyz", np.eye(3), strict=True):
-        if direction @ axis > 1.0 - 1e-12:
-            return word
-    return f"along ({', '.join(f'{value:.3g}' for value in direction.round(12) + 0.0)})"
+def _label(direction: FloatArray) -> Label:
+    """Return x, y or z, or the direction; in short x′, y′ or z′ by its largest component."""
+    word = "xyz"[int(np.argmax(np.abs(direction)))]
+    if direction.max() > 1.0 - 1e-12:
+        return Label(word, word)
+    parts = ", ".join(f"{value:.3g}" for value in direction.round(12) + 0.0)
+    return Label(f"along ({parts})", word + "′")

@@ -160,6 +160,15 @@ def test_letters_are_not_smaller_than_8_points_and_inside(size):
     assert words_of(figure)[0].endswith(section.describe())
 
 
+def test_a_direction_that_finds_no_room_is_named_by_its_largest_part():
+    mesh = cube(4, block=False)
+    section = Section("plane", (0.5, 0.5, 0.5), (0.0, 0.1, 1.0))
+    for size, label in ((1600, 1600), "along (0, 0.995, -0.0995)"), ((1600, 380), "y′"):
+        figure, _, _ = drawn(mesh, section, size=size)
+        assert figure.axes[0].get_ylabel() == label
+        assert figure.axes[0].get_xlabel() == "x"
+
+
 def test_thin_cells_have_thin_lines_and_lines_can_be_left_out():
     base = cube(6, block=False)
     squeezed = base.with_points(base.points ** np.array([4.0, 1.0, 1.0]))
