@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.rbf.methods import METHODS
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
 
 HALVINGS = 3
@@ -87,8 +86,6 @@ class Step:
         Convergence of the greedy selection in this step; empty without data reduction.
     tried : tuple of Trial
         The numbers of steps tried by STEPS= auto, in the last step of the run.
-    control : (c,) int64
-        The control nodes of this step; empty where a method has none.
     """
 
     index: int
@@ -102,7 +99,6 @@ class Step:
     warnings: tuple[str, ...]
     history: tuple[Cycle, ...] = ()
     tried: tuple[Trial, ...] = ()
-    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +140,7 @@ class Climb:
             total = index + len(ahead)
             watch = Watch(self._report(index + 1, total), seconds)
             goal = plan.coords[plan.known] + plan.target * part
-            solution = _step(plan, self.case.sliding, coords, goal, watch)
+            solution = _step(plan, coords, goal, watch)
             moved = _moved(plan, coords, solution.displacement, goal)
             points = _cartesian(plan, mesh.points, moved)
             if not np.all(np.isfinite(points)):
@@ -161,6 +157,7 @@ class Climb:
             if not told:
                 told = _dropped_warning(solution, index, mesh)
                 warnings += told
+            warnings += [f"step {index}: {text}" for text in solution.warnings]
             yield self._made(index, total, points, solution, watch, warnings)
             seconds = {}
 
@@ -187,7 +184,6 @@ class Climb:
             watch.seconds,
             tuple(warnings),
             solution.history,
-            control=solution.control,
         )
 
 
@@ -198,7 +194,7 @@ def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
         yield replace(step, total=len(steps), tried=tried if last else ())
 
 
-def _step(plan: Plan, sliding: str, coords: FloatArray, goal: FloatArray, watch: Watch) -> Solution:
+def _step(plan: Plan, coords: FloatArray, goal: FloatArray, watch: Watch) -> Solution:
     """Return the displacement of all nodes from ``coords`` to the next step."""
     normal_nodes, normals = plan.constraints(coords)
     problem = Problem(
@@ -218,7 +214,7 @@ def _step(plan: Plan, sliding: str, coords: FloatArray, goal: FloatArray, watch:
         shift=plan.frame.shift(),
         reduction=plan.reduction,
     )
-    return METHODS[sliding](problem, watch)
+    return plan.solve(problem, watch)
 
 
 def _moved(

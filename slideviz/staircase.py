@@ -23,6 +23,10 @@ __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
 """Numbers of steps that STEPS= auto tries, in this order."""
 
+ELASTIC_BYTES = {2: 2_000, 3: 8_000}
+"""Memory that linear elasticity takes for each node, by dimension: measured on quadrilaterals and
+hexahedra, whose matrix has the most entries."""
+
 
 def deform(
     case: Case,
@@ -62,7 +66,7 @@ def deform(
     if plan is None:
         with watch.phase("classify"):
             plan = make_plan(case, mesh)
-    _require_memory(plan, case.sliding)
+    _require_memory(plan, case)
     climb = Climb(case, mesh, plan, tell, watch.seconds)
     yield from climb.steps(case.steps) if case.steps else _automatic(climb)
 
@@ -122,22 +126,35 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     return first
 
 
-def _require_memory(plan: Plan, sliding: str) -> None:
-    """Raise DeformError when the dense system would not fit into memory."""
-    if plan.reduction is not None:
-        return  # the selection keeps no dense matrix of all candidates
-    counts, dim = plan.classes.counts(), plan.coords.shape[1]
+def _require_memory(plan: Plan, case: Case) -> None:
+    """Raise DeformError when the system would not fit into memory."""
+    if case.method == "elastic":
+        _require_free(
+            ELASTIC_BYTES[plan.coords.shape[1]] * len(plan.coords),
+            f"linear elasticity of {len(plan.coords)} nodes needs",
+            "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
+        )
+    if case.method != "rbf" or plan.reduction is not None:
+        return  # nothing is dense; the selection keeps no matrix of all candidates
+    counts, dim, sliding = plan.classes.counts(), plan.coords.shape[1], case.sliding
     known = counts["moving"] + counts["fixed"]
     unknowns = known + counts["sliding_edge"] + counts["sliding_surface"]
     if sliding == "ds":
         unknowns = dim * known + (dim - 1) * counts["sliding_edge"] + counts["sliding_surface"]
-    needed = 2.6 * 8 * unknowns**2
+    _require_free(
+        2.6 * 8 * unknowns**2,
+        f"{unknowns} unknowns need",
+        "give large boundaries far from the motion the role internal, use SLIDING_MODE= ps, "
+        "DATA_REDUCTION= YES, or a coarser mesh",
+    )
+
+
+def _require_free(needed: float, what: str, remedy: str) -> None:
+    """Raise DeformError when so many bytes are not free."""
     free = _free_memory()
     if needed > free:
         raise DeformError(
-            f"{unknowns} unknowns need {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are "
-            "free; give large boundaries far from the motion the role internal, use "
-            "SLIDING_MODE= ps, DATA_REDUCTION= YES, or a coarser mesh"
+            f"{what} {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free; {remedy}"
         )
 
 

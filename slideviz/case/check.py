@@ -192,3 +192,34 @@ def idle_roles(case: Case) -> tuple[str, ...]:
             "SLIDING_MODE= ps or ds they do"
         )
     return tuple(found)
+
+
+_APPLIES = {
+    "reduction": ("rbf", "DATA_REDUCTION= YES"),
+    "kernel": ("rbf", "RBF_KERNEL"),
+    "influence_factor": ("rbf", "INFLUENCE_FACTOR"),
+    "idw_power": ("idw", "IDW_POWER"),
+    "idw_fixed_weight": ("idw", "IDW_FIXED_WEIGHT"),
+}
+"""Settings of one method: which, and the key."""
+
+_SLIDES = {
+    ("idw", "ds"): "inverse distance weighting solves no system that nodes could slide in: "
+    "SLIDING_MODE= ds does the same as ps (edges, then surfaces, each put back on its boundary)",
+    ("elastic", "ps"): "in linear elasticity nodes slide by the equations themselves: "
+    "SLIDING_MODE= ps does the same as ds",
+}
+
+
+def idle_settings(case: Case) -> tuple[str, ...]:
+    """Return sentences about settings that the chosen method does not use."""
+    usual = type(case)()
+    idle = [
+        key
+        for field, (method, key) in _APPLIES.items()
+        if case.method != method and getattr(case, field) != getattr(usual, field)
+    ]
+    found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
+    if idle:
+        found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
+    return tuple(found)

@@ -30,7 +30,7 @@ from slideviz.case.key import (
     role,
     setting,
 )
-from slideviz.case.model import PERIODIC_MODES, SLIDING
+from slideviz.case.model import METHODS, PERIODIC_MODES, SLIDING
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import (
     AXIS,
@@ -120,6 +120,15 @@ _ROWS = (
     setting("PERIODIC_AXIS", PERIODICITY, AXIS, "axis", "Axis of rotational periodicity."),
     setting("PERIODIC_ORIGIN", PERIODICITY, POINT, "origin", "A point on that axis."),
     setting(
+        "METHOD",
+        METHOD,
+        choice({word: word for word in METHODS}),
+        "method",
+        "Radial basis functions, or to compare with them: inverse distance weighting, or linear "
+        "elasticity with cells that are the stiffer the smaller they are (as SU2 by default). "
+        "With both, ps and ds do the same, and kernel, radius and data reduction nothing.",
+    ),
+    setting(
         "SLIDING_MODE",
         METHOD,
         choice({word: word for word in SLIDING}),
@@ -159,6 +168,21 @@ _ROWS = (
         ),
         "kernel",
         "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
+    ),
+    setting(
+        "IDW_POWER",
+        METHOD,
+        real(0.0),
+        "idw_power",
+        "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
+        "given.",
+    ),
+    setting(
+        "IDW_FIXED_WEIGHT",
+        METHOD,
+        real(0.0),
+        "idw_fixed_weight",
+        "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
     ),
     setting(
         "CURVED",
@@ -255,6 +279,9 @@ _OURS = {
     "SELECTION",
     "MAX_CONTROL_NODES",
     "DATA_RED_RELATIVE",
+    "METHOD",
+    "IDW_POWER",
+    "IDW_FIXED_WEIGHT",
 }
 
 KEYS: dict[str, Key] = {

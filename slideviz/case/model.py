@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
+Method = Literal["rbf", "idw", "elastic"]
 Sliding = Literal["none", "ps", "ds"]
 PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
 PeriodicType = Literal["auto", "translational", "rotational"]
 Point = tuple[float, ...] | Literal["centroid"]
 
 ROLES: tuple[Role, ...] = ("moving", "fixed", "sliding", "periodic", "internal")
+METHODS: tuple[Method, ...] = ("rbf", "idw", "elastic")
 SLIDING: tuple[Sliding, ...] = ("none", "ps", "ds")
 PERIODIC_MODES: tuple[PeriodicMode, ...] = ("none", "periodic", "fixed", "moving")
 
@@ -106,8 +108,8 @@ class Case:
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
     where that is left to the matching of the periodic markers; ``steps`` is 0 for as many as it
     takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
-    control nodes are used. ``view`` has how a window showed the case, by key: it changes no
-    result.
+    control nodes are used, ``idw_power`` where it is the number of dimensions. ``view`` has how
+    a window showed the case, by key: it changes no result.
     """
 
     mesh_file: Path | None = None
@@ -115,6 +117,7 @@ class Case:
     zone: int | None = None
     roles: Mapping[str, Role] = field(default_factory=dict)
     motions: tuple[Motion, ...] = ()
+    method: Method = "rbf"
     sliding: Sliding = "none"
     periodic: PeriodicMode = "none"
     periodic_type: PeriodicType = "auto"
@@ -128,6 +131,8 @@ class Case:
     influence_factor: float = 2.5
     kernel: str = "wendland-c2"
     reduction: Reduction | None = None
+    idw_power: float | None = None
+    idw_fixed_weight: float = 1.0
     quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
     generate_quality: bool = True
     source: Path | None = None

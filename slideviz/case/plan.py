@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from slideviz.baselines.conditions import Body
+from slideviz.baselines.elastic import deform_elastic
+from slideviz.baselines.idw import Weights, deform_idw
+from slideviz.baselines.shapes import blocks
+from slideviz.case.check import idle_settings
 from slideviz.case.clash import clash, jump
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
@@ -20,7 +27,8 @@ from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, classify, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, make_frame
-from slideviz.rbf.problem import Reduction
+from slideviz.rbf.methods import METHODS
+from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 
 COINCIDENT = 1e-12
@@ -61,6 +69,8 @@ class Plan:
     boundary, fans, tracks
         Topology, and where sliding nodes slide.
     pairs : tuple of Pair
+    solve : callable
+        The method on one step.
     warnings : tuple of str
     """
 
@@ -80,6 +90,7 @@ class Plan:
     fans: Fans
     tracks: Tracks
     pairs: tuple[Pair, ...]
+    solve: Callable[[Problem, Watch], Solution]
     warnings: tuple[str, ...]
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -175,8 +186,21 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         fans=fans,
         tracks=tracks,
         pairs=pairs,
-        warnings=warnings,
+        solve=_method(case, mesh, frame, axis),
+        warnings=(*warnings, *idle_settings(case)),
     )
+
+
+def _method(
+    case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
+) -> Callable[[Problem, Watch], Solution]:
+    """Return what METHOD and SLIDING_MODE choose."""
+    if case.method == "idw":
+        power = case.idw_power or float(mesh.dim)
+        return partial(deform_idw, weights=Weights(power, case.idw_fixed_weight))
+    if case.method == "elastic":
+        return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
+    return METHODS[case.sliding]
 
 
 def _require_finite(mesh: Mesh) -> None:
@@ -237,7 +261,7 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
 def _reduction(case: Case, extent: float) -> Reduction | None:
     """Return the settings of the selection in the solver's terms."""
     given = case.reduction
-    if given is None:
+    if given is None or case.method != "rbf":
         return None
     level: Literal["none", "size", "ratio"] = "none"
     if given.multilevel:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ def run_report(
     return {
         "case": str(case.source or ""),
         "mesh": str(case.mesh_file or ""),
+        "method": case.method,
         "sliding": case.sliding,
         "periodic": case.periodic,
         "steps": last.total,
@@ -56,7 +58,7 @@ def run_report(
         },
         "tried": [asdict(trial) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
-        "condition": [step.condition for step in steps],
+        "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),

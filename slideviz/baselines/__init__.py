@@ -1,0 +1,1 @@
+"""Methods to compare with: inverse distance weighting and linear elasticity."""

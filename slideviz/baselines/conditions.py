@@ -1,0 +1,162 @@
+"""What every node of the elastic body may do, as projections, turns and known displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.baselines.shapes import Block
+from slideviz.baselines.stiffness import Conditions
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.periodic import axis_basis
+from slideviz.rbf.classify import RANK_TOLERANCE
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.problem import Problem
+from slideviz.rbf.rows import merge
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The mesh as an elastic body: what stays the same over the steps.
+
+    Attributes
+    ----------
+    parts : list of Block
+        Its elements.
+    frame : Frame
+        In which displacements are given and wanted.
+    axis : (n,) bool
+        Nodes on the axis of a cylindrical frame, which move along it only.
+    """
+
+    parts: list[Block]
+    frame: Frame
+    axis: np.ndarray
+
+
+def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray) -> Conditions:
+    """Return the conditions when these nodes (m,) are displaced by ``values`` (m, d).
+
+    Nodes that coincide, and periodic images, are one block of unknowns; all other sliding nodes
+    of the problem keep off their normals. Nodes of no cell stay.
+
+    Raises
+    ------
+    DeformError
+        Coinciding nodes are asked to move differently.
+    """
+    same = problem.same_as
+    n, d = problem.coords.shape
+    first, data = merge(problem, nodes, values)
+    given = np.zeros((n, d))
+    given[first] = data
+    is_known = np.zeros(n, bool)
+    is_known[first] = True
+    used = np.zeros(n, bool)
+    for part in body.parts:
+        used[part.nodes] = True
+    open_nodes = np.flatnonzero(used & ~is_known[same])
+    place = np.full(n, -1, np.int64)
+    owners, place[open_nodes] = np.unique(same[open_nodes], return_inverse=True)
+    known = np.where(is_known[same, None], given[same], 0.0)
+    free = _projections(problem, body, place, len(owners))
+    turn = np.tile(np.eye(d), (n, 1, 1))
+    images = open_nodes[same[open_nodes] != open_nodes]
+    turn[images] = _turns(problem, body.frame, images)
+    turn[open_nodes] = turn[open_nodes] @ free[place[open_nodes]]
+    plain = np.all(turn == np.eye(d), axis=(1, 2))
+    return Conditions(place, turn, plain, _cartesian(problem, body.frame, known), free)
+
+
+def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> FloatArray:
+    """Return displacements (n, d) of the frame as Cartesian ones; zero ones stay zero."""
+    if not frame.cylindrical:
+        return displacement
+    moved = frame.points(problem.coords + displacement) - frame.points(problem.coords)
+    return np.where(np.any(displacement != 0, axis=1, keepdims=True), moved, 0.0)
+
+
+def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
+    """Return the rotations (m, d, d) of displacements of the nodes' owners into their own."""
+    d = problem.coords.shape[1]
+    if not (frame.cylindrical and frame.period):
+        return np.tile(np.eye(d), (len(nodes), 1, 1))
+    apart = problem.coords[nodes, 1] - problem.coords[problem.same_as[nodes], 1]
+    angle = np.round(apart / frame.shift()[1]) * frame.period
+    turn = np.zeros((len(nodes), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    assert frame.axis is not None
+    basis = axis_basis(frame.axis)
+    return (basis.T @ turn @ basis)[:, :d, :d]
+
+
+def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
+    """Return the projections (count, d, d) on the directions in which unknowns are free."""
+    frame, d = body.frame, problem.coords.shape[1]
+    nodes = problem.normal_nodes
+    normals = cartesian_normals(frame, problem.coords[nodes], problem.normals)
+    on_axis = np.flatnonzero(body.axis)
+    if len(on_axis):
+        assert frame.axis is not None
+        across = axis_basis(frame.axis)[:2, :d]
+        nodes = np.concatenate([nodes, np.repeat(on_axis, 2)])
+        normals = np.concatenate([normals, np.tile(across, (len(on_axis), 1))])
+    images = np.flatnonzero(problem.same_as[nodes] != nodes)
+    back = _turns(problem, frame, nodes[images])
+    normals[images] = np.einsum("mji,mj->mi", back, normals[images])
+    rows = np.flatnonzero(place[nodes] >= 0)
+    rows = rows[np.argsort(place[nodes[rows]], kind="stable")]
+    at, normals = place[nodes[rows]], normals[rows]
+    free = np.tile(np.eye(d), (count, 1, 1))
+    # The first constraint of each block, then the second of each, and so on.
+    turn = np.arange(len(at)) - np.searchsorted(at, at)
+    for k in range(int(turn.max(initial=-1)) + 1):
+        here, normal = at[turn == k], normals[turn == k]
+        left = np.einsum("mij,mj->mi", free[here], normal)
+        length = np.linalg.norm(left, axis=1)
+        # Normals that are nearly alike are one: those of the two sides of a periodic mesh.
+        new = length > RANK_TOLERANCE
+        unit = left[new] / length[new, None]
+        free[here[new]] -= unit[:, :, None] * unit[:, None, :]
+    return free
+
+
+def cartesian_normals(frame: Frame, coords: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return the directions (m, d) off which Cartesian displacements must keep.
+
+    In a cylindrical frame displacements are (dr, rho dtheta[, dz]), and rho dtheta is rho / r
+    times the distance along the circle.
+    """
+    if not frame.cylindrical:
+        return np.array(normals)
+    assert frame.axis is not None
+    angle = coords[:, 1] / frame.radius + frame.theta0
+    d = normals.shape[1]
+    around = normals[:, 1] * frame.radius / np.maximum(coords[:, 0], 1e-9 * frame.radius)
+    local = np.zeros((len(normals), 3))
+    local[:, 0] = normals[:, 0] * np.cos(angle) - around * np.sin(angle)
+    local[:, 1] = normals[:, 0] * np.sin(angle) + around * np.cos(angle)
+    if d == 3:
+        local[:, 2] = normals[:, 2]
+    out = (local @ axis_basis(frame.axis))[:, :d]
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300)
+
+
+def rigid_motions(points: FloatArray, conditions: Conditions) -> FloatArray:
+    """Return the rigid motions of the unknowns, as far as they are free, (k d, 3 or 6)."""
+    place = conditions.place
+    owner = np.zeros(len(conditions.free), np.int64)
+    owner[place[place >= 0][::-1]] = np.flatnonzero(place >= 0)[::-1]
+    d = points.shape[1]
+    x = points[owner]
+    x = (x - x.mean(axis=0)) / max(float(np.ptp(x)), 1e-300) if len(x) else x
+    pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
+    modes = np.zeros((len(x), d, d + len(pairs)))
+    modes[:, range(d), range(d)] = 1.0
+    for column, (i, j) in enumerate(pairs, start=d):
+        modes[:, i, column], modes[:, j, column] = -x[:, j], x[:, i]
+    return (conditions.free @ modes).reshape(-1, modes.shape[2])

@@ -1,0 +1,117 @@
+"""Linear elasticity: the mesh as an elastic body, as SU2 deforms it by default.
+
+Cells are the stiffer the smaller they are (Young's modulus is the inverse of the volume).
+Moving and fixed nodes have their displacement, sliding ones none along their normals, periodic
+images that of each other, turned where the mesh repeats by rotation; all others are free. In
+every step the body is taken as it is then, without stresses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.baselines.conditions import Body, conditions, rigid_motions
+from slideviz.baselines.multigrid import Found, solve
+from slideviz.baselines.stiffness import assemble
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.methods import within
+from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.rows import AGREE, merge
+
+HOPELESS = 1e-3
+"""Fall of the residual that must be reached; what is between it and the tolerance is told."""
+
+ASSEMBLING = 0.2
+"""The part of the phase ``solve`` that the matrix takes."""
+
+
+def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
+    """Return the displacement of an elastic body.
+
+    Sliding nodes move in the tangent planes of their boundary. Where it is curved, or a node
+    slid past its end, they are then put back on it, and all else follows once more.
+
+    Raises
+    ------
+    DeformError
+        A cell has no volume, the solver does not converge, or coinciding nodes are asked to
+        move differently.
+    """
+    nodes, values = problem.known, problem.values
+    displacement, told = _equilibrium(problem, watch, body, nodes, values)
+    sliding = np.concatenate([problem.edge, problem.surface])
+    if len(sliding):
+        free = within(problem, sliding, displacement[sliding])
+        with watch.phase("project"):
+            slid = problem.project(sliding, free)
+        nodes, values = np.concatenate([nodes, sliding]), np.concatenate([values, slid])
+        if np.abs(slid - free).max() > AGREE * problem.basis.radius:
+            start = displacement
+            displacement, told = _equilibrium(problem, watch, body, nodes, values, start)
+    displacement[nodes] = values
+    return Solution(
+        displacement,
+        len(merge(problem, nodes, values)[0]),
+        0.0,
+        np.empty(0, np.int64),
+        float("nan"),
+        warnings=told,
+    )
+
+
+def _equilibrium(
+    problem: Problem,
+    watch: Watch,
+    body: Body,
+    nodes: IntArray,
+    values: FloatArray,
+    start: FloatArray | None = None,
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the displacement of all nodes in the frame (n, d), and what to tell of the solver."""
+    with watch.phase("solve") as tick:
+        points = body.frame.points(problem.coords)
+        given = conditions(problem, body, nodes, values)
+        matrix, right = assemble(points, body.parts, given, lambda f: tick(ASSEMBLING * f))
+        guess = np.zeros((len(given.free), points.shape[1]))
+        inside = np.flatnonzero(given.place >= 0)
+        if start is not None:
+            moved = body.frame.points(problem.coords + start) - points
+            turned = np.einsum("mji,mj->mi", given.turn[inside], moved[inside])
+            guess[given.place[inside]] = turned
+        found = solve(
+            matrix,
+            right,
+            rigid_motions(points, given),
+            guess.ravel(),
+            lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
+        )
+        told = _told(found)
+        shift = given.known.copy()
+        unknown = found.x.reshape(guess.shape)[given.place[inside]]
+        shift[inside] = np.einsum("mij,mj->mi", given.turn[inside], unknown)
+        displacement = body.frame.difference(points, shift)
+    return displacement, told
+
+
+def _told(found: Found) -> tuple[str, ...]:
+    """Return what to tell of the solver.
+
+    Raises
+    ------
+    DeformError
+        It did not get near a solution.
+    """
+    if found.converged:
+        return ()
+    if not found.fall <= HOPELESS:
+        raise DeformError(
+            f"the equations of linear elasticity were not solved: after {found.iterations} "
+            f"iterations the residual is {found.fall:.2g} of what it was; cells much smaller or "
+            "flatter than their neighbours do this, so use more STEPS, or METHOD= rbf"
+        )
+    sentence = (
+        f"the equations of linear elasticity were solved to {found.fall:.1g} only, in "
+        f"{found.iterations} iterations; look at the result with care, or use more STEPS"
+    )
+    return (sentence,)

@@ -1,0 +1,209 @@
+"""Conjugate gradients, preconditioned by smoothed aggregation.
+
+pyamg makes the hierarchy from the rigid motions; the cycles run through it here, because its
+own sweeps keep the interpreter lock for seconds on large meshes, and with it a window still.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from threading import Thread
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import bsr_array, bsr_matrix
+
+from slideviz.baselines import sweeps
+from slideviz.mesh.model import FloatArray
+from slideviz.rbf.compiled import one_at_a_time
+from slideviz.rbf.evaluate import Tick, no_tick
+
+TOLERANCE = 1e-8
+"""Fall of the residual, in the energy of the preconditioner, at which the solution is found."""
+
+MAX_ITERATIONS = 300
+
+COARSE = 600
+"""Unknowns that are few enough for a dense factor."""
+
+RIDGE = 1e-12
+"""Added to the diagonal of the coarsest matrix, relative to it: motions that no condition holds
+(a mesh that may slide as a whole) make it singular, and then the right-hand side fits."""
+
+WAIT_SECONDS = 0.1
+"""Between two calls of ``tick`` while the hierarchy is made."""
+
+MAKING = 0.3
+"""The part of the work that making the hierarchy takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A solution (n,), the iterations it took, and how far the residual fell."""
+
+    x: FloatArray
+    iterations: int
+    fall: float
+
+    @property
+    def converged(self) -> bool:
+        """Tell whether the residual fell to the tolerance."""
+        return self.fall <= TOLERANCE
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A matrix in blocks with the inverses of its diagonal, and the way to the next level.
+
+    ``up`` and ``down`` are None on the coarsest, which has a dense factor instead.
+    """
+
+    matrix: bsr_array
+    inverse: FloatArray
+    up: Any = None
+    down: Any = None
+    factor: Any = None
+
+
+def solve(
+    matrix: bsr_array,
+    right: FloatArray,
+    modes: FloatArray,
+    start: FloatArray,
+    tick: Tick = no_tick,
+) -> Found:
+    """Return the solution of a symmetric positive definite system.
+
+    Parameters
+    ----------
+    matrix : (n, n)
+        In blocks.
+    right, start : (n,)
+        Right-hand side, and a guess of the solution.
+    modes : (n, m)
+        What costs next to no energy: the rigid motions.
+    """
+    if not np.any(right):
+        return Found(np.zeros_like(right), 0, 0.0)
+    levels = _while_ticking(lambda: _levels(matrix, modes), tick)
+    return _conjugate_gradients(levels, right, start, tick)
+
+
+def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
+    """Return what ``work`` returns, calling ``tick`` meanwhile, which may raise to stop.
+
+    pyamg's set-up of a large mesh takes seconds and asks nobody. When it is stopped it goes on
+    in its thread to its end, but nobody waits for that.
+    """
+    found: Future[list[Level]] = Future()
+
+    def run() -> None:
+        try:
+            found.set_result(work())
+        except BaseException as problem:  # handed to the thread that waits
+            found.set_exception(problem)
+
+    Thread(target=run, daemon=True, name="multigrid").start()
+    done = 0.0
+    while True:
+        try:
+            return found.result(timeout=WAIT_SECONDS)
+        except TimeoutError:
+            if found.done():
+                raise
+            done += (1.0 - done) / 50
+            tick(MAKING * done)
+
+
+def _levels(matrix: bsr_array, modes: FloatArray) -> list[Level]:
+    """Return the hierarchy, finest first."""
+    import pyamg
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pyamg tells of conversions that are meant
+        made = pyamg.smoothed_aggregation_solver(
+            bsr_matrix(matrix),
+            B=modes,
+            smooth=("jacobi", {"omega": 4.0 / 3.0}),
+            improve_candidates=None,
+            presmoother=None,
+            postsmoother=None,
+            max_coarse=COARSE,
+        ).levels
+    found = []
+    for level in made[:-1]:
+        inverse = np.linalg.pinv(_diagonal(level.A), hermitian=True)
+        found.append(Level(level.A, np.ascontiguousarray(inverse), level.P, level.R))
+    dense = made[-1].A.toarray()
+    diagonal = np.diag(dense).copy()
+    # Rows of nothing: motions that the nodes of an aggregate do not have.
+    dense[np.diag_indices_from(dense)] += np.where(diagonal > 0, RIDGE * diagonal, 1.0)
+    factor = cho_factor(dense, lower=True, check_finite=False)
+    found.append(Level(made[-1].A, np.empty((0, 1, 1)), factor=factor))
+    return found
+
+
+def _diagonal(matrix: Any) -> FloatArray:
+    """Return the diagonal blocks (m, b, b) of a matrix in blocks; zero where it has none."""
+    rows = np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+    there = rows == matrix.indices
+    out = np.zeros((len(matrix.indptr) - 1, *matrix.data.shape[1:]))
+    out[rows[there]] = matrix.data[there]
+    return out
+
+
+def _product(matrix: Any, x: FloatArray) -> FloatArray:
+    """Return the product of a matrix in blocks (n, n) with a vector (n,)."""
+    out = np.empty((len(matrix.indptr) - 1, matrix.data.shape[1]))
+    with one_at_a_time(matrix.data.size):
+        sweeps.product(matrix.indptr, matrix.indices, matrix.data, x.reshape(out.shape), out)
+    return out.ravel()
+
+
+def _sweep(level: Level, right: FloatArray, x: FloatArray, backward: bool) -> None:
+    """Smooth x (n,) in place."""
+    matrix, shape = level.matrix, level.inverse.shape[:2]
+    blocks = right.reshape(shape), x.reshape(shape)
+    sweeps.sweep(matrix.indptr, matrix.indices, matrix.data, level.inverse, *blocks, backward)
+
+
+def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
+    """Return the correction (n,) of a V-cycle: one sweep down, and the same backwards up."""
+    level = levels[0]
+    if level.factor is not None:
+        return np.asarray(cho_solve(level.factor, right, check_finite=False))
+    x = np.zeros_like(right)
+    _sweep(level, right, x, backward=False)
+    left = right - _product(level.matrix, x)
+    x += level.up @ _cycle(levels[1:], np.ascontiguousarray(level.down @ left))
+    _sweep(level, right, x, backward=True)
+    return x
+
+
+def _conjugate_gradients(
+    levels: list[Level], right: FloatArray, start: FloatArray, tick: Tick
+) -> Found:
+    """Return the solution; Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1."""
+    matrix = levels[0].matrix
+    first = float(right @ _cycle(levels, right))
+    x = np.array(start, float)
+    left = right - _product(matrix, x) if np.any(start) else right.copy()
+    z = _cycle(levels, left)
+    energy, along, fall = float(left @ z), z, np.inf
+    for count in range(MAX_ITERATIONS + 1):
+        fall = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
+        if not fall > TOLERANCE or count == MAX_ITERATIONS:
+            return Found(x, count, fall)
+        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(fall, 1.0)) / np.log(TOLERANCE)))
+        image = _product(matrix, along)
+        size = energy / float(along @ image)
+        x += size * along
+        left -= size * image
+        z = _cycle(levels, left)
+        before, energy = energy, float(left @ z)
+        along = z + (energy / before) * along
+    raise AssertionError

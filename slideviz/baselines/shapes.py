@@ -1,0 +1,119 @@
+"""Shape functions at integration points, from scikit-fem, by the element types of SU2.
+
+Triangles and tetrahedra have one integration point, quadrilaterals four, prisms six and
+hexahedra eight: what SU2's mesh deformation uses. There is no linear pyramid in scikit-fem, and
+none whose gradients are polynomials: a pyramid is the mean of its two divisions into two
+tetrahedra, so that its four base corners are treated alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from slideviz.mesh.model import Cells, FloatArray, IntArray
+
+PYRAMID = 14
+TETRAHEDRON = 10
+PYRAMID_PARTS = ((0, 1, 2, 4), (0, 2, 3, 4), (0, 1, 3, 4), (1, 2, 3, 4))
+"""Both divisions of a pyramid; each of the four tetrahedra counts half."""
+
+_CORNERS = {
+    5: ((0, 0), (1, 0), (0, 1)),
+    9: ((0, 0), (1, 0), (1, 1), (0, 1)),
+    10: ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    12: (
+        *((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)),
+        *((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
+    ),
+    13: ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
+}
+"""The corners of the reference elements in the order of SU2's (VTK's) nodes."""
+
+_ORDER = {5: 1, 9: 2, 10: 1, 12: 2}
+"""Degree of the polynomials that the integration has to get right."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A reference element.
+
+    Attributes
+    ----------
+    gradients : (q, a, d) float64
+        Of the a shape functions, at q integration points, in the reference element.
+    weights : (q,) float64
+        Of the integration points; their sum is the reference element's volume.
+    """
+
+    gradients: FloatArray
+    weights: FloatArray
+
+
+@cache
+def shape(vtk: int) -> Shape:
+    """Return the shape functions of an element type, in the order of SU2's nodes."""
+    import skfem
+
+    element = {
+        5: skfem.ElementTriP1,
+        9: skfem.ElementQuad1,
+        10: skfem.ElementTetP1,
+        12: skfem.ElementHex1,
+        13: skfem.ElementWedge1,
+    }[vtk]()
+    x, weights = _quadrature(vtk, element)
+    corners = [tuple(round(v) for v in row) for row in element.doflocs.tolist()]
+    local = [corners.index(corner) for corner in _CORNERS[vtk]]
+    gradients = [np.asarray(element.lbasis(x, i)[1], float) for i in local]
+    # (a, d) or (a, d, q), depending on whether the gradients are constant.
+    full = [np.broadcast_to(g.reshape(len(x), -1), x.shape).T for g in gradients]
+    return Shape(np.ascontiguousarray(np.stack(full, axis=1)), np.ascontiguousarray(weights))
+
+
+def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
+    """Return integration points (d, q) and weights (q,)."""
+    from skfem.quadrature import get_quadrature
+    from skfem.refdom import RefLine, RefTri
+
+    if vtk in _ORDER:
+        x, weights = get_quadrature(element, _ORDER[vtk])
+        return np.asarray(x), np.asarray(weights)
+    # A prism: triangle times line. scikit-fem's own rule for it has its centre at x = 1/2.
+    (flat, area), (height, length) = get_quadrature(RefTri, 2), get_quadrature(RefLine, 2)
+    x = np.concatenate([np.repeat(flat, len(length), axis=1), np.tile(height, len(area))])
+    return x, np.repeat(area, len(length)) * np.tile(length, len(area))
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Elements that have one shape.
+
+    Attributes
+    ----------
+    shape : Shape
+    nodes : (m, a) int64
+    cell : (m,) int64
+        The cell of the mesh that each element is (a part of).
+    share : float
+        How much each counts: 1, or 1/2 for the parts of pyramids.
+    """
+
+    shape: Shape
+    nodes: IntArray
+    cell: IntArray
+    share: float
+
+
+def blocks(cells: Cells) -> list[Block]:
+    """Return all cells as elements with shape functions; pyramids in parts."""
+    found = []
+    for vtk, (ids, nodes) in cells.by_type.items():
+        if vtk == PYRAMID:
+            parts = np.concatenate([nodes[:, part] for part in PYRAMID_PARTS])
+            found.append(Block(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5))
+        else:
+            found.append(Block(shape(vtk), nodes, ids, 1.0))
+    return found

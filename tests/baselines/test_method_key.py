@@ -1,0 +1,107 @@
+"""METHOD as a key of the case: reading, what does not apply, the report, and all samples."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz import staircase
+from slideviz.case.cfg import set_key
+from slideviz.case.check import idle_settings
+from slideviz.case.model import METHODS, Case, Reduction, Rotate
+from slideviz.case.samples import SAMPLES, write_sample
+from slideviz.cli import run
+from slideviz.errors import CaseError, DeformError
+from tests import builders
+
+
+def test_the_method_is_read_written_and_rbf_by_default(tmp_path):
+    assert Case().method == "rbf"
+    case = set_key(Case(), "METHOD", "elastic")
+    assert case.method == "elastic"
+    case = set_key(set_key(case, "IDW_POWER", "2.5"), "IDW_FIXED_WEIGHT", "3")
+    case.write(tmp_path / "a.cfg")
+    again = Case.read(tmp_path / "a.cfg")
+    assert (again.method, again.idw_power, again.idw_fixed_weight) == ("elastic", 2.5, 3.0)
+    with pytest.raises(CaseError, match="METHOD"):
+        set_key(Case(), "METHOD", "spring")
+    with pytest.raises(CaseError, match="above 0"):
+        set_key(Case(), "IDW_POWER", "0")
+    with pytest.raises(CaseError, match="above 0"):
+        set_key(Case(), "IDW_FIXED_WEIGHT", "-1")
+
+
+def test_settings_that_the_method_does_not_use_are_told():
+    assert idle_settings(Case()) == ()
+    assert idle_settings(Case(sliding="ps", reduction=Reduction(), kernel="gaussian")) == ()
+    assert idle_settings(Case(method="idw", sliding="ps", idw_power=2.0)) == ()
+    assert idle_settings(Case(method="elastic", sliding="ds")) == ()
+    case = Case(method="elastic", reduction=Reduction(), kernel="gaussian", influence_factor=1.0)
+    assert idle_settings(case) == (
+        "METHOD= elastic does not use DATA_REDUCTION= YES, RBF_KERNEL, INFLUENCE_FACTOR",
+    )
+    assert idle_settings(Case(idw_power=2.0, idw_fixed_weight=2.0)) == (
+        "METHOD= rbf does not use IDW_POWER, IDW_FIXED_WEIGHT",
+    )
+    assert "does the same as ps" in idle_settings(Case(method="idw", sliding="ds"))[0]
+    assert "does the same as ds" in idle_settings(Case(method="elastic", sliding="ps"))[0]
+
+
+def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_is_not(
+    monkeypatch,
+):
+    mesh = builders.square(6)
+    monkeypatch.setattr(staircase, "_free_memory", lambda: 1000.0)
+    case = Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),), method="elastic")
+    with pytest.raises(DeformError, match=r"elasticity of 48 nodes needs .* METHOD= idw"):
+        list(sv.deform(case, mesh))
+    assert len(list(sv.deform(case.change(method="idw"), mesh))) == 1
+
+
+@pytest.mark.parametrize("method", ["idw", "elastic"])
+def test_automatic_steps_work_with_every_method(method):
+    mesh = builders.square(8)
+    case = Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 20.0),), method=method, steps=0)
+    *_, last = sv.deform(case, mesh)
+    assert last.tried
+    assert sv.quality(last.mesh, reference=mesh).inverted == 0
+
+
+SIZES = {
+    "square": 10,
+    "polar": 10,
+    "hexahedron": 8,
+    "cylindrical": 8,
+    "passage": 16,
+    "turbine-row": 5_000,
+    "stator": 5_000,
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", SAMPLES)
+def test_every_sample_runs_with_every_method_and_reports_valid_json(tmp_path, name, method):
+    write_sample(name, tmp_path / name, SIZES[name])
+    report = tmp_path / "report.json"
+    words = ["run", str(tmp_path / name / f"{name}.cfg"), "--quiet", "--json", str(report)]
+    words += ["--set", f"METHOD={method}", "--set", "STEPS=1", "-o", str(tmp_path / "out.su2")]
+    code = run(words)
+    assert code in (0, 3)
+
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    found = json.loads(report.read_text(), parse_constant=refuse)
+    assert found["method"] == method
+    assert (found["condition"] == [None]) == (method != "rbf")
+    assert found["control_nodes"][0] > 0
+    assert found["convergence"] == [] or method == "rbf"
+    if method != "rbf":
+        counts = found["node_counts"]
+        boundary = sum(counts[k] for k in counts if k != "internal")
+        assert found["control_nodes"][0] <= boundary
+        assert found["max_error"] < 1e-9
+    assert np.isfinite(sv.read(tmp_path / "out.su2").points).all()
