@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
 
@@ -86,6 +86,8 @@ class Step:
         Convergence of the greedy selection in this step; empty without data reduction.
     tried : tuple of Trial
         The numbers of steps tried by STEPS= auto, in the last step of the run.
+    control : (c,) int64
+        The control nodes of this step; empty where a method has none.
     """
 
     index: int
@@ -99,6 +101,7 @@ class Step:
     warnings: tuple[str, ...]
     history: tuple[Cycle, ...] = ()
     tried: tuple[Trial, ...] = ()
+    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +187,7 @@ class Climb:
             watch.seconds,
             tuple(warnings),
             solution.history,
+            control=solution.control,
         )
 
 
