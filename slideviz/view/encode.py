@@ -69,8 +69,10 @@ def kind_of(file: Path) -> str:
         It is none of them.
     """
     suffix = file.suffix.lower()
-    if file.is_dir() or not suffix:
+    if file.is_dir() or not (suffix or file.exists()):
         return ".png"
+    if not suffix:
+        raise SlidevizError(f"{file} is not a folder; end the name of a film with .mp4 or .gif")
     if suffix not in SUFFIXES:
         raise SlidevizError(
             f"{file}: no film can be written as {file.suffix}; end the name with .mp4 or .gif, or "

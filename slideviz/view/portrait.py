@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
@@ -43,6 +44,11 @@ class Portrait:
         What part of the mesh is seen.
     seen : sequence of Mesh
         More steps of it that the camera must see whole.
+
+    Raises
+    ------
+    SlidevizError
+        The detail has not as many coordinates as the mesh.
     """
 
     def __init__(
@@ -54,6 +60,11 @@ class Portrait:
         zoom: Zoom = "auto",
         seen: Sequence[Mesh] = (),
     ) -> None:
+        if isinstance(zoom, Detail) and len(zoom.centre) != mesh.dim:
+            raise SlidevizError(
+                f"a detail about {', '.join(f'{x:g}' for x in zoom.centre)} is not a place in a "
+                f"{mesh.dim}D mesh; give {mesh.dim} coordinates and a width"
+            )
         self.plotter = plotter
         self.colour_by = colour_by
         self._base = base

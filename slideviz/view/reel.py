@@ -90,7 +90,8 @@ def check_film(
     existing = [path for path in paths if path.exists()]
     if existing and not overwrite:
         raise SlidevizError(
-            f"{existing[0]} exists already; choose another name, or allow it to be replaced"
+            f"{existing[0]} exists already; choose another name, or allow it to be replaced "
+            "(--force on the command line)"
         )
     folder = paths[0].parent
     if folder == file and not folder.exists():

@@ -241,6 +241,12 @@ def test_what_cannot_be_made_is_told_before_the_work(tmp_path, name, reel, messa
         check_film(tmp_path / name, reel)
 
 
+def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
+    (tmp_path / "steps").write_text("")
+    with pytest.raises(SlidevizError, match=r"steps is not a folder; end the name of a film with"):
+        check_film(tmp_path / "steps", Reel())
+
+
 def test_a_folder_without_permission_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(SlidevizError, match="no permission to write there; choose another folder"):

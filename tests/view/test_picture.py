@@ -112,3 +112,11 @@ def test_what_moves_is_shown_in_detail_when_it_is_tiny_in_the_mesh(tmp_path):
     assert 5 * 5 < holes["auto"] < holes[str(Detail((0.1, 0.0), 2.4))]
     wide = 500 / 2.4
     assert holes[str(Detail((0.1, 0.0), 2.4))] == pytest.approx(wide**2, rel=0.25)
+
+
+def test_a_detail_needs_a_coordinate_for_each_direction(tmp_path, square):
+    with pytest.raises(SlidevizError, match=r"about 0, 1, 2 is not a place in a 2D mesh; give 2"):
+        picture(square, tmp_path / "a.png", size=(100, 80), zoom=Detail((0.0, 1.0, 2.0), 1.0))
+    with pytest.raises(SlidevizError, match=r"a picture of 20x9000 pixels cannot be drawn; .* 64"):
+        picture(square, tmp_path / "a.png", size=(20, 9000))
+    assert not list(tmp_path.iterdir())
