@@ -91,11 +91,15 @@ class Section:
         """
         base, origin = self.basis, np.asarray(self.origin)
         dim = points.shape[1]
+
+        def along(row: FloatArray) -> FloatArray:
+            # Not by BLAS, whose threads wait for each other when the machine is busy.
+            return np.einsum("nd,d->n", points, row[:dim]) - origin @ row
+
         if self.kind == "plane":
-            gap = points @ base[2, :dim] - origin @ base[2]
+            gap = along(base[2])
         else:
-            across = [points @ row[:dim] - origin @ row for row in base[:2]]
-            gap = np.hypot(*across) - self.radius
+            gap = np.hypot(along(base[0]), along(base[1])) - self.radius
         size = np.abs(gap)
         gap[size <= ON_SECTION * size.max(initial=0.0)] = 0.0
         return gap
