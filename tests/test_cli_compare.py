@@ -80,7 +80,7 @@ def test_data_reduction_leaves_its_convergence(square, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--methods", "ps,pz"], "--methods: 'pz' is not one of none, ps, ds"),
+        (["--methods", "ps,pz"], "--methods: 'pz' is not one of none, ps, ds, idw, elastic"),
         (["--periodic", "sometimes"], "--periodic: 'sometimes' is not one of none, periodic"),
         (["--methods", ","], "--methods names none of none, ps"),
         (["--steps", "1,0"], "--steps: '0' is not a number of steps"),

@@ -31,7 +31,9 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
         "combination could be computed; 130 cancelled, what was finished is in the table",
     )
     call.add_argument("case", type=Path, help="the case file (.cfg)")
-    call.add_argument("--methods", metavar="LIST", help="of none,ps,ds (default: none,ps,ds)")
+    call.add_argument(
+        "--methods", metavar="LIST", help="of none,ps,ds,idw,elastic (default: none,ps,ds)"
+    )
     call.add_argument(
         "--periodic",
         metavar="LIST",
@@ -67,8 +69,8 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE
     from slideviz.cli.run_command import read_case, tell_compiling
     from slideviz.errors import CaseError
+    from slideviz.view.compare import warm
     from slideviz.view.compare_table import terminal_head
-    from slideviz.view.warmup import warm_up
 
     case = read_case(arguments)
     if case.mesh_file is None:
@@ -81,8 +83,7 @@ def compare(arguments: argparse.Namespace) -> int:
         raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
     mesh = read(case.mesh_file, zone=case.zone)
     tell_compiling(arguments.quiet)
-    # What is loaded once must not count as time of a run.
-    warm_up(lambda: None, lambda: False)
+    warm({combination.method for combination in wanted})
 
     def say(text: str) -> None:
         if not arguments.quiet:
@@ -170,7 +171,8 @@ def _drawn(
     arguments: argparse.Namespace, case: Case, mesh: Mesh, rows: Sequence[Row], folder: Path
 ) -> list[Path]:
     """Return the plots and pictures written."""
-    from slideviz.view.compare_plots import figures, profiler, save_figure, steps_name
+    from slideviz.view.compare_panels import profiler
+    from slideviz.view.compare_plots import figures, save_figure, steps_name
     from slideviz.view.compare_sheets import DPI, sheet
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)

@@ -8,28 +8,32 @@ says why; it never ends the comparison.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import PERIODIC_MODES, Case, PeriodicMode
+from slideviz.case.model import PERIODIC_MODES, SLIDING, Case, PeriodicMode
 from slideviz.case.plan import Plan, make_plan
+from slideviz.case.samples import sample
 from slideviz.climb import Progress, Step
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
 from slideviz.staircase import deform
+from slideviz.view.warmup import warm_up
 
 METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    "none": ("no sliding", {"sliding": "none"}),
-    "ps": ("pseudo sliding", {"sliding": "ps"}),
-    "ds": ("direct sliding", {"sliding": "ds"}),
+    "none": ("no sliding", {"method": "rbf", "sliding": "none"}),
+    "ps": ("pseudo sliding", {"method": "rbf", "sliding": "ps"}),
+    "ds": ("direct sliding", {"method": "rbf", "sliding": "ds"}),
+    "idw": ("inverse distance", {"method": "idw", "sliding": "ps"}),
+    "elastic": ("linear elasticity", {"method": "elastic", "sliding": "ds"}),
 }
-"""What each method is called, and what of a case it changes."""
+"""What each method is called, and what of a case it changes; the last two slide, too."""
 
 MODES: Mapping[PeriodicMode, str] = {
     "none": "not periodic",
@@ -153,6 +157,14 @@ def wanted_methods(case: Case) -> tuple[str, ...]:
     """Return the methods worth trying: those that slide, if the case has boundaries for it."""
     slides = any(case.markers_with(role) for role in ("sliding", "periodic", "internal"))
     return ("none", "ps", "ds") if slides else ("none",)
+
+
+def warm(methods: Iterable[str]) -> None:
+    """Load what the methods load once, so that it does not count as time of a run."""
+    warm_up(lambda: None, lambda: False)
+    made = sample("square", 4, "motion")
+    for method in set(methods) - set(SLIDING):
+        *_, _ = deform(Combination(method, "none", 1).applied(made.case), made.mesh)
 
 
 def compare(

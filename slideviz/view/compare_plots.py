@@ -1,34 +1,27 @@
-"""Figures of a comparison: against steps, step by step, histogram, span, convergence.
-
-Where both methods and periodic modes vary, each method has a panel and each mode a line, as in
-the thesis (Figures 5.5, 5.7, 5.8); otherwise there is one panel with a line for each.
-"""
+"""Figures of a comparison: against steps, step by step, histogram, span, convergence."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from slideviz.errors import CaseError, MeshError
+from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
-from slideviz.mesh.model import Mesh
-from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.quality import INVERTED
 from slideviz.view import plots
-from slideviz.view.compare import METHODS, MODES, Result, Row
+from slideviz.view.compare import Row
+from slideviz.view.compare_panels import Line, Panel, Profiler, panels, result_of
 from slideviz.view.plots_style import PRINT
-from slideviz.view.spanwise import Profile, along, along_radius, spanwise
+from slideviz.view.spanwise import spanwise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from slideviz.case.model import Case
 
 WIDTH = 7.0
 """Inches; that of a page's text, at which letters are 8 points or more."""
@@ -36,50 +29,6 @@ WIDTH = 7.0
 _MANY = 5000
 _LAST = ("minimum", "mean")
 _QUIET = replace(PRINT, legend=False)
-
-Span = Literal["r", "x", "y", "z"]
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A row with the name and the number of its line in a panel."""
-
-    label: str
-    series: int
-    row: Row
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """Rows that are drawn together; ``title`` is empty where there is one panel only."""
-
-    title: str
-    lines: tuple[Line, ...]
-
-
-def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
-    """Return rows with a result in panels; a line has the same look in each."""
-    methods = list(dict.fromkeys(row.combination.method for row in rows))
-    modes = list(dict.fromkeys(row.combination.periodic for row in rows))
-    by_method = len(modes) == 1
-    done = [row for row in rows if row.result is not None]
-    if by_method:
-        every = [
-            Line(METHODS[row.combination.method][0], methods.index(row.combination.method), row)
-            for row in done
-        ]
-        return (Panel("", tuple(every)),) if every else ()
-    found = []
-    for method in methods:
-        mine = [row for row in done if row.combination.method == method]
-        lines = [
-            Line(MODES[row.combination.periodic], modes.index(row.combination.periodic), row)
-            for row in mine
-        ]
-        title = METHODS[method][0] if len(methods) > 1 else ""
-        if lines:
-            found.append(Panel(title, tuple(lines)))
-    return tuple(found)
 
 
 def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
@@ -102,9 +51,9 @@ def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, F
             continue
         name = steps_name(number)
         yield f"histogram_{name}", _grid(group, (_histogram,), across=True)
-        if any(len(_result(line).minimum) > 1 for line in lines):
+        if any(len(result_of(line).minimum) > 1 for line in lines):
             yield f"by_step_{name}", _grid(group, (_by_step,), across=True)
-        if any(_result(line).history for line in lines):
+        if any(result_of(line).history for line in lines):
             yield f"convergence_{name}", _grid(group, (_convergence,), across=True)
         if span is not None:
             yield f"spanwise_{name}", _grid(group, (_span(span, "minimum"), _span(span, "mean")))
@@ -143,56 +92,13 @@ def save_figure(
     return paths
 
 
-Profiler = Callable[[Line], Profile]
 _Draw = Callable[["Axes", Sequence[Line]], None]
-
-
-def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
-    """Return what makes profiles along the span; None where nothing says what the span is.
-
-    Parameters
-    ----------
-    case : Case
-    mesh : Mesh
-        The undeformed mesh. Its cells say which layer a cell is in, so that layers of cells stay
-        together while they bend.
-    span : {"r", "x", "y", "z"}, optional
-        When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
-        nothing of a 2D mesh.
-    """
-    axis, origin, turns = case.axis, case.origin, False
-    names = case.markers_with("periodic")
-    if names and span in (None, "r"):
-        try:
-            first = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
-            turns = first.kind == "rotational"
-            axis, origin = (first.axis, first.origin) if turns else (axis, origin)
-        except (MeshError, CaseError):
-            pass  # the rows say it
-    if span is None and mesh.dim == 2:
-        return None
-    where = span or ("r" if turns else "z")
-
-    def profile(line: Line) -> Profile:
-        values = _result(line).quality.values
-        if where == "r":
-            made = along_radius(mesh, values, axis, origin, label=line.label)
-        else:
-            made = along(mesh, values, where, label=line.label)
-        return replace(made, series=line.series)
-
-    return profile
-
-
-def _result(line: Line) -> Result:
-    assert line.row.result is not None
-    return line.row.result
 
 
 def _outcomes(lines: Sequence[Line]) -> list[plots.Outcome]:
     found = []
     for line in lines:
-        result = _result(line)
+        result = result_of(line)
         found.append(
             plots.Outcome(
                 line.label,
@@ -225,8 +131,8 @@ def _histogram(axes: Axes, lines: Sequence[Line]) -> None:
     runs = [
         plots.QualityRun(
             line.label,
-            _result(line).quality.values,
-            _result(line).quality.status == INVERTED,
+            result_of(line).quality.values,
+            result_of(line).quality.status == INVERTED,
             line.series,
         )
         for line in lines
@@ -239,7 +145,7 @@ def _histogram(axes: Axes, lines: Sequence[Line]) -> None:
 def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
     runs = []
     for line in lines:
-        result = _result(line)
+        result = result_of(line)
         numbers = np.arange(1, result.steps + 1)
         runs.append(plots.StepRun(line.label, numbers, result.minimum, result.mean, line.series))
     plots.quality_by_step(axes, runs, _QUIET)
@@ -248,16 +154,16 @@ def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
 def _convergence(axes: Axes, lines: Sequence[Line]) -> None:
     runs = []
     for line in lines:
-        if not _result(line).history:
+        if not result_of(line).history:
             continue
-        cycles = [cycle for step, cycle in _result(line).history if step == 1]
+        cycles = [cycle for step, cycle in result_of(line).history if step == 1]
         runs.append(
             plots.GreedyRun(
                 line.label,
                 np.array([cycle.control_nodes for cycle in cycles]),
                 np.array([cycle.error for cycle in cycles]),
                 np.array([cycle.level for cycle in cycles]),
-                _result(line).tolerance,
+                result_of(line).tolerance,
                 line.series,
             )
         )

@@ -22,7 +22,8 @@ from slideviz.view.compare import (
     wanted_methods,
     wanted_modes,
 )
-from slideviz.view.compare_plots import figures, panels, profiler, save_figure, steps_name
+from slideviz.view.compare_panels import panels, profiler
+from slideviz.view.compare_plots import figures, save_figure, steps_name
 from slideviz.view.compare_sheets import sheet
 from slideviz.view.compare_table import csv_text, history_text, terminal_head, terminal_line
 
@@ -160,6 +161,13 @@ def test_the_table_reads_back(rows):
             assert line["problem"] == ""
 
 
+def test_what_is_no_number_is_left_empty(square):
+    (row,) = compare(square.case, square.mesh, combinations(("idw",), ("none",), (1,)))
+    (line,) = csv.DictReader(csv_text([row]).splitlines())
+    assert np.isnan(row.result.condition)
+    assert line["condition"] == ""
+
+
 def test_terminal_lines_stand_in_columns(rows):
     head = terminal_head()
     for row in rows:
@@ -220,7 +228,7 @@ def test_convergence_and_span_are_drawn_when_there_is_something_to_draw():
     case = made.case.change(
         reduction=Reduction(tolerance=1e-2), motions=(Translate(block, (0.01, 0.0, 0.02)),)
     )
-    rows = list(compare(case, made.mesh, combinations(("ps",), ("moving",), (1,))))
+    rows = list(compare(case, made.mesh, combinations(("ps", "idw"), ("moving",), (1,))))
     assert all(row.result for row in rows), [row.problem for row in rows]
     drawn = dict(figures(rows, profiler(case, made.mesh)))
     assert set(drawn) == {"histogram_01_steps", "convergence_01_steps", "spanwise_01_steps"}
