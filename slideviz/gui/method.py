@@ -23,7 +23,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.model import Reduction
 from slideviz.gui.fields import Choice, NumberField, VectorField, positive
-from slideviz.gui.method_more import NO_REDUCTION, MoreSettings, enable, set_tip
+from slideviz.gui.method_more import NO_REDUCTION, MoreSettings, enable, not_used, set_tip
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
 from slideviz.view.state import Session
@@ -33,6 +33,9 @@ AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 MAX_STEPS = 9999
 
 TIPS = {
+    "method": "How the inner nodes follow: by radial basis functions, or to compare with them, as "
+    "means weighted with the inverse distance to the boundary, or as an elastic body whose cells "
+    "are the stiffer the smaller they are (as SU2 deforms by default).",
     "sliding": "Whether the nodes of sliding boundaries stay (none), slide and are put back on the "
     "boundary in stages (pseudo), or slide as part of the system itself (direct).",
     "periodic": "What the periodic boundaries do: nothing special (none), only the distance "
@@ -92,6 +95,13 @@ class MethodPanel(QWidget):
         return layout
 
     def _make_fields(self) -> None:
+        self.method = Choice(
+            {
+                "rbf": "RBF interpolation",
+                "idw": "Inverse distance weighting",
+                "elastic": "Linear elasticity",
+            }
+        )
         self.sliding = Choice({"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"})
         self.periodic = Choice(
             {
@@ -121,6 +131,7 @@ class MethodPanel(QWidget):
         self.guess_text.setWordWrap(True)
         self.guess_text.setProperty("hint", True)
         rows = (
+            ("Method", "method"),
             ("Sliding", "sliding"),
             ("Periodicity", "periodic"),
             ("Type", "periodic_type"),
@@ -149,7 +160,7 @@ class MethodPanel(QWidget):
         self.form.addRow(label, widget or field)
 
     def _connect(self) -> None:
-        for name in ("sliding", "periodic", "periodic_type"):
+        for name in ("method", "sliding", "periodic", "periodic_type"):
             getattr(self, name).chosen.connect(lambda value, name=name: self._set(name, value))
         self.axis.changed.connect(self._axis_changed)
         self.origin.changed.connect(lambda value: self._set("origin", value))
@@ -180,7 +191,7 @@ class MethodPanel(QWidget):
     def sync(self, session: Session) -> None:
         """Show the session."""
         case = session.case
-        for name in ("sliding", "periodic", "periodic_type"):
+        for name in ("method", "sliding", "periodic", "periodic_type"):
             getattr(self, name).show_value(getattr(case, name))
         self.axis.show_value(case.axis)
         self.origin.show_value(case.origin)
@@ -205,7 +216,9 @@ class MethodPanel(QWidget):
         self.reduction.blockSignals(True)
         self.reduction.setChecked(given is not None)
         self.reduction.blockSignals(False)
-        enable(self.tolerance, "" if given else NO_REDUCTION, TIPS["tolerance"])
+        no_method = not_used(session.case)
+        enable(self.reduction, no_method, TIPS["reduction"])
+        enable(self.tolerance, no_method or ("" if given else NO_REDUCTION), TIPS["tolerance"])
         extent = self._extent
         if self._reduction is not None:
             of_extent = self._reduction.relative

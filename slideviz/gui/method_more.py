@@ -9,7 +9,7 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QFormLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from slideviz.case.kernels import kernel_titles
-from slideviz.case.model import Reduction
+from slideviz.case.model import Case, Reduction
 from slideviz.gui.fields import Choice, NumberField, angle_limit, positive
 from slideviz.view.state import Session
 
@@ -142,15 +142,28 @@ class MoreSettings(QWidget):
         by_size = given.criterion == "size"
         self.level_end.show_value(given.level_size if by_size else given.level_tolerance)
         self.gamma.show_value(given.gamma)
-        off = "" if case.reduction is not None else NO_REDUCTION
+        no_method = not_used(case)
+        off = no_method or ("" if case.reduction is not None else NO_REDUCTION)
         no_level = off or ("" if given.multilevel else "there are no levels")
         for name, why in (
+            ("kernel", no_method),
+            ("influence_factor", no_method),
             ("selection", off),
             ("levels", off),
             ("level_end", no_level),
             ("gamma", off),
         ):
             enable(getattr(self, name), why, TIPS[name])
+
+
+def not_used(case: Case) -> str:
+    """Return why settings of radial basis functions do nothing; empty where they do."""
+    if case.method == "rbf":
+        return ""
+    return {
+        "idw": "inverse distance weighting does not use it",
+        "elastic": "linear elasticity does not use it",
+    }[case.method]
 
 
 def enable(field: QWidget, why_not: str, tip: str) -> None:
