@@ -8,7 +8,12 @@ from typing import Any
 import pyvista as pv
 
 from slideviz.case.model import ROLES
-from slideviz.view.legend import add_colour_bar, add_role_legend, clear_legend
+from slideviz.view.legend import (
+    add_colour_bar,
+    add_point_legend,
+    add_role_legend,
+    clear_legend,
+)
 from slideviz.view.stage import Stage
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.surfaces import Surface
@@ -44,16 +49,28 @@ class LegendLayer:
             return
         self._drawn = key
         clear_legend(stage.plotter)
+        style = (stage.look, stage.font_scale)
         if not new.view.legend or mesh is None:
             return
         if what == "role":
             used = {new.role(name) for name in mesh.marker_names}
             roles = [role for role in ROLES if role in used]
             add_role_legend(stage.plotter, roles, stage.look, stage.font_scale)
+            add_point_legend(stage.plotter, stage.point_words, 24.0 * len(roles) + 16, style)
         else:
-            style = (stage.look, stage.font_scale)
             title, bad = COLOUR_BY[what], has_inverted(new)
             add_colour_bar(stage.plotter, self._mapper, title, bad, style)
+            end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
+            self._lower_bar(title, end)
+
+    def _lower_bar(self, title: str, below: float) -> None:
+        """Make the colour bar with its title end where the lines about points above it do."""
+        plotter = self.stage.plotter
+        below += 34 if self.stage.point_words else 0
+        bar = plotter.scalar_bars[title]
+        free = 1.0 - below * self.stage.font_scale / max(plotter.window_size[1], 1)
+        bottom = bar.GetPosition()[1]
+        bar.SetHeight(max(min(bar.GetHeight(), free - bottom), 0.2))
 
     def _key(self, session: Session) -> tuple[object, ...]:
         """Return all that the legend depends on."""
@@ -62,7 +79,8 @@ class LegendLayer:
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         place = tuple(self.stage.plotter.window_size)
         colours = (view.colour_by, view.colour_map, session.colour_range)
-        return (id(mesh), view.legend, colours, said, self.stage.look, place)
+        points = self.stage.point_words
+        return (id(mesh), view.legend, colours, said, points, self.stage.look, place)
 
 
 def has_inverted(session: Session) -> bool:

@@ -39,23 +39,48 @@ def set_letters(text: Any, look: Look, size: float) -> None:
 
 def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
     """Write the roles in use into the upper right corner, each with its colour."""
+    for row, role in enumerate(roles):
+        top = 14 + 24 * (row + 1)
+        _line(
+            plotter, ("\u25a0", ROLE_COLOURS[role], role), (top, STRIP - 28, 14), look, font_scale
+        )
+
+
+def add_point_legend(
+    plotter: Any, words: Sequence[tuple[str, str]], top: float, style: tuple[Look, float]
+) -> float:
+    """Write what points mean below ``top`` pixels; return where the last line ends."""
+    for row, (word, colour) in enumerate(words):
+        _line(plotter, ("\u25cf", colour, word), (top + 21 * (row + 1), STRIP - 25, 12), *style)
+    return top + 21 * len(words)
+
+
+def _line(
+    plotter: Any,
+    said: tuple[str, str, str],
+    place: tuple[float, float, float],
+    look: Look,
+    font_scale: float,
+) -> None:
+    """Write a sign in its colour and a word, so far below the top and left of the right edge."""
     import pyvista as pv
 
+    (sign, colour, word), (down, right, size) = said, place
     width, height = plotter.window_size
-    for row, role in enumerate(roles):
-        top = 1.0 - (14 + 24 * (row + 1)) * font_scale / max(height, 1)
-        for sign, colour, right in (
-            ("\u25a0", ROLE_COLOURS[role], STRIP - 8),
-            (role, look.text, STRIP - 28),
-        ):
-            text = pv.Text(sign)
-            text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-            text.GetPositionCoordinate().SetValue(1.0 - right * font_scale / max(width, 1), top)
-            set_letters(text.prop, look, (20 if colour != look.text else 14) * font_scale)
-            text.prop.color = colour
-            text.prop.SetVerticalJustificationToCentered()
-            name = f"legend:{role}:{sign}"
-            plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
+    top = 1.0 - down * font_scale / max(height, 1)
+    for what, said_in, edge, letters in (
+        (sign, colour, STRIP - 8, 1.4 * size),
+        (word, look.text, right, size),
+    ):
+        text = pv.Text(what)
+        text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+        text.GetPositionCoordinate().SetValue(1.0 - edge * font_scale / max(width, 1), top)
+        set_letters(text.prop, look, letters * font_scale)
+        text.prop.color = said_in
+        text.prop.SetVerticalJustificationToCentered()
+        # A role and the nodes of a type may have the same word.
+        name = f"legend:{word}:{what}" if sign == "\u25a0" else f"legend:nodes:{word}:{what}"
+        plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
 
 
 def clear_legend(plotter: Any) -> None:

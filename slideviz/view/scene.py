@@ -14,9 +14,12 @@ from slideviz.mesh.model import FloatArray
 from slideviz.view import pick
 from slideviz.view.actors import Drawn
 from slideviz.view.eye import Eye
+from slideviz.view.layer_copies import CopyLayer
 from slideviz.view.layer_ghosts import GhostLayer
 from slideviz.view.layer_legend import LegendLayer
 from slideviz.view.layer_mesh import BoundaryLayer, CellLayer
+from slideviz.view.layer_points import PointLayer
+from slideviz.view.layer_triad import TriadLayer
 from slideviz.view.look import LIGHT, Look
 from slideviz.view.stage import Layer, Stage
 from slideviz.view.state import Session
@@ -45,7 +48,10 @@ class Scene:
             self._cells,
             self._boundaries,
             self._ghosts,
+            CopyLayer(self.stage, self._cells, self._boundaries),
+            PointLayer(self.stage),
             LegendLayer(self.stage),
+            TriadLayer(self.stage),
         )
         self.eye = Eye(self.stage, self._shapes)
         self.session = Session()

@@ -44,6 +44,8 @@ class Stage:
         Enlarges the letters, for pictures of many pixels.
     table : pyvista.LookupTable
         The colours of values, and of inverted cells below them; changed in place.
+    point_words : tuple of (str, str)
+        Words and colours of the nodes drawn as points, for the legend.
     """
 
     def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
@@ -51,6 +53,7 @@ class Stage:
         self.look = look
         self.font_scale = font_scale
         self.table = lookup_table()
+        self.point_words: tuple[tuple[str, str], ...] = ()
         self._values: tuple[object, FloatArray] | None = None
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:

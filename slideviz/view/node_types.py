@@ -1,0 +1,139 @@
+"""What the nodes of the boundaries may do, for the view: moving, sliding, periodic and so on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.topology import Boundary, Fans, find_boundary, find_fans
+from slideviz.rbf.classify import classify
+from slideviz.view.look import ROLE_COLOURS
+from slideviz.view.state import Session
+
+NodeType = Literal[
+    "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
+]
+
+NODE_WORDS: dict[NodeType, str] = {
+    "moving": "moving",
+    "fixed": "fixed",
+    "sliding_surface": "sliding face",
+    "sliding_edge": "sliding edge",
+    "periodic": "periodic",
+    "internal": "internal",
+    "control": "control",
+}
+"""The types of nodes, as the legend names them."""
+
+NODE_COLOURS: dict[NodeType, str] = {
+    "moving": ROLE_COLOURS["moving"],
+    "fixed": ROLE_COLOURS["fixed"],
+    "sliding_surface": ROLE_COLOURS["sliding"],
+    "sliding_edge": "#56b4e9",
+    "periodic": ROLE_COLOURS["periodic"],
+    "internal": ROLE_COLOURS["internal"],
+    "control": "#d81b60",
+}
+"""Those of the roles, and two more that colour-blind people tell from them."""
+
+CLASSES: tuple[NodeType, ...] = tuple(kind for kind in NODE_WORDS if kind != "control")
+
+
+@dataclass(frozen=True, eq=False)
+class TypedNodes:
+    """Nodes to be drawn as points.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        The nodes, rising.
+    kinds : (k,) int64
+        The place of each node's type in ``NODE_WORDS``.
+    """
+
+    nodes: IntArray
+    kinds: IntArray
+
+    @property
+    def present(self) -> tuple[NodeType, ...]:
+        """Return the types that occur, in the order of ``NODE_WORDS``."""
+        there = set(np.unique(self.kinds).tolist())
+        return tuple(kind for place, kind in enumerate(NODE_WORDS) if place in there)
+
+    def only(self, nodes: IntArray) -> TypedNodes:
+        """Return those that are among ``nodes``."""
+        keep = np.isin(self.nodes, nodes)
+        return TypedNodes(self.nodes[keep], self.kinds[keep])
+
+
+NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+class NodeTypes:
+    """The types of the boundary nodes of a mesh, worked out once for each case."""
+
+    def __init__(self) -> None:
+        self._mesh: Mesh | None = None
+        self._boundary: Boundary | None = None
+        self._fans: tuple[float, Fans] | None = None
+        self._types: tuple[object, TypedNodes] | None = None
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.__init__()  # type: ignore[misc]
+
+    def of(self, session: Session) -> TypedNodes:
+        """Return the nodes that the view of a session shows as points, whatever is hidden."""
+        if session.mesh is None or session.view.points == "none":
+            return NOTHING
+        if session.view.points == "control":
+            return control_nodes(session)
+        # Steps were computed with the settings of their run, not with those of now.
+        ran = session.frame is not None and session.frame.step is not None
+        return self._typed(session.mesh, (session.ran if ran else None) or session.case)
+
+    def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
+        roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)
+        key = (mesh, roles, case.sliding, case.periodic, case.feature_angle_deg)
+        if self._types is None or self._types[0] != key:
+            self._types = key, self._classified(mesh, case)
+        return self._types[1]
+
+    def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
+        if not mesh.markers:
+            return NOTHING
+        if self._mesh is not mesh or self._boundary is None:
+            self._mesh, self._boundary, self._fans = mesh, find_boundary(mesh), None
+        boundary, angle = self._boundary, case.feature_angle_deg
+        if self._fans is None or self._fans[0] != angle:
+            self._fans = angle, find_fans(boundary, mesh.points, angle)
+        method = (case.sliding, case.periodic)
+        try:
+            classes = classify(boundary, self._fans[1], mesh.points, case.roles, method, angle)
+        except SlidevizError:
+            return NOTHING  # what is wrong with the case is said beside the Run button
+        place = {kind: index for index, kind in enumerate(NODE_WORDS)}
+        kinds = np.full(len(mesh.points), place["internal"])
+        for marker in mesh.markers:
+            if case.roles.get(marker.name) == "periodic":
+                kinds[marker.nodes] = place["periodic"]
+        kinds[classes.surface] = place["sliding_surface"]
+        kinds[classes.edge] = place["sliding_edge"]
+        kinds[classes.fixed] = place["fixed"]
+        kinds[classes.moving] = place["moving"]
+        nodes = np.unique(boundary.nodes)
+        return TypedNodes(nodes, kinds[nodes])
+
+
+def control_nodes(session: Session) -> TypedNodes:
+    """Return the control nodes of the step that is shown; none before the first step."""
+    step = session.frame.step if session.frame is not None else None
+    if step is None:
+        return NOTHING
+    nodes = np.unique(step.control)
+    return TypedNodes(nodes, np.full(len(nodes), list(NODE_WORDS).index("control")))

@@ -1,0 +1,258 @@
+"""Points, neighbouring passages and axes in the scene, judged by where which colours are."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from slideviz.case.samples import sample
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.layer_copies import PALER, CopyLayer, Period, matrices
+from slideviz.view.layer_triad import COLOURS, SIZE
+from slideviz.view.look import DARK, LIGHT, ROLE_COLOURS
+from slideviz.view.node_types import NODE_COLOURS
+from slideviz.view.pick import to_display
+from slideviz.view.scene import Scene
+from slideviz.view.state import Frame
+from slideviz.view.surfaces import find_surfaces
+
+LEFT = np.array([-0.004, 0.0])
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=[620, 460])
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def scene(plotter):
+    return Scene(plotter)
+
+
+@pytest.fixture(scope="module")
+def row():
+    return sample("turbine-row", size=5000)
+
+
+@pytest.fixture(scope="module")
+def stator():
+    return sample("stator", size=5000)
+
+
+def opened(scene, one, **view):
+    session = changes.open_mesh(Frame(one.mesh, quality(one.mesh)), None, (), one.case)
+    session = changes.set_view(session, **view)
+    scene.open(session, find_surfaces(one.mesh))
+    return session
+
+
+def image(scene):
+    scene.plotter.render()
+    return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
+
+
+def near(scene, point, reach=3):
+    """Return the colours around a point of the mesh, (k, 3)."""
+    picture = image(scene)
+    x, y = to_display(scene.plotter, np.array([list(point) + [0.0] * (3 - len(point))]))[0]
+    row, column = picture.shape[0] - 1 - round(y), round(x)
+    part = picture[row - reach : row + reach + 1, column - reach : column + reach + 1, :3]
+    return part.reshape(-1, 3)
+
+
+def has(colours, wanted, within=45, least=1):
+    """Tell whether so many pixels have about that colour."""
+    off = np.abs(colours - np.array(pv.Color(wanted).int_rgb)).max(axis=1)
+    return int((off < within).sum()) >= least
+
+
+def deformed(session, shift):
+    """Return the session at a step in which all points have moved by ``shift``."""
+    mesh = session.mesh.with_points(session.mesh.points + shift)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    return changes.add_frames(changes.start_run(session), [frame])
+
+
+# Points -----------------------------------------------------------------------------------
+
+
+def test_points_have_the_colour_of_their_type_where_the_nodes_are(scene, row):
+    session = opened(scene, row, points="types", colour_by="size_skew", edges=False, triad=False)
+    mesh = row.mesh
+    blade = mesh.points[mesh.marker("BLADE").nodes]
+    inflow = mesh.points[mesh.marker("INFLOW").nodes]
+    # The line of the boundary has the colour of its role: a point is wider.
+    assert has(near(scene, blade[5]), NODE_COLOURS["moving"], least=22)
+    assert has(near(scene, inflow[len(inflow) // 2]), NODE_COLOURS["sliding_edge"])
+    scene.update(changes.set_view(session, points="none"))
+    assert not has(near(scene, blade[5]), NODE_COLOURS["moving"], least=22)
+    assert not has(near(scene, inflow[len(inflow) // 2]), NODE_COLOURS["sliding_edge"])
+
+
+def test_points_follow_the_step_and_their_boundary(scene, row):
+    session = opened(scene, row, points="types", colour_by="size_skew", edges=False, triad=False)
+    at = row.mesh.points[row.mesh.marker("BLADE").nodes][5]
+    moved = deformed(session, LEFT)
+    scene.update(moved)
+    assert has(near(scene, at + LEFT), NODE_COLOURS["moving"])
+    assert not has(near(scene, at), NODE_COLOURS["moving"], 25)
+    hidden = changes.show(moved, ("BLADE",), False)
+    scene.update(hidden)
+    assert not has(near(scene, at + LEFT), NODE_COLOURS["moving"])
+    scene.update(changes.show_frame(changes.show(hidden, ("BLADE",)), 0))
+    assert has(near(scene, at), NODE_COLOURS["moving"])
+
+
+def test_the_legend_names_the_points(scene, row):
+    session = opened(scene, row, points="types", colour_by="size_skew")
+
+    def words():
+        found = [name.split(":") for name in scene.plotter.actors if name.startswith("legend:")]
+        return {parts[2] for parts in found if parts[1] == "nodes"}
+
+    assert words() == {"moving", "sliding edge", "periodic"}
+    bar = scene.plotter.scalar_bars["size-skew"]
+    with_points = bar.GetHeight()
+    scene.update(changes.set_view(session, points="none", colour_by="size_skew"))
+    assert not words()
+    assert scene.plotter.scalar_bars["size-skew"].GetHeight() > with_points
+    scene.update(changes.set_view(session, colour_by="role"))
+    assert words() == {"moving", "sliding edge", "periodic"}
+    assert "legend:moving:moving" in scene.plotter.actors, "the role is named, too"
+
+
+# Neighbouring passages --------------------------------------------------------------------
+
+
+def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
+    pitch = Period().of(changes.open_mesh(Frame(row.mesh, quality(row.mesh)), None)).vector
+    nodes = row.mesh.marker("BLADE").nodes
+    at = row.mesh.points[nodes[len(nodes) // 3]]
+    session = opened(scene, row, copies=1, edges=False, triad=False)
+    orange = np.array(pv.Color(ROLE_COLOURS["moving"]).int_rgb)
+    plain = np.array(pv.Color(LIGHT.cell).int_rgb)
+    paler = pv.Color((orange + PALER * (plain - orange)).astype(int).tolist())
+    assert has(near(scene, at), ROLE_COLOURS["moving"], 20)
+    for side in (-1, 1):
+        assert has(near(scene, at + side * pitch), paler, 20), side
+        assert not has(near(scene, at + side * pitch), ROLE_COLOURS["moving"], 20), "not paler"
+    assert scene.pick(*to_display(scene.plotter, [[*(at + pitch), 0.0]])[0]) != "BLADE"
+    scene.update(changes.set_view(session, copies=0))
+    assert not has(near(scene, at + pitch), paler, 20)
+    assert not [name for name in scene.plotter.actors if name.startswith("copy:")]
+
+
+def test_neighbours_of_a_stator_are_turned(scene, stator):
+    session = opened(scene, stator, copies=1)
+    copies = {
+        name: actor for name, actor in scene.plotter.actors.items() if name.startswith("copy:")
+    }
+    assert len(copies) == 2 * len(stator.mesh.markers)
+    drawn = scene.drawn["BLADE"]
+    for number in (-1, 1):
+        actor = copies[f"copy:{number}:BLADE"]
+        assert actor.mapper.dataset is drawn.shape, "the data is shared"
+        angle = np.arctan2(actor.user_matrix[1, 0], actor.user_matrix[0, 0])
+        assert abs(abs(angle) - 2 * np.pi / 41) < 1e-6
+    # The second periodic side of one is the first of the next.
+    period = Period().of(session)
+    first = stator.mesh.points[stator.mesh.marker(period.first).nodes]
+    second = stator.mesh.points[stator.mesh.marker(period.second).nodes]
+    moved = first @ matrices(session, period)[1][:3, :3].T
+    gap = np.linalg.norm(moved[:, None] - second[None], axis=2).min(axis=1)
+    assert gap.max() < 1e-6
+
+
+def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
+    session = opened(scene, stator)
+    near_scale = scene.plotter.camera.parallel_scale
+    scene.update(changes.set_view(session, copies=-1))
+    names = {name for name in scene.plotter.actors if name.endswith(":BLADE") and "copy" in name}
+    assert len(names) == 40
+    scene.fit()
+    assert scene.plotter.camera.parallel_scale > 3 * near_scale
+    copies = next(layer for layer in scene.layers if isinstance(layer, CopyLayer))
+    points = np.concatenate([shape.points for shape in copies.shapes()])
+    seen = to_display(scene.plotter, points)
+    assert seen.min() > 0
+    assert (seen.max(axis=0) < [620 - 100, 460]).all()
+
+
+def test_neighbours_follow_the_step_and_the_colours(scene, row):
+    session = opened(scene, row, copies=1, edges=False, triad=False)
+    pitch = Period().of(session).vector
+    nodes = row.mesh.marker("BLADE").nodes
+    at = row.mesh.points[nodes[len(nodes) // 3]]
+    before = near(scene, at + pitch, 1).mean(axis=0)
+    scene.update(deformed(session, LEFT))
+    assert np.abs(near(scene, at + pitch, 1).mean(axis=0) - before).max() > 40
+    after = near(scene, at + pitch + LEFT, 1).mean(axis=0)
+    assert np.abs(after - before).max() < 25
+    inside = row.mesh.points.mean(axis=0) + pitch
+    plain = near(scene, inside, 1).mean(axis=0)
+    scene.update(changes.set_view(session, colour_by="skew"))
+    _, green, blue = near(scene, inside, 1).mean(axis=0)
+    assert green > blue + 40, "yellow to green, as good cells are"
+    assert np.ptp(plain) < 30
+
+
+def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
+    period = Period()
+    lonely = changes.set_view(session, copies=2)
+    assert period.of(lonely) is None
+    scene.open(lonely, find_surfaces(lonely.mesh))
+    assert not [name for name in scene.plotter.actors if name.startswith("copy:")]
+
+
+def test_periodic_boundaries_that_do_not_match_have_no_neighbours(row):
+    session = changes.open_mesh(Frame(row.mesh, quality(row.mesh)), None, (), row.case)
+    assert Period().of(session) is not None
+    wrong = changes.set_role(session, ("INFLOW", "BLADE"), "periodic")
+    assert Period().of(wrong) is None
+
+
+# Axes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK], ids=["light", "dark"])
+def test_the_axes_are_in_the_lower_left_corner(scene, stator, look):
+    session = opened(scene, stator)
+    scene.set_look(look)
+
+    def differs(a, b):
+        return np.abs(a - b).max(axis=2) > 20
+
+    shown = image(scene)
+    scene.update(changes.set_view(session, triad=False))
+    without = image(scene)
+    rows, columns = np.nonzero(differs(shown, without))
+    assert len(rows) > 80
+    assert columns.max() <= SIZE
+    assert rows.min() >= shown.shape[0] - SIZE
+    scene.update(changes.set_view(session, triad=True))
+    assert differs(without, image(scene)).sum() > len(rows) / 2
+
+
+def test_the_axes_turn_with_the_camera_and_have_their_colours(scene, stator):
+    opened(scene, stator)
+    counts = []
+    for side in ("+x", "+y", "+z"):
+        scene.look_from(side)
+        corner = image(scene)[-SIZE:, :SIZE].reshape(-1, 3)
+        counts.append([has_hue(corner, colour) for colour in COLOURS])
+    found = np.array(counts)
+    for axis in range(3):
+        others = np.delete(found[:, axis], axis)
+        assert found[axis, axis] < others.min(), "seen from its end, it is a dot"
+
+
+def has_hue(colours, wanted):
+    """Count the pixels of about the hue of a colour, whatever their shade."""
+    rgb = np.array(pv.Color(wanted).float_rgb)
+    parts = colours - colours.min(axis=1, keepdims=True)
+    wanted = (rgb - rgb.min()) / (rgb - rgb.min()).max()
+    strong = parts.max(axis=1) > 60
+    parts = parts[strong] / parts[strong].max(axis=1, keepdims=True)
+    return int((np.abs(parts - wanted).max(axis=1) < 0.3).sum())

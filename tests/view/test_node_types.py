@@ -1,0 +1,109 @@
+"""Which nodes are drawn as points: what they may do, and the control nodes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slideviz.case.model import Reduction, Translate
+from slideviz.case.samples import sample
+from slideviz.mesh.quality import quality
+from slideviz.staircase import deform
+from slideviz.view import changes
+from slideviz.view.node_types import NODE_WORDS, NOTHING, NodeTypes
+from slideviz.view.state import Frame
+
+
+def session_of(one, **view):
+    session = changes.open_mesh(Frame(one.mesh, quality(one.mesh)), None, (), one.case)
+    return changes.set_view(session, **view)
+
+
+def named(typed):
+    """Return the nodes of each type."""
+    words = list(NODE_WORDS)
+    return {kind: set(typed.nodes[typed.kinds == words.index(kind)].tolist()) for kind in words}
+
+
+@pytest.fixture(scope="module")
+def stator():
+    return sample("stator", size=5000)
+
+
+def test_nodes_of_a_solid_mesh_have_the_types_that_the_method_gives_them(stator):
+    session = session_of(stator, points="types")
+    found = named(NodeTypes().of(session))
+    case = stator.case.change(motions=(Translate("BLADE", (1e-4, 0.0, 0.0)),))
+    step = next(deform(case, stator.mesh))
+    for kind in ("moving", "fixed", "sliding_edge", "sliding_surface"):
+        assert len(found[kind]) == step.node_counts[kind], kind
+    mesh = stator.mesh
+    assert found["moving"] == set(mesh.marker("BLADE").nodes.tolist())
+    on_hub = set(mesh.marker("HUB").nodes.tolist())
+    assert found["internal"] <= on_hub | set(mesh.marker("SHROUD").nodes.tolist())
+    assert found["internal"]
+    every = set(np.concatenate([marker.nodes for marker in mesh.markers]).tolist())
+    assert set().union(*found.values()) == every
+    assert not found["control"]
+
+
+def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
+    types, session = NodeTypes(), session_of(passage, points="types")
+    walls = [name for name in passage.mesh.marker_names if session.role(name) == "sliding"]
+    before = named(types.of(session))
+    assert before["sliding_edge"]
+    fixed = changes.set_role(session, walls, "fixed")
+    assert len(named(types.of(fixed))["sliding_edge"]) < len(before["sliding_edge"])
+    step = next(deform(session.case, passage.mesh))
+    ran = changes.add_frames(
+        changes.start_run(session), [Frame(step.mesh, quality(step.mesh), step)]
+    )
+    changed = changes.set_role(ran, walls, "fixed")
+    assert named(types.of(changed)) == before
+    assert named(types.of(changes.show_frame(changed, 0))) == named(types.of(fixed))
+
+
+def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
+    from slideviz.view import node_types as module
+
+    asked, real = [], module.classify
+
+    def counted(*values):
+        asked.append(1)
+        return real(*values)
+
+    monkeypatch.setattr(module, "classify", counted)
+    types, session = NodeTypes(), session_of(passage, points="types")
+    first = types.of(session)
+    assert types.of(changes.set_view(session, edges=False)) is first
+    assert types.of(changes.set_case(session, steps=7)) is first
+    assert len(asked) == 1
+    types.of(changes.set_case(session, sliding="none", periodic="none"))
+    assert len(asked) == 2
+
+
+def test_control_nodes_are_those_that_the_step_interpolated_with(passage):
+    case = passage.case.change(reduction=Reduction(tolerance=1e-2), steps=2)
+    session = changes.start_run(session_of(passage, points="control"))
+    assert NodeTypes().of(session) is NOTHING
+    steps = list(deform(case, passage.mesh))
+    session = changes.add_frames(
+        session, [Frame(step.mesh, quality(step.mesh), step) for step in steps]
+    )
+    boundary = np.unique(np.concatenate([marker.nodes for marker in passage.mesh.markers]))
+    for index, step in enumerate(steps, start=1):
+        found = named(NodeTypes().of(changes.show_frame(session, index)))["control"]
+        assert found == set(step.control.tolist())
+        assert len(found) == step.control_nodes < len(boundary)
+        assert found <= set(boundary.tolist())
+    # With all nodes as control nodes, every one whose displacement is known is among them.
+    step = next(deform(case.change(reduction=None), passage.mesh))
+    assert len(step.control) == step.control_nodes > len(found)
+    assert set(step.control.tolist()) <= set(boundary.tolist())
+
+
+def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passage):
+    session = session_of(passage, points="types")
+    bare = replace(session, mesh=replace(passage.mesh, markers=()))
+    assert NodeTypes().of(bare) is NOTHING
+    assert NodeTypes().of(changes.set_view(session, points="none")) is NOTHING
