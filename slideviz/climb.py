@@ -138,12 +138,13 @@ class Climb:
         warnings = [*self.case.warnings, *plan.warnings]
         told: list[str] = []
         seconds = dict(self.seconds)
+        before: Solution | None = None
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
             watch = Watch(self._report(index + 1, total), seconds)
             goal = plan.coords[plan.known] + plan.target * part
-            solution = _step(plan, coords, goal, watch)
+            solution = _step(plan, coords, goal, watch, before)
             moved = _moved(plan, coords, solution.displacement, goal)
             points = _cartesian(plan, mesh.points, moved)
             if not np.all(np.isfinite(points)):
@@ -156,6 +157,7 @@ class Climb:
                     continue
                 folded = now
             coords, done, index = moved, part, index + 1
+            before = solution
             ahead.pop(0)
             if not told:
                 told = _dropped_warning(solution, index, mesh)
@@ -198,7 +200,13 @@ def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
         yield replace(step, total=len(steps), tried=tried if last else ())
 
 
-def _step(plan: Plan, coords: FloatArray, goal: FloatArray, watch: Watch) -> Solution:
+def _step(
+    plan: Plan,
+    coords: FloatArray,
+    goal: FloatArray,
+    watch: Watch,
+    before: Solution | None,
+) -> Solution:
     """Return the displacement of all nodes from ``coords`` to the next step."""
     normal_nodes, normals = plan.constraints(coords)
     problem = Problem(
@@ -217,6 +225,7 @@ def _step(plan: Plan, coords: FloatArray, goal: FloatArray, watch: Watch) -> Sol
         coords=coords,
         shift=plan.frame.shift(),
         reduction=plan.reduction,
+        before=before,
     )
     return plan.solve(problem, watch)
 

@@ -183,7 +183,7 @@ def test_nothing_known_is_refused():
 def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unknowns, monkeypatch):
     mesh = builders.square(6)
     monkeypatch.setattr(staircase, "_free_memory", lambda: 1000.0)
-    monkeypatch.setattr(solve, "factorise", lambda *_: pytest.fail("the system was built"))
+    monkeypatch.setattr(solve, "extend", lambda *_: pytest.fail("the system was built"))
     text = rf"{unknowns} unknowns need 0\.0 GB of memory, 0\.0 GB are free; give large bound"
     with pytest.raises(DeformError, match=text):
         next(sv.deform(square_case(mesh, sliding=method), mesh))

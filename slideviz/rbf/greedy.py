@@ -9,6 +9,9 @@ two triangular solves, and the residual of all candidates is recomputed by the f
 is also the exact error. So nothing is factorised twice and no candidates-by-controls matrix
 exists; picking one or two nodes in a cycle, as the thesis does, is the same with a small pool.
 
+Steps after the first begin with the control nodes of the one before, and have to make up for
+what these lacked (``Problem.lag``), so that the tolerance holds for the whole displacement.
+
 Candidates are sorted by position, and every number depends on one candidate and the order of
 the control nodes alone: neither numbering nor threads change the selection.
 """
@@ -25,20 +28,10 @@ from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.pool import pool
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
 from slideviz.rbf.rows import Rows, blocks
-from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, solve_lower
-
-POOL = 768
-"""Largest number of rows in the pool of a block."""
-
-POOL_START = 192
-POOL_SHARE = 6
-"""The pool begins small and has this many candidates for each node to pick: as good, measured
-by the number of control nodes, and cheaper than the largest one from the start."""
-
-BLOCK_LIMIT = 128
-"""Largest number of nodes picked in a cycle."""
+from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
 STALE = 0.3
 """A block ends when the pool's largest error is below this part of the largest of all."""
@@ -73,6 +66,7 @@ class GreedyFit:
         self._level = history[-1].level if history else 1
         self._rows = Rows(np.empty(0, np.int64), None, np.empty((0, d)))
         self._candidate = self._block = np.empty(0, np.int64)
+        self._known = problem.beginning()
         self._new_level()
 
     def _new_level(self) -> None:
@@ -90,7 +84,7 @@ class GreedyFit:
 
     def add(self, rows: Rows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""
-        rows = self._sorted(rows)
+        rows = rows.by_position(self._problem.coords)
         first = not len(self._rows.nodes)
         self._rows = rows if first else self._rows.followed_by(rows)
         rows = self._rows
@@ -105,14 +99,6 @@ class GreedyFit:
         with self._watch.phase("select"):
             self._select()
 
-    def _sorted(self, rows: Rows) -> Rows:
-        """Return the rows ordered by position, rows of one node together."""
-        coords = self._problem.coords[rows.nodes]
-        keys = [np.arange(len(coords)), *(coords[:, k] for k in reversed(range(coords.shape[1])))]
-        order = np.lexsort(keys)
-        normals = None if rows.normals is None else rows.normals[order]
-        return Rows(rows.nodes[order], normals, rows.right[order])
-
     def _select(self) -> None:
         """Run cycles until the error is below the tolerance, or nothing is left to choose."""
         settings = self._settings
@@ -120,6 +106,12 @@ class GreedyFit:
         residual = target - self._values(self._now)
         errors = self._errors(residual)
         goal = self._level_goal(errors)
+        again = np.flatnonzero(np.isin(self._rows.nodes, self._known) & ~self._barred)
+        if len(again) and errors.max(initial=0.0) > settings.tolerance:
+            self._record(errors)
+            self._take(again, target)
+            residual = target - self._values(self._now)
+            errors = self._errors(residual)
         while True:
             self._record(errors)
             if errors.max(initial=0.0) <= settings.tolerance or self._full() or self._singular:
@@ -210,9 +202,9 @@ class GreedyFit:
         """Pick nodes, extend the factor and the weights; tell whether any could be picked."""
         open_ = np.zeros(len(errors), bool)
         open_[self._candidate[~self._barred]] = True
-        count, pool = self._pool(np.where(open_, errors, -1.0), residual)
-        while len(pool):
-            rows = np.flatnonzero(np.isin(self._candidate, pool) & ~self._barred)
+        count, among = self._pool(np.where(open_, errors, -1.0), residual)
+        while len(among):
+            rows = np.flatnonzero(np.isin(self._candidate, among) & ~self._barred)
             done = len(self._chosen) / len(self._grown)
             flops = 4.0 * (done + count) * len(rows) * done
             with enough_threads(flops):
@@ -223,44 +215,20 @@ class GreedyFit:
                 self.found = self._settled.plus(self._now)
                 return True
             # All of the pool fell to the pivot guard: try the next ones.
-            open_[pool] = False
-            count, pool = self._pool(np.where(open_, errors, -1.0), residual)
+            open_[among] = False
+            count, among = self._pool(np.where(open_, errors, -1.0), residual)
         return False
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
         """Return how many nodes to pick, and the candidates to pick them from."""
-        settings, chosen = self._settings, len(self.found.nodes)
-        eligible = np.count_nonzero(errors > settings.tolerance)
-        if not eligible:
-            return 0, np.empty(0, np.int64)
-        worst = int(np.argmax(errors))
-        if settings.pick == "one":
-            return 1, np.array([worst])
-        if settings.pick == "double":
-            return self._double(errors, residual, worst)
-        per_node = max(1, len(self._candidate) // max(1, len(errors)))
-        count = int(np.clip(chosen // 4, 4, BLOCK_LIMIT))
-        size = min(eligible, POOL // per_node, max(POOL_START, POOL_SHARE * count))
-        order = np.argsort(-errors, kind="stable")[:size]
-        if settings.level == "size":
-            left = settings.level_size - len(np.unique(self._candidate[self._chosen]))
-            count = min(count, max(1, left))
-        if settings.max_nodes is not None:
-            count = min(count, max(1, settings.max_nodes - chosen))
-        return count, np.sort(order)
-
-    def _double(self, errors: FloatArray, residual: FloatArray, worst: int) -> tuple[int, IntArray]:
-        """Return the worst candidate and the worst one whose error is more than 90° from its."""
         normals, d = self._rows.normals, self._problem.values.shape[1]
         vectors = residual
         if normals is not None:
             vectors = np.zeros((len(errors), d))
             np.add.at(vectors, self._candidate, residual * normals)
-        opposite = np.where(vectors @ vectors[worst] < 0, errors, -1.0)
-        second = int(np.argmax(opposite))
-        if opposite[second] <= self._settings.tolerance:
-            return 1, np.array([worst])
-        return 2, np.sort([worst, second])
+        chosen = len(self.found.nodes), len(np.unique(self._candidate[self._chosen]))
+        per_node = max(1, len(self._candidate) // max(1, len(errors)))
+        return pool(errors, vectors, self._settings, chosen, per_node)
 
     def _pick(
         self,
@@ -294,6 +262,21 @@ class GreedyFit:
         self._chosen = np.concatenate([self._chosen, rows[picked]])
         self._barred[rows[picked]] = True
         return len(picked) > 0
+
+    def _take(self, rows: IntArray, target: FloatArray) -> None:
+        """Append rows chosen in the step before to the factors."""
+        with enough_threads(len(rows) ** 3 / 3.0):
+            for k, factor in enumerate(self._grown):
+                part = rows[self._block[rows] == k]
+                left, schur = self._remaining(factor, part)
+                made = factorise(schur)
+                turn = len(self._chosen) + np.arange(len(made.kept))
+                factor.append(part[made.kept], turn, (left[:, made.kept].T, made.lower))
+                factor.follow(target)
+                self._chosen = np.concatenate([self._chosen, part[made.kept]])
+            self._barred[rows] = True
+            self._now = self._own(target)
+        self.found = self._settled.plus(self._now)
 
     def _remaining(self, factor: Growing, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""

@@ -71,7 +71,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     fit.add(sliding_rows(problem))
     sliding = np.concatenate([problem.edge, problem.surface])
     nodes = np.concatenate([problem.known, sliding])
-    free = _at(problem, watch, fit, sliding)
+    free = _at(problem, watch, fit, sliding) - problem.behind(sliding)
     if not problem.curved:
         free = within(problem, sliding, free)
     with watch.phase("project"):
@@ -123,7 +123,7 @@ def _slide(problem: Problem, watch: Watch, fit: Fit, level: IntArray) -> FloatAr
     On curved boundaries the part along the normals goes first: the point that is closest to a
     node pushed through a thin profile is on the profile's other side.
     """
-    free = _at(problem, watch, fit, level)
+    free = _at(problem, watch, fit, level) - problem.behind(level)
     if problem.curved:
         free = within(problem, level, free)
     with watch.phase("project"):
@@ -136,7 +136,10 @@ def _finish(
     """Evaluate at all nodes; boundary nodes are set exactly, and what they lack is spread."""
     displacement = _at(problem, watch, fit, np.arange(problem.features.shape[1]))
     errors = values - displacement[nodes]
-    largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
+    total, lag = problem.behind(nodes) + errors, None
+    if problem.reduction is not None:
+        lag = np.zeros_like(displacement)
+        lag[nodes] = total
     if problem.reduction is not None or len(fit.dropped):
         with watch.phase("correct") as tick:
             correct(problem, displacement, nodes, errors, tick)
@@ -144,9 +147,10 @@ def _finish(
     return Solution(
         displacement,
         len(fit.found.nodes),
-        largest,
+        float(np.linalg.norm(total, axis=1).max(initial=0.0)),
         fit.dropped,
         fit.condition(),
         fit.history,
         control=fit.found.nodes,
+        lag=lag,
     )

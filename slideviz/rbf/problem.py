@@ -42,7 +42,7 @@ class Reduction:
     ----------
     tolerance : float
         Largest error at the boundary, in the mesh's length unit, that may remain for the
-        correction.
+        correction, summed over the steps.
     pick : "block", "double" or "one"
         Nodes added in a cycle: a growing number of them, the worst and the worst with an error
         in an opposite direction, or the worst one.
@@ -100,6 +100,8 @@ class Problem:
         Current positions in the frame, and one period in it (zero: none), for the correction.
     reduction : Reduction or None
         None: all candidates are control nodes.
+    before : Solution or None
+        That of the step before.
     """
 
     basis: Basis
@@ -117,6 +119,25 @@ class Problem:
     coords: FloatArray
     shift: FloatArray
     reduction: Reduction | None = None
+    before: Solution | None = None
+
+    def behind(self, nodes: IntArray) -> FloatArray:
+        """Return how much the interpolants of all steps before lack at nodes, (m, d)."""
+        if self.before is None or self.before.lag is None:
+            return np.zeros((len(nodes), self.values.shape[1]))
+        return self.before.lag[nodes]
+
+    def beginning(self) -> IntArray:
+        """Return the control nodes with which a selection begins.
+
+        Those of the step before, where one level is made; not if their number reached its
+        limit, for then they could not follow a changing error.
+        """
+        settings, before = self.reduction, self.before
+        if settings is None or before is None or settings.level != "none":
+            return np.empty(0, np.int64)
+        full = settings.max_nodes is not None and len(before.control) >= settings.max_nodes
+        return before.control[:0] if full else before.control
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +151,8 @@ class Solution:
     control_nodes : int
         Nodes in the final system, coinciding ones counted once.
     max_error : float
-        Largest misfit of the interpolant at the nodes whose displacement is known or projected,
-        before the correction sets these exactly.
+        Largest misfit at the nodes whose displacement is known or projected, before the
+        correction sets these exactly; with data reduction that of all steps so far.
     dropped : (m,) int64
         Nodes that the pivot guard left out.
     condition : float
@@ -142,6 +163,9 @@ class Solution:
         What the user should know.
     control : (c,) int64
         The nodes in the final system; empty where a method has no such system.
+    lag : (n, d) float64 or None
+        How much less than the boundary nodes the interpolants of all steps so far have moved
+        there; None without data reduction.
     """
 
     displacement: FloatArray
@@ -152,6 +176,7 @@ class Solution:
     history: tuple[Cycle, ...] = ()
     warnings: tuple[str, ...] = ()
     control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    lag: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,10 +46,17 @@ class Rows:
         nodes = np.concatenate([self.nodes, more.nodes])
         return Rows(nodes, None, np.concatenate([self.right, more.right]))
 
+    def by_position(self, coords: FloatArray) -> Rows:
+        """Return the rows ordered by the coordinates (n, d) of their nodes."""
+        at = coords[self.nodes]
+        order = np.lexsort([np.arange(len(at)), *at.T[::-1]])
+        normals = None if self.normals is None else self.normals[order]
+        return Rows(self.nodes[order], normals, self.right[order])
+
 
 def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Rows:
     """Return the rows of nodes with known displacement, coinciding ones merged."""
-    merged, data = merge(problem, nodes, values)
+    merged, data = merge(problem, nodes, values + problem.behind(nodes))
     return Rows(merged, None, data)
 
 
@@ -58,7 +65,9 @@ def sliding_rows(problem: Problem) -> Rows:
     d = problem.values.shape[1]
     nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
     normals = np.concatenate([np.tile(np.eye(d), (len(problem.known), 1)), problem.normals])
-    right = np.concatenate([problem.values.ravel(), np.zeros(len(problem.normal_nodes))])
+    values = problem.values + problem.behind(problem.known)
+    across = np.einsum("qd,qd->q", problem.behind(problem.normal_nodes), problem.normals)
+    right = np.concatenate([values.ravel(), across])
     order = np.argsort(problem.same_as[nodes], kind="stable")
     nodes, normals, right = nodes[order], normals[order], right[order]
     stands = problem.same_as[nodes]

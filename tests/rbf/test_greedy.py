@@ -74,6 +74,46 @@ def test_every_case_converges_and_boundaries_are_exact(tmp_path, name, sliding, 
     assert np.abs(last.mesh.points - exact.mesh.points).max() < 5e-3
 
 
+@pytest.mark.parametrize(("sliding", "periodic"), [("none", "periodic"), ("ps", "moving")])
+@pytest.mark.parametrize("name", ["square", "polar", "hexahedron", "cylindrical"])
+def test_the_tolerance_holds_for_all_steps_together(tmp_path, name, sliding, periodic):
+    """Errors of the steps must not add up: ten times the tolerance would be 1e-2."""
+    case, mesh = case_of(name, tmp_path, 9 if name in ("hexahedron", "cylindrical") else None)
+    case = case.change(
+        sliding=sliding, periodic=periodic, steps=10, reduction=Reduction(tolerance=1e-3)
+    )
+    steps = list(sv.deform(case, mesh))
+    exact = last_of(case.change(reduction=None), mesh)
+    assert np.abs(steps[-1].mesh.points - exact.mesh.points).max() < 6e-3
+    assert max(step.max_error for step in steps) <= 1e-3 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
+def test_steps_go_on_with_the_control_nodes_of_the_one_before(tmp_path, sliding):
+    case, mesh = case_of("square", tmp_path)
+    case = case.change(
+        sliding=sliding, periodic="none", steps=3, reduction=Reduction(tolerance=1e-3)
+    )
+    steps = list(sv.deform(case, mesh))
+    for step, after in pairwise(steps):
+        assert set(step.control) <= set(after.control)
+        assert after.history[0].control_nodes == 0
+        assert after.history[1].control_nodes > 4
+    assert len(steps[2].history) < len(steps[0].history)
+
+
+@pytest.mark.parametrize(
+    "reduction",
+    [Reduction(tolerance=1e-3, max_nodes=9), replace(KINDS["levels by size"], tolerance=1e-3)],
+)
+def test_a_limited_number_of_nodes_is_chosen_anew_in_each_step(tmp_path, reduction):
+    """Kept, they could not follow the error; and levels are made anew as well."""
+    case, mesh = case_of("square", tmp_path)
+    case = case.change(sliding="none", periodic="none", steps=4, reduction=reduction)
+    sets = [set(step.control) for step in sv.deform(case, mesh)]
+    assert any(not a <= b for a, b in pairwise(sets))
+
+
 def test_ten_times_the_tolerance_needs_fewer_nodes(tmp_path):
     case, mesh = case_of("square", tmp_path)
     case = case.change(steps=1, sliding="ds", periodic="none")
