@@ -10,20 +10,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from slideviz.mesh.model import FloatArray
-from slideviz.view import pick
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.view import pick, pick_cell
 from slideviz.view.actors import Drawn
 from slideviz.view.eye import Eye
+from slideviz.view.inspect import cell_at, chosen_cells, surroundings
+from slideviz.view.layer_chosen import ChosenLayer
 from slideviz.view.layer_copies import CopyLayer
 from slideviz.view.layer_ghosts import GhostLayer
 from slideviz.view.layer_legend import LegendLayer
+from slideviz.view.layer_mark import MarkLayer
 from slideviz.view.layer_mesh import BoundaryLayer, CellLayer
 from slideviz.view.layer_points import PointLayer
 from slideviz.view.layer_triad import TriadLayer
 from slideviz.view.look import LIGHT, Look
 from slideviz.view.stage import Layer, Stage
 from slideviz.view.state import Session
+from slideviz.view.store import tell_all
 from slideviz.view.surfaces import Surface
+
+NEAR = 8.0
+"""Sizes of a cell that the height of the view shows after flying to it."""
 
 
 class Scene:
@@ -43,10 +52,13 @@ class Scene:
         self.stage = Stage(plotter, look, font_scale)
         self._cells = CellLayer(self.stage)
         self._boundaries = BoundaryLayer(self.stage)
+        self._chosen = ChosenLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
         self.layers: tuple[Layer, ...] = (
             self._cells,
             self._boundaries,
+            self._chosen,
+            MarkLayer(self.stage, self._boundaries),
             self._ghosts,
             CopyLayer(self.stage, self._cells, self._boundaries),
             PointLayer(self.stage),
@@ -99,8 +111,7 @@ class Scene:
         if session.mesh is None or old.mesh is None:
             return
         self.stage.set_colours(session)
-        for layer in self.layers:
-            layer.update(old, session)
+        tell_all((layer.update for layer in self.layers), old, session)
         if old.view.perspective != session.view.perspective:
             self.plotter.camera.parallel_projection = self._parallel()
 
@@ -110,6 +121,11 @@ class Scene:
         self.stage.set_background()
         self._again()
 
+    def set_legend(self, drawn: bool) -> None:
+        """Draw the legend where it is wanted, or leave it to a view beside this one."""
+        self.stage.has_legend = drawn
+        self.resized()
+
     def resized(self) -> None:
         """Put the legend where it belongs in a view of another size."""
         self.eye.shift()
@@ -117,8 +133,7 @@ class Scene:
 
     def _again(self) -> None:
         if self.session.mesh is not None:
-            for layer in self.layers:
-                layer.update(self.session, self.session)
+            tell_all((layer.update for layer in self.layers), self.session, self.session)
 
     # Ghosts -----------------------------------------------------------------------------
 
@@ -165,3 +180,44 @@ class Scene:
         if drawn[0].surface.facets.shape[1] == 2:
             return pick.nearest_line(self.plotter, x, y, drawn)
         return pick.front_surface(self.plotter, x, y, drawn)
+
+    def pick_cell(self, x: float, y: float) -> int | None:
+        """Return the cell at a pixel counted from the lower left, or None.
+
+        In 3D it is the one whose side is in front. While a range chooses cells, only these.
+        """
+        session = self.session
+        if session.mesh is None or session.frame is None:
+            return None
+        if session.mesh.dim == 2:
+            values = self.stage.values(session)
+            if session.view.threshold is not None:
+                chosen = chosen_cells(values, session.view.threshold)
+                some = np.full(len(values), np.nan)
+                some[chosen] = values[chosen]
+                values = some
+            at = pick_cell.on_plane(self.plotter, x, y)
+            return cell_at(session.frame.mesh, *at, values)
+        return pick_cell.front_cell(self.plotter, x, y, self._pickable())
+
+    def _pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""
+        if self._chosen.cells is not None:
+            return [(self._chosen.actor, self._chosen.owner)] if len(self._chosen.cells) else []
+        hidden = self.session.view.hidden
+        shown = [
+            (one.actor, one.surface.owner) for name, one in self.drawn.items() if name not in hidden
+        ]
+        if self._cells.actor is not None:
+            owner = self._cells.shape.cell_data["vtkOriginalCellIds"]
+            shown.append((self._cells.actor, np.asarray(owner)))
+        return shown
+
+    def fly_to(self, cell: int) -> None:
+        """Look at a cell of the frame that is shown, from the present side and near."""
+        mesh = self.session.frame.mesh if self.session.frame is not None else None
+        if mesh is None or not 0 <= cell < len(mesh.cells):
+            return
+        middle, size = surroundings(mesh, cell)
+        depth = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+        self.eye.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)
