@@ -59,6 +59,14 @@ def test_quiet_and_without_pictures(square, tmp_path, capsys):
     assert (row["method"], row["periodic"], row["steps_made"]) == ("ps", "moving", "2")
 
 
+def test_other_methods_are_compared_too(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "idw,elastic,ps", "--periodic", "moving"]
+    assert run([*argv, "--steps", "2", "-o", str(out), "--no-pictures"]) == 0
+    assert [row["method"] for row in table(out) if row["min"]] == ["idw", "elastic", "ps"]
+    assert "inverse distance" in (out / "by_step_02_steps.svg").read_text()
+
+
 def test_the_default_folder_is_named_after_the_case(square, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     argv = ["compare", str(square), "--methods", "none", "--periodic", "none", "--steps", "1"]
