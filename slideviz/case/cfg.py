@@ -6,7 +6,7 @@ Everything that a file has wrong is reported at once. Paths in it are relative t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -46,10 +46,11 @@ def read_case(path: Path) -> Case:
     return case.change(source=path, warnings=warnings + remarks)
 
 
-def write_case(path: Path, case: Case) -> None:
+def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
     """Write a case file that ``read_case`` reads back without loss.
 
     Files below, or near, its folder are named relative to it, so that folders can be moved.
+    Remarks, of one line each, stand at its top as comments.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def write_case(path: Path, case: Case) -> None:
     """
     folder = Path(os.path.realpath(path.parent))
     named = _with_paths(case, lambda file: _to_folder(file, folder))
-    text = _text(named, path)
+    text = "".join(f"% {remark}\n" for remark in remarks) + _text(named, path)
     # Whatever is saved can be opened again: better no file than one that has to be mended.
     again, problems, _ = _parsed(path, text)
     if not problems and again.change(source=case.source, warnings=case.warnings) != named:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import sys
+import tempfile
 from importlib import import_module
 from pathlib import Path
 
-from qtpy.QtCore import QCoreApplication, Qt, QTimer
+from qtpy.QtCore import QCoreApplication, QStandardPaths, Qt, QTimer
 from qtpy.QtWidgets import QApplication
 
+from slideviz.gui.faults import caught, crash_log
 from slideviz.gui.icons import logo
 from slideviz.gui.window import MainWindow
 
 WARM_UP_MS = 300
 """The window is drawn first: compilation slows everything down a little."""
 
-log = logging.getLogger("slideviz")
+SWITCH_S = 0.001
+"""How long a thread may keep the interpreter to itself when another wants it."""
 
 
 def launch(path: Path | None = None, run: bool = False) -> int:
@@ -37,22 +41,40 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     app = QApplication.instance() or QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")
     app.setWindowIcon(logo())
-    window = MainWindow()
-    previous = sys.excepthook
-    sys.excepthook = lambda kind, error, trace: _unexpected(window, kind, error, trace)
+    places = QStandardPaths.StandardLocation
+    crashes = _folder(places.CacheLocation) / "crashes"
+    with crash_log(crashes):
+        window = MainWindow(kept=_folder(places.AppDataLocation) / "sessions")
+        with caught(window.faults):
+            be_quick()
+            window.show()
+            window.restore.look(crashes)
+            QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
+            if path is not None:
+                QTimer.singleShot(0, lambda: window.files.open_path(path))
+                if run:
+                    QTimer.singleShot(100, lambda: _run_when_read(window))
+            code = int(app.exec())
+    if window.left_behind:
+        # A library still computes in a thread that cannot be stopped: no tidying up under it.
+        logging.shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
+
+
+def be_quick() -> None:
+    """Set Python up for a window that must answer while other threads compute."""
     # The modules live as long as the window, and need not be searched for garbage.
     gc.collect()
     gc.freeze()
-    window.show()
-    QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
-    if path is not None:
-        QTimer.singleShot(0, lambda: window.files.open_path(path))
-        if run:
-            QTimer.singleShot(100, lambda: _run_when_read(window))
-    try:
-        return int(app.exec())
-    finally:
-        sys.excepthook = previous
+    # A picture asks for the interpreter a dozen times; 5 ms each would be seen.
+    sys.setswitchinterval(SWITCH_S)
+
+
+def _folder(place: QStandardPaths.StandardLocation) -> Path:
+    return Path(QStandardPaths.writableLocation(place) or tempfile.gettempdir())
 
 
 def _run_when_read(window: MainWindow) -> None:
@@ -61,12 +83,3 @@ def _run_when_read(window: MainWindow) -> None:
         QTimer.singleShot(100, lambda: _run_when_read(window))
     elif window.run_panel.run.isEnabled():
         window.start_run()
-
-
-def _unexpected(window: MainWindow, kind, error, trace) -> None:
-    """Tell of an error that nobody caught; the window goes on."""
-    if issubclass(kind, KeyboardInterrupt):
-        QApplication.quit()
-        return
-    log.error("unexpected", exc_info=(kind, error, trace))
-    window.banner.tell_error(error.with_traceback(trace))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-import traceback
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from qtpy.QtCore import Qt, Signal
@@ -28,7 +28,12 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.errors import SlidevizError
+from slideviz.gui.faults import details_of
 
+_WORTH = {
+    "case": "The case repeats the result exactly.",
+    "mesh": "The mesh of the last step goes to a file of its own.",
+}
 PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
 
@@ -70,20 +75,31 @@ def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path |
     return path
 
 
-def ask_unsaved(parent: QWidget, what: str) -> str:
-    """Return ``save``, ``discard`` or ``cancel`` for changes that would be lost."""
+def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",)) -> str:
+    """Return ``case`` or ``mesh`` to save it, ``discard`` or ``cancel``, for what would be lost.
+
+    Parameters
+    ----------
+    what : str
+        What is unsaved, in a sentence.
+    can_save : sequence of {"case", "mesh"}
+        What can be saved now.
+    """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle("Unsaved changes")
     box.setText(what)
-    box.setInformativeText("Save the case first? It repeats the result exactly.")
-    save = box.addButton("Save case…", QMessageBox.ButtonRole.AcceptRole)
-    discard = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
-    box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
-    box.setDefaultButton(save)
+    box.setInformativeText(" ".join(_WORTH[name] for name in can_save))
+    buttons = {
+        name: box.addButton(f"Save {name}…", QMessageBox.ButtonRole.AcceptRole) for name in can_save
+    }
+    buttons["discard"] = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
+    buttons["cancel"] = box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
+    box.setEscapeButton(buttons["cancel"])
+    box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
     box.exec()
     clicked = box.clickedButton()
-    return "save" if clicked is save else "discard" if clicked is discard else "cancel"
+    return next((name for name, button in buttons.items() if button is clicked), "cancel")
 
 
 def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
@@ -187,14 +203,21 @@ class Banner(QFrame):
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.details = QPushButton("Details…")
         self.details.clicked.connect(self._show_details)
+        self.copy = QPushButton("Copy details")
+        self.copy.setToolTip("Copy the message with its trace, versions and platform.")
+        self.copy.clicked.connect(lambda: QApplication.clipboard().setText(self._full))
         close = QToolButton()
         close.setText("✕")
         close.setToolTip("Close the message")
-        close.clicked.connect(self.hide)
+        close.clicked.connect(self._closed)
         row.addWidget(self.text, 1)
         row.addWidget(self.details)
+        row.addWidget(self.copy)
         row.addWidget(close)
+        self.answers: dict[str, QPushButton] = {}
+        self._later: Callable[[], object] | None = None
         self._full = ""
+        self._brief = ""
         self.hide()
 
     def tell(self, text: str, full: str = "", calm: bool = True) -> None:
@@ -204,9 +227,11 @@ class Banner(QFrame):
         self.style().polish(self)
         lines = text.splitlines() or [""]
         brief = "\n".join(lines[:4]) + ("\n…" if len(lines) > 4 else "")
-        self.text.setText(html.escape(brief, quote=False).replace("\n", "<br>"))
+        self._brief = html.escape(brief, quote=False).replace("\n", "<br>")
+        self.text.setText(self._brief)
         self._full = full or (text if len(lines) > 4 else "")
         self.details.setVisible(bool(self._full))
+        self.copy.setVisible(bool(full))
         self.show()
         self.shown.emit(text)
 
@@ -214,8 +239,42 @@ class Banner(QFrame):
         """Show what an error means; the trace is behind “Details” if it was not expected."""
         full = ""
         if not isinstance(error, SlidevizError):
-            full = "".join(traceback.format_exception(error))
+            full = details_of(error)
         self.tell(message_of(error), full, calm=False)
+
+    def ask(
+        self,
+        text: str,
+        answers: Mapping[str, Callable[[], object]],
+        full: str = "",
+        later: Callable[[], object] | None = None,
+    ) -> None:
+        """Show a question with a button for each answer; ``later`` when it is closed instead."""
+        self._forget_answers()
+        for name, function in answers.items():
+            button = QPushButton(name)
+            button.clicked.connect(lambda _=False, function=function: function())
+            self.answers[name] = button
+            self.layout().insertWidget(self.layout().count() - 1, button)
+        self._later = later
+        self.tell(text, full)
+
+    def _forget_answers(self) -> None:
+        for button in self.answers.values():
+            self.layout().removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        self.answers = {}
+
+    def _closed(self) -> None:
+        later, self._later = self._later, None
+        self.hide()
+        if later is not None:
+            later()
+
+    def count(self, times: int) -> None:
+        """Show how often what the message tells has happened."""
+        self.text.setText(f"{self._brief} <i>({times:,} times)</i>")
 
     def _show_details(self) -> None:
         self.dialog = DetailsDialog(self, self._full)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
-from qtpy.QtCore import QObject, QSettings, QStandardPaths
+from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 from qtpy.QtWidgets import QDialog
 
 from slideviz.errors import SlidevizError
@@ -29,6 +30,12 @@ class Files(QObject):
         self.settings = settings
         self.samples = known_samples()
         self._saved_to: Path | None = None
+        self.saving = False
+        self.after_save: Callable[[], object] | None = None
+        window.running.ended.connect(self._job_ended)
+
+    def _job_ended(self) -> None:
+        self.saving = False
 
     # Open ------------------------------------------------------------------------------
 
@@ -57,7 +64,7 @@ class Files(QObject):
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
         """Open a mesh or case in the background, unless the user would rather keep what is."""
-        if self.may_go_on():
+        if self.may_go_on(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
             self.window.start_job(f"Opening {path.name}", self._opened, jobs.open_file, path, zone)
 
@@ -93,19 +100,36 @@ class Files(QObject):
             session.path, mesh.dim, len(mesh.cells), len(mesh.points), len(mesh.markers),
         )  # fmt: skip
 
-    def may_go_on(self) -> bool:
-        """Ask about unsaved changes; return whether they may be dropped or were saved."""
-        session = self.window.store.session
-        what = []
+    def may_go_on(self, again: Callable[[], object]) -> bool:
+        """Ask about unsaved changes; return whether they may be dropped or were saved.
+
+        ``again`` is called when a mesh was saved, in the background, so that the answer may be
+        another one.
+        """
+        while unsaved := self._unsaved():
+            text = " and ".join(unsaved.values())
+            can_save = [name for name in unsaved if name in ("case", "mesh")]
+            answer = dialogs.ask_unsaved(self.window, f"{text[0].upper()}{text[1:]}.", can_save)
+            if answer == "discard":
+                return True
+            if answer == "mesh":
+                self.save_mesh(last=True, then=again)
+                return False
+            if answer == "cancel" or not self.save_case():
+                return False
+        return True
+
+    def _unsaved(self) -> dict[str, str]:
+        """Return what would be lost, in words, by what it is."""
+        session, unsaved = self.window.store.session, {}
         if session.unsaved_case:
-            what.append("the case has changes")
+            unsaved["case"] = "the case has changes"
         if session.unsaved_mesh:
-            what.append("the deformed mesh has not been saved")
-        if not what:
-            return True
-        text = " and ".join(what)
-        answer = dialogs.ask_unsaved(self.window, f"{text[0].upper()}{text[1:]}.")
-        return answer == "discard" or (answer == "save" and self.save_case())
+            run = session.run_shown
+            # While it goes on there is no last step to save.
+            name = "mesh" if run.end and not self.window.runner.busy else "run"
+            unsaved[name] = "the deformed mesh has not been saved"
+        return unsaved
 
     # Save ------------------------------------------------------------------------------
 
@@ -114,10 +138,13 @@ class Files(QObject):
         path = session.path or session.case.source
         return path.stem if path is not None else "mesh"
 
-    def save_mesh(self) -> None:
-        """Ask for a name and write the mesh of the step that is shown."""
+    def save_mesh(self, last: bool = False, then: Callable[[], object] | None = None) -> None:
+        """Ask for a name and write the mesh of the step that is shown, or of the last.
+
+        ``then`` is called when it is written.
+        """
         session = self.window.store.session
-        frame = session.frame
+        frame = session.frames[-1] if last and session.frames else session.frame
         if frame is None or self.window.runner.busy:
             return
         step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
@@ -131,6 +158,7 @@ class Files(QObject):
             return
         self.settings.setValue("folder", str(path.parent))
         last = frame is session.frames[-1]
+        self.saving, self.after_save = True, then
         self.window.start_job(
             f"Saving {path.name}",
             lambda saved: self._mesh_saved(saved, last),
@@ -145,6 +173,8 @@ class Files(QObject):
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
         self.window.say(f"Saved {path}")
+        if self.after_save is not None:
+            QTimer.singleShot(0, self.after_save)
 
     def save_case(self) -> bool:
         """Ask for a name and write the case; return whether it was written."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import logging
 
-from qtpy.QtCore import QObject, Signal
+from qtpy.QtCore import QObject, Qt, Signal
 from qtpy.QtGui import QFontDatabase
 from qtpy.QtWidgets import QPlainTextEdit
+
+LOGGERS = ("slideviz", "py.warnings")
+"""Whose lines are shown: ours, those of Qt and VTK below it, and Python's warnings."""
 
 
 class _Bridge(QObject):
@@ -20,13 +23,24 @@ class LogHandler(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self.bridge = _Bridge()
+        self._last: tuple[int, str] = (0, "")
+        self._repeats = 0
         self.setFormatter(logging.Formatter("%(asctime)s  %(levelname)-7s %(message)s", "%H:%M:%S"))
 
     def emit(self, record: logging.LogRecord) -> None:
         """Pass one line on."""
+        line = self.format(record)
+        # What a library says for every picture it draws would hide everything else.
+        what, self._last = self._last, (record.levelno, record.getMessage())
+        if what == self._last:
+            self._repeats += 1
+            return
+        repeats, self._repeats = self._repeats, 0
         # The window may be gone when the thread that logs is not yet.
         with contextlib.suppress(RuntimeError):
-            self.bridge.wrote.emit(self.format(record))
+            if repeats:
+                self.bridge.wrote.emit(f"          … {repeats} times more")
+            self.bridge.wrote.emit(line)
 
 
 class LogPanel(QPlainTextEdit):
@@ -39,12 +53,15 @@ class LogPanel(QPlainTextEdit):
         self.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.handler = LogHandler()
-        self.handler.bridge.wrote.connect(self.appendPlainText)
+        # In a turn of its own: what Qt complains of in the middle of something comes here too.
+        self.handler.bridge.wrote.connect(self.appendPlainText, Qt.ConnectionType.QueuedConnection)
         logger = logging.getLogger("slideviz")
-        logger.addHandler(self.handler)
+        for name in LOGGERS:
+            logging.getLogger(name).addHandler(self.handler)
         if logger.level == logging.NOTSET:
             logger.setLevel(logging.INFO)
 
     def detach(self) -> None:
         """Stop listening to the log."""
-        logging.getLogger("slideviz").removeHandler(self.handler)
+        for name in LOGGERS:
+            logging.getLogger(name).removeHandler(self.handler)

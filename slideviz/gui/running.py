@@ -79,10 +79,10 @@ class Running(QObject):
         if self.runner.busy:
             self.runner.cancel()
 
-    def close(self) -> None:
-        """End the job; nothing is signalled any more."""
+    def close(self) -> bool:
+        """End the job; nothing is signalled any more. Return whether its thread has ended."""
         self._next = None
-        self.runner.close()
+        return self.runner.close()
 
     def _end(self, how: str) -> None:
         self._finish = None

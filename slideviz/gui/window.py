@@ -12,11 +12,14 @@ from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidge
 
 from slideviz.gui import theme
 from slideviz.gui.actions import Actions
+from slideviz.gui.autosave import Autosave
 from slideviz.gui.clash import ClashWatch
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.docks import Docks
+from slideviz.gui.faults import Faults
 from slideviz.gui.files import Files
 from slideviz.gui.player import Player
+from slideviz.gui.restore import Restore
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewing import Viewing
@@ -37,9 +40,16 @@ class MainWindow(QMainWindow):
         Where recent files, theme and layout are kept.
     multi_samples : int
         Anti-aliasing of the view; 0 is the fastest.
+    kept : Path, optional
+        The folder where the session is kept in case the program ends badly; nowhere without it.
     """
 
-    def __init__(self, settings: QSettings | None = None, multi_samples: int = 4) -> None:
+    def __init__(
+        self,
+        settings: QSettings | None = None,
+        multi_samples: int = 4,
+        kept: Path | None = None,
+    ) -> None:
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")
         self.setObjectName("slideviz")
@@ -48,9 +58,13 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self.store = Store()
         self.banner = Banner()
+        self.offer = Banner()
+        self.faults = Faults(self.banner, self)
+        self.store.failed = self.faults.tell
         self.running = Running(self.store, self.banner, self)
         self.files = Files(self, self.settings)
         self._closed = False
+        self.left_behind = False
         self._make_centre(multi_samples)
         self.docks_ = Docks(self)
         self._make_status()
@@ -63,6 +77,7 @@ class MainWindow(QMainWindow):
         self.clash_watch = ClashWatch(self.store, self)
         self.warm_up = WarmUp(self)
         self.warm_up.compiling.connect(self.preparing.setVisible)
+        self._keep_session(kept)
         self.sync_actions()
 
     # Parts -----------------------------------------------------------------------------
@@ -73,6 +88,7 @@ class MainWindow(QMainWindow):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.banner)
+        column.addWidget(self.offer)
         stack = QWidget()
         grid = QGridLayout(stack)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -157,6 +173,13 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(geometry)
         if state is None or not self.restoreState(state):
             self.docks_.share_room()
+
+    def _keep_session(self, folder: Path | None) -> None:
+        self.autosave: Autosave | None = None
+        self.restore: Restore | None = None
+        if folder is not None:
+            self.autosave = Autosave(self.store, folder, lambda: self.scene.eye.place, self)
+            self.restore = Restore(self, self.offer, self.autosave)
 
     def restore_layout(self) -> None:
         """Put every panel back to where it was at first."""
@@ -280,17 +303,25 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event) -> None:
         if not self._closed:
-            if not self.files.may_go_on():
+            if self.files.saving:
+                self.say("The window closes when the mesh is saved")
+                self.files.after_save = self.close
+                event.ignore()
+                return
+            if not self.files.may_go_on(self.close):
                 event.ignore()
                 return
             self._closed = True
             self.settings.setValue("geometry", self.saveGeometry())
             self.settings.setValue("state", self.saveState())
+            self.hide()
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
             self.warm_up.close()
             self.clash_watch.close()
-            self.running.close()
+            self.left_behind = not self.running.close()
+            if self.autosave is not None:
+                self.autosave.close()
             self.docks_.panels["log"].detach()
             self.viewing.close_views()
         super().closeEvent(event)

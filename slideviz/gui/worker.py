@@ -1,23 +1,32 @@
 """Long jobs beside the window: one thread, one job at a time, one end for each.
 
 The sender of the signals lives in the window's thread, so that every slot runs there; the job
-itself runs in an executor and never touches Qt or VTK. What is reported meanwhile goes through a
+itself runs in a thread and never touches Qt or VTK. What is reported meanwhile goes through a
 mailbox: of `Doing` only the newest is delivered, everything else in full.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
+import sys
+import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from threading import Event, Lock
+from threading import Event, Lock, Thread, get_native_id
 from typing import Any
 
-from qtpy.QtCore import QObject, Qt, Signal
+from qtpy.QtCore import QObject, Qt, QTimer, Signal
 
 from slideviz.errors import Cancelled
 from slideviz.view.jobs import Doing
 
+NEWS_S = 0.1
+"""News are not shown more often: each time the whole window goes to the screen again."""
+CLOSING_S = 1.0
+"""How long a window that closes waits for its job."""
+NICENESS = 5
+"""How far a job stands back behind the window where both want the processor."""
 log = logging.getLogger("slideviz")
 
 
@@ -43,34 +52,49 @@ class JobRunner(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix="slideviz")
+        self._thread: Thread | None = None
         self._lock = Lock()
         self._stop = Event()
         self._news: Doing | None = None
+        self._told_s = float("-inf")
         self._items: list[object] = []
         self._end: tuple[str, Any] | None = None
         self._woken = False
+        self._closed = False
         self.busy = False
         self._wake.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def alive(self) -> bool:
+        """Tell whether the thread of a job goes on, whatever the window knows of it."""
+        return self._thread is not None and self._thread.is_alive()
 
     def start(self, function: Callable[..., Any], *values: Any) -> None:
         """Start a job; there must be none."""
         assert not self.busy, "a job is running"
         self.busy = True
         self._stop = Event()
-        self._pool.submit(self._run, self._stop, function, *values)
+        # A daemon: the program must be able to end while a library keeps its thread.
+        self._thread = Thread(
+            target=self._run, args=(self._stop, function, *values), name="slideviz", daemon=True
+        )
+        self._thread.start()
 
     def cancel(self) -> None:
         """Ask the job to end; it does within a second, with ``cancelled``."""
         self._stop.set()
 
-    def close(self) -> None:
-        """End the job and the thread; nothing is signalled any more."""
+    def close(self) -> bool:
+        """End the job; nothing is signalled any more. Return whether its thread has ended."""
         self._stop.set()
+        self._closed = True
         self.blockSignals(True)
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        if self._thread is not None:
+            self._thread.join(CLOSING_S)
+        return not self.alive
 
     def _run(self, stop: Event, function: Callable[..., Any], *values: Any) -> None:
+        _stand_back()
         try:
             end = ("finished", function(*values, self._report, stop.is_set))
         except Cancelled:
@@ -91,17 +115,26 @@ class JobRunner(QObject):
             self._call()
 
     def _call(self) -> None:
-        if not self._woken:
-            self._woken = True
-            self._wake.emit()
+        # The window may be gone when its job is not yet.
+        with contextlib.suppress(RuntimeError):
+            if not self._woken and not self._closed:
+                self._woken = True
+                self._wake.emit()
 
     def _deliver(self) -> None:
+        if self._closed:
+            return
+        wait = self._told_s + NEWS_S - time.monotonic()
         with self._lock:
+            if wait > 0 and self._end is None and not self._items:
+                QTimer.singleShot(round(1000 * wait) + 1, self._deliver)
+                return
             news, self._news = self._news, None
             items, self._items = self._items, []
             end, self._end = self._end, None
             self._woken = False
         if news is not None:
+            self._told_s = time.monotonic()
             self.doing.emit(news)
         if items:
             self.kept.emit(items)
@@ -116,3 +149,13 @@ class JobRunner(QObject):
         else:
             log.debug("a job failed", exc_info=value)
             self.failed.emit(value)
+
+
+def _stand_back() -> None:
+    """Let the window go before this thread, and before those that it starts.
+
+    Without a graphics card the picture is drawn by the same processor that computes.
+    """
+    if sys.platform == "linux":  # only there it is for one thread, not for the whole program
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, get_native_id(), NICENESS)

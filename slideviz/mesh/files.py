@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +115,7 @@ def write(
     mesh: Mesh,
     overwrite: bool = False,
     cell_data: Mapping[str, ArrayLike] | None = None,
+    going_on: Callable[[], object] | None = None,
 ) -> None:
     """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
 
@@ -128,6 +129,9 @@ def write(
         Whether ``path`` may be the file that the mesh was read from.
     cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
         Values on the cells by name; not for SU2, which has no place for them.
+    going_on : callable, optional
+        Called between the blocks of an SU2 file; what it raises stops the writing, and what was
+        at ``path`` stays.
 
     Raises
     ------
@@ -154,6 +158,8 @@ def write(
     with atomic_write(path) as file:
         for block in su2_blocks(mesh):
             file.write(block)
+            if going_on is not None:
+                going_on()
 
 
 def _is_source(path: Path, mesh: Mesh) -> bool:

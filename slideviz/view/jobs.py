@@ -143,8 +143,14 @@ def overall(now: object) -> float:
     return float((step - 1 + inside) / total)
 
 
-def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, _stopped: Stopped) -> Path:
-    """Write the mesh of a frame, with its quality where the format can hold it."""
+def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, stopped: Stopped) -> Path:
+    """Write the mesh of a frame, with its quality where the format can hold it.
+
+    Raises
+    ------
+    Cancelled
+        It was stopped; what was at ``path`` is as before.
+    """
     from slideviz.mesh.files import write
 
     report(Doing(f"Writing {path.name}"))
@@ -152,7 +158,7 @@ def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, _stoppe
     if path.suffix.lower() != ".su2":
         measured = frame.quality
         data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
-    write(path, frame.mesh, overwrite=overwrite, cell_data=data)
+    write(path, frame.mesh, overwrite, data, lambda: require_going(stopped))
     return path
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, get_args
 
 from slideviz.case.model import Case
@@ -62,6 +63,11 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     if "VIEW_SECTIONS" in kept:
         values["sections"] = tuple(_section(text) for text in kept["VIEW_SECTIONS"])
     return replace(view, **values)
+
+
+def restored(session: Session, source: Path | None) -> Session:
+    """Return a session just opened from what was kept of it: it is of ``source``, and unsaved."""
+    return replace(session, case=session.case.change(source=source), saved=Case())
 
 
 def kept_camera(case: Case) -> Camera | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ from slideviz.case.model import Case
 from slideviz.view.state import Guess, Session, ViewState
 
 Listener = Callable[[Session, Session], None]
+Failed = Callable[[Exception], None]
 
 TOGETHER_S = 1.0
 """Changes of one kind that follow each other so closely are undone as one."""
@@ -34,6 +35,26 @@ WORDS: dict[str, str] = {
     "set_view": "view",
 }
 """What the menu calls a change, by the name of its function; others cannot be undone."""
+
+
+def tell_all(
+    functions: Iterable[Callable[..., object]], *values: Any, failed: Failed | None = None
+) -> None:
+    """Call every function with the values, also those after one that raises.
+
+    Its error goes to ``failed``; without that, the first one is raised when all were called.
+    """
+    first: Exception | None = None
+    for function in tuple(functions):
+        try:
+            function(*values)
+        except Exception as error:
+            if failed is not None:
+                failed(error)
+            else:
+                first = first or error
+    if first is not None:
+        raise first
 
 
 @dataclass(frozen=True)
@@ -84,7 +105,8 @@ class Store:
 
     Listeners are called with the old and the new session, in the order in which they came.
     A change made by a listener is told after the present one has been told to everybody, so
-    that nobody hears of the newer one first.
+    that nobody hears of the newer one first. One that raises keeps nobody from hearing: its
+    error goes to ``failed`` or, where that is None, is raised when everybody was told.
 
     Parameters
     ----------
@@ -101,6 +123,7 @@ class Store:
         self._clock = clock
         self._listeners: list[Listener] = []
         self._waiting: list[tuple[Session, Session]] = []
+        self.failed: Failed | None = None
         self._undo: list[_Done] = []
         self._redo: list[_Done] = []
 
@@ -133,13 +156,18 @@ class Store:
         self.session = session
         if len(self._waiting) > 1:
             return
+        first: Exception | None = None
         try:
             while self._waiting:
-                for listener in self._listeners:
-                    listener(*self._waiting[0])
+                try:
+                    tell_all(self._listeners, *self._waiting[0], failed=self.failed)
+                except Exception as error:
+                    first = first or error
                 self._waiting.pop(0)
         finally:
             self._waiting.clear()
+        if first is not None:
+            raise first
 
     # Undo ------------------------------------------------------------------------------
 

@@ -63,7 +63,9 @@ def window(qtbot, settings, monkeypatch):
     # Shortcuts belong to the active window.
     made.activateWindow()
     qtbot.waitUntil(made.isActiveWindow)
-    return made
+    yield made
+    # A listener that raises is told in the banner, and the window goes on: not so a test.
+    assert made.faults.count == 0, made.banner.text.text()
 
 
 @pytest.fixture(scope="session")

@@ -633,7 +633,7 @@ def test_closing_while_running_ends_the_run(ready, answers):
     assert ready.window.close()
     assert len(asked) == 1
     assert not ready.window.isVisible()
-    assert ready.window.runner._pool._shutdown
+    assert not ready.window.runner.alive
 
 
 # Saving -----------------------------------------------------------------------------------
@@ -721,7 +721,7 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
     assert before.std() > 5, "the view still works"
 
 
-@pytest.mark.parametrize("answer", ["cancel", "discard", "save"])
+@pytest.mark.parametrize("answer", ["cancel", "discard", "case"])
 def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, answer):
     opened.role("airfoil", "fixed")
     asked = answers("ask_unsaved", answer)
@@ -729,7 +729,7 @@ def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, ans
     closed = opened.window.close()
     assert closed == (answer != "cancel")
     assert "case has changes" in asked[0][0]
-    assert (tmp_path / "a.cfg").exists() == (answer == "save")
+    assert (tmp_path / "a.cfg").exists() == (answer == "case")
 
 
 def test_nothing_is_asked_when_nothing_changed(opened):

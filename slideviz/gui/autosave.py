@@ -1,0 +1,220 @@
+"""The session is written as a case file now and then, so that a crash costs some seconds of work.
+
+Each window has a file of its own, ``session-PID-N.cfg``, and a lock beside it that the system
+frees when the program ends, however it does. A file that nobody holds is of a session that did
+not end properly. Nothing is ever thrown away unasked: what cannot be read is renamed to
+``….broken``.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+
+from qtpy.QtCore import QLockFile, QObject, QTimer
+
+from slideviz.case.cfg import write_case
+from slideviz.case.model import Case
+from slideviz.errors import SlidevizError
+from slideviz.gui.worker import JobRunner
+from slideviz.view.keep import Camera, keep_view
+from slideviz.view.state import Session
+from slideviz.view.store import Store
+
+DELAY_MS = 5000
+"""The session is written so long after the first change that is not in the file yet."""
+HALF_WRITTEN_S = 60.0
+"""A temporary file older than this is not being written any more."""
+SOURCE = "saved as: "
+_numbers = count(1)
+log = logging.getLogger("slideviz")
+
+
+class Autosave(QObject):
+    """Writes the session of a window after each change, and removes it at a clean end.
+
+    Parameters
+    ----------
+    store : Store
+    folder : Path
+        Where the files are, of all windows; made when needed.
+    camera : callable
+        Tells from where the mesh is looked at.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        folder: Path,
+        camera: Callable[[], Camera | None],
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.store = store
+        self.path = folder / f"session-{os.getpid()}-{next(_numbers)}.cfg"
+        self._camera = camera
+        self._lock: QLockFile | None = None
+        self._written: tuple[object, ...] = ()
+        self._asked: tuple[object, ...] = ()
+        self._replaces: list[Found] = []
+        self._runner = JobRunner(self)
+        self._runner.finished.connect(self._done)
+        self._runner.failed.connect(self._failed)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(DELAY_MS)
+        self._timer.timeout.connect(self.save)
+        store.listen(self._changed)
+
+    def save(self) -> None:
+        """Write the session in the background, if it is not written as it is."""
+        session = self.store.session
+        if self._runner.busy:
+            self._timer.start()
+        elif session.mesh is not None and _key(session) != self._written:
+            self._asked = _key(session)
+            case = keep_view(session, self._camera())
+            self._runner.start(self._write, case)
+
+    def replace(self, found: Found) -> None:
+        """Remove a session of an earlier start as soon as this one, which is the same, is safe."""
+        self._replaces.append(found)
+        self._written = ()
+        self.save()
+
+    def close(self) -> None:
+        """End; the file is not needed any more."""
+        self._timer.stop()
+        self._runner.close()
+        self.path.unlink(missing_ok=True)
+        if self._lock is not None:
+            self._lock.unlock()
+
+    def _changed(self, _old: Session, new: Session) -> None:
+        # Not put off by the next change: somebody who never rests is saved as well.
+        if new.mesh is not None and _key(new) != self._written and not self._timer.isActive():
+            self._timer.start()
+
+    def _write(self, case: Case, _report: object, _stopped: object) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        if self._lock is None:
+            self._lock = _lock(self.path)
+            self._lock.tryLock(0)
+        remarks = () if case.source is None else (f"{SOURCE}{case.source}",)
+        write_case(self.path, case, remarks)
+
+    def _done(self, _: object) -> None:
+        self._written = self._asked
+        for found in self._replaces:
+            found.remove()
+        self._replaces.clear()
+        self._changed(self.store.session, self.store.session)
+
+    def _failed(self, error: Exception) -> None:
+        # Tried again with the next change; the log shows the same line once.
+        log.warning("the session could not be kept for a restart: %s", error)
+
+
+def _key(session: Session) -> tuple[object, ...]:
+    return session.mesh, session.case, session.view.style
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The session of a program that did not end properly.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    case : Case
+        What is in it.
+    source : Path or None
+        The case file that it was opened from or saved to.
+    lock : QLockFile
+        Held, so that no other window offers it too.
+    """
+
+    path: Path
+    case: Case
+    source: Path | None
+    lock: QLockFile
+
+    @property
+    def when(self) -> datetime:
+        """Return when it was written."""
+        return datetime.fromtimestamp(self.path.stat().st_mtime)
+
+    def remove(self) -> None:
+        """Throw it away."""
+        self.path.unlink(missing_ok=True)
+        self.lock.unlock()
+
+
+def find_sessions(folder: Path) -> tuple[list[Found], list[str]]:
+    """Return the sessions that nobody holds, newest first, and what is wrong with others.
+
+    Those that cannot be read are renamed to ``….broken`` and told of, in a sentence each.
+    """
+    found, problems = [], []
+    for path in sorted(folder.glob("session-*.cfg"), key=_modified, reverse=True):
+        lock = _lock(path)
+        if not lock.tryLock(0):
+            continue
+        try:
+            case = Case.read(path)
+            if case.mesh_file is None:
+                raise SlidevizError(f"{path.name}: it names no mesh")
+            found.append(Found(path, case, _source(path), lock))
+        except (SlidevizError, OSError) as problem:
+            problems.append(_put_aside(path, str(problem).splitlines()[0]))
+            lock.unlock()
+    left = [path for path in folder.glob(".slideviz-*.tmp") if _is_left(path)]
+    problems += [_put_aside(path, "it was being written when the program ended") for path in left]
+    return found, problems
+
+
+def _is_left(path: Path) -> bool:
+    return time.time() - _modified(path) > HALF_WRITTEN_S
+
+
+def _lock(path: Path) -> QLockFile:
+    lock = QLockFile(str(path.with_suffix(".lock")))
+    # A lock is free when its program is gone, not when it is old.
+    lock.setStaleLockTime(0)
+    return lock
+
+
+def _modified(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _source(path: Path) -> Path | None:
+    """Return the case file that the remark in a session names."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        _, found, name = line.partition(f"% {SOURCE}")
+        if found:
+            return Path(name)
+    return None
+
+
+def _put_aside(path: Path, why: str) -> str:
+    """Rename a file that cannot be used, and return what to say."""
+    kept = path.with_name(f"{path.name.lstrip('.')}.broken")
+    number = count(2)
+    while kept.exists():
+        kept = path.with_name(f"{path.name.lstrip('.')}.{next(number)}.broken")
+    try:
+        path.rename(kept)
+    except OSError as problem:
+        return f"{path}: a kept session cannot be read ({why}), nor renamed ({problem})."
+    return f"A kept session cannot be read ({why}); it is still there, as {kept}."

@@ -1,0 +1,96 @@
+"""Offers the sessions that did not end properly, in a banner, one after the other."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from qtpy.QtCore import QObject
+
+from slideviz.gui.autosave import Autosave, Found, find_sessions
+from slideviz.gui.dialogs import Banner
+from slideviz.gui.faults import old_crashes
+from slideviz.view import jobs
+from slideviz.view.keep import restored
+
+log = logging.getLogger("slideviz")
+
+
+class Restore(QObject):
+    """What a window does about sessions of earlier starts.
+
+    Parameters
+    ----------
+    window : MainWindow
+        Where a session is opened.
+    banner : Banner
+        Where they are offered: one of its own, which no other message takes away.
+    autosave : Autosave
+        Goes on with what is restored.
+    """
+
+    def __init__(self, window, banner: Banner, autosave: Autosave) -> None:
+        super().__init__(window)
+        self.window = window
+        self.banner = banner
+        self.autosave = autosave
+        self.waiting: list[Found] = []
+        # Held while this window lasts: what was not wanted now is offered at the next start.
+        self._later: list[Found] = []
+        self._trace = ""
+
+    def look(self, crashes: Path | None = None) -> None:
+        """Look for sessions, and for traces of crashes in a folder, and offer what is found."""
+        self.waiting, problems = find_sessions(self.autosave.path.parent)
+        for path in old_crashes(crashes) if crashes is not None else ():
+            log.warning("slideviz crashed; where it was is in %s", path)
+            self._trace = path.read_text(encoding="utf-8", errors="replace")
+        for problem in problems:
+            log.warning("%s", problem)
+        if problems:
+            self.window.banner.tell("\n".join(problems), calm=False)
+        self._offer()
+
+    def _offer(self) -> None:
+        if not self.waiting:
+            self.banner.hide()
+            return
+        found = self.waiting[0]
+        more = len(self.waiting) - 1
+        text = (
+            f"slideviz did not end properly. Restore the session of {_time_text(found.when)} "
+            f"with {found.case.mesh_file.name}?" + (f" ({more} more)" if more else "")
+        )
+        answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
+        self.banner.ask(text, answers, self._trace, later=self._put_off)
+
+    def answer(self, restore: bool) -> None:
+        """Open the session that is offered, or throw it away; then offer the next."""
+        found = self.waiting[0]
+        if not restore:
+            self.waiting.pop(0).remove()
+        elif self.window.files.may_go_on(partial(self.answer, True)):
+            self._later.append(self.waiting.pop(0))
+            done = partial(self._opened, found)
+            name = found.case.mesh_file.name
+            self.window.start_job(f"Restoring {name}", done, jobs.open_file, found.path, None)
+        self._offer()
+
+    def _put_off(self) -> None:
+        self._later += self.waiting
+        self.waiting = []
+
+    def _opened(self, found: Found, opened: jobs.Opened) -> None:
+        session = restored(opened.session, found.source)
+        self.window.show_opened(replace(opened, session=session))
+        self.autosave.replace(found)
+        self.window.say("Session restored; steps are computed again by a run")
+        log.info("restored the session of %s", _time_text(found.when))
+
+
+def _time_text(when: datetime) -> str:
+    """Return a time as people say it: the day only when it is not today."""
+    return f"{when:%H:%M}" if when.date() == datetime.now().date() else f"{when:%Y-%m-%d %H:%M}"
