@@ -47,6 +47,9 @@ LABELS: dict[What, str] = {
 _BAND, _STEMS = 0.13, 0.07
 """Width of the strip left of 0 where inverted cells are counted, and of the part for counts."""
 
+_CROWDED = 300
+"""Selections of more cycles than this get a thin line."""
+
 
 @dataclass(frozen=True, eq=False)
 class QualityRun:
@@ -266,7 +269,7 @@ def convergence(
 ) -> None:
     """Draw the error of greedy selections against control nodes, on a logarithmic axis.
 
-    Each tolerance is a thin line; a marker shows where a level begins.
+    Each tolerance is a thin line; markers show where levels begin, about ten of many.
     """
     dress(axes, style, "control nodes [-]", f"largest error [{unit}]")
     axes.set_yscale("log")
@@ -275,8 +278,11 @@ def convergence(
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
         line = _line(style, place(run.series, index))
-        line["markevery"] = np.flatnonzero(first[shown]).tolist()
+        begins = np.flatnonzero(first[shown])
+        line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()
         line["markersize"] = 3.5
+        if len(run.error) > _CROWDED:
+            line["linewidth"] = 0.5 * style.width
         axes.plot(run.control_nodes[shown], run.error[shown], label=run.label, **line)
         if run.tolerance and run.tolerance not in told:
             told.add(run.tolerance)

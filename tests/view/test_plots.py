@@ -102,6 +102,14 @@ def test_convergence_marks_levels_and_tolerance(axes):
     assert low < 1e-2 / 2
 
 
+def test_of_many_levels_some_are_marked(axes):
+    count = np.arange(400)
+    convergence(axes, [GreedyRun("a", count, np.ones(400), count)])
+    (line,) = axes.lines
+    assert len(line.get_markevery()) == 10
+    assert line.get_linewidth() < PRINT.width
+
+
 def outcomes():
     return [
         Outcome("ps", 20, 0.5, 0.7, 0, 2.0),
