@@ -65,10 +65,9 @@ def weighted_means(
     tick
         Called between chunks with the fraction done; may raise to stop.
     """
-    rotational = basis.period > 0
     # Only lengths are scaled: sine and cosine of the angle are none.
     scale = np.full((4, 1), 1.0 / basis.radius)
-    if rotational:
+    if basis.period > 0:
         scale[1:3] = 1.0
     x, c = _rows(targets, 4) * scale, _rows(sources, 4) * scale
     v, g = _rows(data[0].T, 3), np.ascontiguousarray(data[1], float)
@@ -79,7 +78,7 @@ def weighted_means(
         part = np.ascontiguousarray(x[:, start : start + size])
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
-            if rotational:
+            if basis.period > 0:
                 weighting.weigh_rotational(part, c, v, g, power, basis.half, result)
             else:
                 weighting.weigh(part, c, v, g, power, result)

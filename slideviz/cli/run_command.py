@@ -153,8 +153,9 @@ def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> N
     from slideviz.cli.report import quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
-    print(f"{report['case']}: {report['steps']} steps, sliding {report['sliding']}, ", end="")
-    print(f"periodic {report['periodic']}")
+    method = "" if report["method"] == "rbf" else f"method {report['method']}, "
+    print(f"{report['case']}: {report['steps']} steps, {method}", end="")
+    print(f"sliding {report['sliding']}, periodic {report['periodic']}")
     print(quality_lines(found))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
@@ -187,6 +188,8 @@ def _inverted_sentence(mesh: Mesh, found: Quality, report: dict) -> str:
 def _advice(report: dict) -> str:
     """Return what this case has not tried yet."""
     ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
+    if report["method"] != "rbf":
+        ideas.append("METHOD= rbf")
     if report["sliding"] == "none":
         ideas.append("SLIDING_MODE= ps or ds")
     if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":

@@ -105,3 +105,13 @@ def test_every_sample_runs_with_every_method_and_reports_valid_json(tmp_path, na
         assert found["control_nodes"][0] <= boundary
         assert found["max_error"] < 1e-9
     assert np.isfinite(sv.read(tmp_path / "out.su2").points).all()
+
+
+def test_the_terminal_names_the_method_and_what_may_help(tmp_path, capsys):
+    write_sample("square", tmp_path, 10)
+    words = ["run", str(tmp_path / "square.cfg"), "--set", "METHOD=idw", "--set", "STEPS=1"]
+    run([*words, "-o", str(tmp_path / "out.su2")])
+    told = capsys.readouterr()
+    assert "1 steps, method idw, sliding ps, periodic moving" in told.out
+    assert "inverted" in told.err
+    assert "METHOD= rbf" in told.err
