@@ -75,7 +75,9 @@ class CellLayer:
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.look.cell
-        self.stage.edges(self.actor.prop, new.view.edges)
+        inside = looks_inside(new)
+        self.actor.prop.opacity = 0.12 if inside else 1.0
+        self.stage.edges(self.actor.prop, new.view.edges and not inside)
 
 
 class BoundaryLayer:

@@ -24,6 +24,7 @@ from slideviz.view.layer_legend import LegendLayer
 from slideviz.view.layer_mark import MarkLayer
 from slideviz.view.layer_mesh import BoundaryLayer, CellLayer
 from slideviz.view.layer_points import PointLayer
+from slideviz.view.layer_sections import SectionLayer
 from slideviz.view.layer_triad import TriadLayer
 from slideviz.view.look import LIGHT, Look
 from slideviz.view.stage import Layer, Stage
@@ -54,10 +55,12 @@ class Scene:
         self._boundaries = BoundaryLayer(self.stage)
         self._chosen = ChosenLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
+        self.sections = SectionLayer(self.stage)
         self.layers: tuple[Layer, ...] = (
             self._cells,
             self._boundaries,
             self._chosen,
+            self.sections,
             MarkLayer(self.stage, self._boundaries),
             self._ghosts,
             CopyLayer(self.stage, self._cells, self._boundaries),
@@ -167,6 +170,10 @@ class Scene:
         """Make everything fill the view, from the present side, beside the legend's strip."""
         self.eye.fit()
 
+    def sees_all(self) -> bool:
+        """Tell whether nothing of the mesh is outside the view."""
+        return self.eye.sees_all()
+
     def zoom_at(self, x: float, y: float, factor: float) -> None:
         """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
         self.eye.zoom_at(x, y, factor)
@@ -198,7 +205,9 @@ class Scene:
                 values = some
             at = pick_cell.on_plane(self.plotter, x, y)
             return cell_at(session.frame.mesh, *at, values)
-        return pick_cell.front_cell(self.plotter, x, y, self._pickable())
+        # Boundaries in front of a section are glass.
+        cut = pick_cell.front_cell(self.plotter, x, y, self.sections.pickable())
+        return pick_cell.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
 
     def _pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""

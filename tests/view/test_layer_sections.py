@@ -1,0 +1,376 @@
+"""Sections in the scene and laid flat: which cells are drawn, where, and in which colours."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from slideviz.case.samples import sample
+from slideviz.errors import CaseError
+from slideviz.mesh.model import Cells, Mesh
+from slideviz.mesh.quality import quality
+from slideviz.view import changes, section_start
+from slideviz.view.actors import VALUES
+from slideviz.view.copies import find_period, moved
+from slideviz.view.cuts import KEPT, Cuts
+from slideviz.view.flat_scene import FlatScene
+from slideviz.view.layer_mesh import looks_inside
+from slideviz.view.look import INVERTED_COLOUR, LIGHT
+from slideviz.view.pick import to_display
+from slideviz.view.scene import Scene
+from slideviz.view.section import Section
+from slideviz.view.state import Frame
+from slideviz.view.surfaces import find_surfaces
+
+MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=[420, 300])
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture
+def scene(plotter):
+    return Scene(plotter)
+
+
+@pytest.fixture
+def flat_plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=[400, 300])
+    yield plotter
+    plotter.close()
+
+
+@pytest.fixture(scope="module")
+def stator():
+    return sample("stator", size=5000)
+
+
+def opened(scene, mesh, case=None, **view):
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), case)
+    session = changes.set_view(session, **view)
+    scene.open(session, find_surfaces(mesh))
+    return session
+
+
+def stepped(session, points):
+    """Return the session at a step with the nodes at these points."""
+    mesh = session.mesh.with_points(points)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    return changes.add_frames(changes.start_run(session), [frame])
+
+
+def crossing(mesh, axis, at):
+    """Return the cells with nodes on both sides, found one after the other."""
+    found = []
+    for cell in range(len(mesh.cells)):
+        low, high = mesh.cells.offsets[cell : cell + 2]
+        x = mesh.points[mesh.cells.connectivity[low:high], axis]
+        if x.min() < at < x.max():
+            found.append(cell)
+    return np.array(found)
+
+
+def cells_of(scene, name="section:0"):
+    return np.unique(scene.sections.drawn[name].polygons.cells)
+
+
+def colours(plotter):
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True)).astype(int)[..., :3].reshape(-1, 3)
+
+
+def count(plotter, colour, within=14):
+    rgb = np.array(pv.Color(colour).int_rgb)
+    return int((np.abs(colours(plotter) - rgb).max(axis=1) <= within).sum())
+
+
+# In space ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
+    section = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0), whole=whole)
+    opened(scene, cube, sections=(section,), colour_by="size_skew")
+    wanted = crossing(cube, 2, 0.46)
+    assert 0 < len(wanted) < len(cube.cells)
+    assert cells_of(scene).tolist() == wanted.tolist()
+    bounds = scene.plotter.actors["section:0"].bounds
+    assert (bounds[5] - bounds[4] > 1e-3) == whole
+
+
+def test_a_section_has_the_values_of_its_cells(scene, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    one = scene.sections.drawn["section:0"]
+    frame = changes.set_view(session, colour_by="skew")
+    scene.update(frame)
+    wanted = session.first.quality.skew[one.polygons.cells]
+    assert one.shown.mapper.scalar_visibility
+    assert np.array_equal(one.shown.shape.cell_data[VALUES], wanted)
+    scene.update(changes.set_view(frame, colour_by="role"))
+    assert not one.shown.mapper.scalar_visibility
+    assert one.actor.prop.color == pv.Color(LIGHT.cell)
+
+
+def test_a_section_follows_the_step(scene, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    points = cube.points.copy()
+    points[:, 2] = points[:, 2] ** 2
+    later = stepped(session, points)
+    scene.update(later)
+    wanted = crossing(later.frame.mesh, 2, 0.46)
+    assert cells_of(scene).tolist() == wanted.tolist()
+    assert set(wanted) != set(crossing(cube, 2, 0.46))
+    scene.update(changes.show_frame(later, 0))
+    assert cells_of(scene).tolist() == crossing(cube, 2, 0.46).tolist()
+
+
+def test_nothing_is_cut_again_when_only_the_colours_change(scene, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    before = scene.sections.drawn["section:0"].polygons
+    session = changes.set_view(session, colour_by="size", edges=False, colour_range=(0.2, 0.6))
+    scene.update(session)
+    assert scene.sections.drawn["section:0"].polygons is before
+    assert not scene.plotter.actors["section:0"].prop.show_edges
+    session = changes.replace_section(session, 0, section_start.at_position(MIDDLE, 0.7))
+    scene.update(session)
+    assert cells_of(scene).tolist() == crossing(cube, 2, 0.7).tolist()
+
+
+def test_a_section_that_is_hidden_or_removed_is_gone(scene, cube):
+    other = Section("plane", (0.3, 0.0, 0.0), (1.0, 0.0, 0.0), shown=False)
+    session = opened(scene, cube, sections=(MIDDLE, other))
+    assert "section:0" in scene.plotter.actors
+    assert "section:1" not in scene.plotter.actors
+    assert looks_inside(session)
+    session = changes.remove_section(session, 0)
+    scene.update(session)
+    assert not any(name.startswith("section:") for name in scene.plotter.actors)
+    assert not looks_inside(session)
+    session = changes.add_section(session, MIDDLE)
+    scene.update(session)
+    assert cells_of(scene, "section:1").tolist() == crossing(cube, 2, 0.46).tolist()
+    scene.clear()
+    assert not scene.sections.drawn
+
+
+def test_a_section_beside_the_mesh_shows_nothing(scene, cube):
+    away = Section("plane", (0.0, 0.0, 9.0), (0.0, 0.0, 1.0))
+    session = opened(scene, cube, sections=(away,))
+    assert not scene.plotter.actors["section:0"].visibility
+    scene.update(changes.replace_section(session, 0, MIDDLE))
+    assert scene.plotter.actors["section:0"].visibility
+
+
+def test_inverted_cells_are_red_in_a_section(scene, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew", edges=False)
+    scene.look_from("+z")
+    assert count(scene.plotter, INVERTED_COLOUR, 30) == 0
+    points = cube.points.copy()
+    inside = ((points > 0.3) & (points < 0.7)).all(axis=1)
+    points[inside] = 1.0 - points[inside]
+    scene.update(stepped(session, points))
+    assert count(scene.plotter, INVERTED_COLOUR, 30) > 50
+
+
+def test_the_cell_under_the_mouse_is_that_of_the_section(scene, cube):
+    opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    scene.look_from("+z")
+    x, y = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46]]))[0]
+    assert scene.pick_cell(x, y) in crossing(cube, 2, 0.46)
+
+
+def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
+    section = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
+    session = opened(scene, square, sections=(section,), colour_by="size_skew")
+    shown = scene.sections.drawn["section:0"].shown
+    assert shown.shape.n_lines == 4
+    assert not shown.mapper.scalar_visibility
+    assert shown.actor.prop.color == pv.Color(LIGHT.text)
+    whole = changes.replace_section(
+        session, 0, Section("plane", section.origin, section.direction, whole=True)
+    )
+    scene.update(whole)
+    assert cells_of(scene).tolist() == crossing(square, 1, 1.5).tolist()
+    assert shown.mapper.scalar_visibility
+    cylinder = Section("cylinder", radius=1.0)
+    scene.update(changes.add_section(whole, cylinder))
+    assert "section:1" not in scene.plotter.actors
+
+
+def test_neighbours_show_the_section_too(scene, stator):
+    cylinder = Section("cylinder", radius=0.27)
+    plane = Section("plane", (0.27, 0.0, 0.0), (1.0, 0.2, 0.0))
+    session = opened(
+        scene, stator.mesh, stator.case, sections=(cylinder, plane), copies=1, colour_by="size"
+    )
+    base, twin = scene.sections.drawn["section:0"].shown, scene.plotter.actors["section:0:1"]
+    assert twin.GetMapper() is base.mapper
+    pair = find_period(stator.mesh, stator.case)
+    turned = moved(np.asarray(base.shape.points), np.array(twin.user_matrix))
+    angle = np.arctan2(turned[:, 1], turned[:, 0]).mean()
+    own = np.arctan2(*np.asarray(base.shape.points)[:, 1::-1].T).mean()
+    assert angle - own == pytest.approx(pair.angle, rel=1e-6)
+    # A plane along the axis cuts each passage at another place.
+    assert "section:1:1" in scene.sections.drawn
+    assert set(cells_of(scene, "section:1:1")) != set(cells_of(scene, "section:1"))
+    assert len(scene.sections.pickable()) == 2
+    scene.update(changes.set_view(session, copies=0))
+    assert {"section:0", "section:1"} == {
+        name for name in scene.plotter.actors if name.startswith("section:")
+    }
+
+
+# What was cut -----------------------------------------------------------------------------
+
+
+def test_cuts_are_remembered_for_the_frame_only(cube):
+    cuts = Cuts()
+    first = cuts.of(cube, MIDDLE)
+    assert cuts.of(cube, Section("plane", MIDDLE.origin, MIDDLE.direction, name="mine")) is first
+    for z in np.linspace(0.1, 0.2, KEPT):
+        cuts.of(cube, section_start.at_position(MIDDLE, z))
+    assert cuts.of(cube, MIDDLE) is not first
+    shifted = cube.with_points(cube.points + 0.1)
+    assert cuts.of(shifted, MIDDLE).cell_ids.tolist() == crossing(shifted, 2, 0.46).tolist()
+    other = Mesh(cube.points, Cells.from_blocks([(12, cube.cells.by_type[12][1][:5])]))
+    assert cuts.of(other, MIDDLE).cell_ids.max(initial=0) < 5
+
+
+# Where sections start ---------------------------------------------------------------------
+
+
+def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
+    mesh = square.with_points(square.points * (3.0, 1.0))
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    plane = section_start.first_plane(session)
+    assert plane.direction == (1.0, 0.0, 0.0)
+    assert section_start.position(plane) == 6.0
+    assert plane.whole
+
+
+def test_a_first_cylinder_has_the_axis_of_the_period(stator):
+    mesh = stator.mesh
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), stator.case)
+    pair = find_period(mesh, stator.case)
+    cylinder = section_start.first_cylinder(session, pair)
+    assert np.cross(cylinder.direction, (0, 0, 1)) == pytest.approx(0.0)
+    radii = np.hypot(*mesh.points[:, :2].T)
+    assert cylinder.radius == pytest.approx((radii.min() + radii.max()) / 2.0)
+    assert section_start.first_cylinder(session, None).direction == stator.case.axis
+
+
+def test_positions_move_a_plane_along_its_normal():
+    plane = Section("plane", (1.0, 2.0, 3.0), (0.0, 3.0, 4.0))
+    assert section_start.position(plane) == pytest.approx(3.6)
+    there = section_start.at_position(plane, 4.6)
+    assert there.origin == pytest.approx((1.0, 2.6, 3.8))
+    low, high = section_start.span(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
+    assert (low, high) == pytest.approx((0.0, 3.0))
+    with pytest.raises(CaseError, match="radius -1 is not positive"):
+        section_start.at_position(Section("cylinder", radius=1.0), -1.0)
+
+
+def test_a_turned_plane_still_cuts(cube):
+    points = section_start.cell_points(cube)
+    outside = Section("plane", (0.0, 5.0, 0.3), (0.0, 0.0, 1.0))
+    assert section_start.turned(outside, (0.0, 1.0, 0.0), points).origin[1] == pytest.approx(0.5)
+    kept = section_start.turned(MIDDLE, (0.0, 1.0, 1.0), points)
+    assert kept.origin == MIDDLE.origin
+
+
+# Flat -------------------------------------------------------------------------------------
+
+
+def test_a_flat_cylinder_has_z_and_r_theta(scene, flat_plotter, stator):
+    section = Section("cylinder", radius=0.27)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), colour_by="size_skew")
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, section)
+    flat.fit()
+    drawn = scene.sections.drawn["section:0"].polygons
+    assert flat.polygons.cell_ids.tolist() == drawn.cell_ids.tolist()
+    low, high = flat.bounds()
+    assert (low[0], high[0]) == pytest.approx((drawn.points[:, 2].min(), drawn.points[:, 2].max()))
+    angle = np.arctan2(drawn.points[:, 1], drawn.points[:, 0])
+    assert high[1] - low[1] == pytest.approx(0.27 * np.ptp(angle), rel=1e-9)
+    assert [label.short for label in flat.labels] == ["z", "r θ"]
+    across, upright = flat.ranges()
+    assert across[0] < low[0] < high[0] < across[1]
+    assert upright[0] < low[1] < high[1] < upright[1]
+    # The same scale both ways.
+    assert np.ptp(across) / np.ptp(upright) == pytest.approx(400 / 300)
+
+
+def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, flat_plotter, cube):
+    session = opened(scene, cube, sections=(MIDDLE,))
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    assert flat.bounds() is None
+    flat.update(session, MIDDLE)
+    flat.fit()
+    cells = crossing(cube, 2, 0.46)
+    values = session.first.quality.values[cells]
+    assert flat.summary == (
+        f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; {len(cells)} cells cut"
+    )
+    x, y = to_display(flat_plotter, np.array([[0.2, 0.2, 0.0]]))[0]
+    assert flat.cell_at(x, y) in cells
+    assert flat.cell_at(2, 2) is None
+    away = Section("plane", (0.0, 0.0, 9.0), (0.0, 0.0, 1.0))
+    flat.update(session, away)
+    flat.fit()
+    assert flat.summary == "it cuts no cell"
+    assert flat.cell_at(x, y) is None
+
+
+def test_flat_neighbours_lie_one_period_on(scene, flat_plotter, stator):
+    section = Section("cylinder", radius=0.27)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, section)
+    one = flat.polygons.points
+    low, high = flat.bounds()
+    pitch = 0.27 * find_period(stator.mesh, stator.case).period
+    assert high[1] - low[1] == pytest.approx(np.ptp(one[:, 1]) + 2 * pitch)
+    z = float(stator.mesh.points[:, 2].mean())
+    flat.update(session, Section("plane", (0.0, 0.0, z), (0.0, 0.0, 1.0)))
+    twins = {n: a for n, a in flat_plotter.actors.items() if n.startswith("flat:")}
+    assert len(twins) == 2
+    radii = [
+        np.hypot(*moved(flat.polygons.points, np.array(twin.user_matrix))[:, :2].T)
+        for twin in twins.values()
+    ]
+    own = np.hypot(*flat.polygons.points[:, :2].T)
+    assert all(np.allclose(each, own) for each in radii)
+
+
+def test_the_marked_cell_has_a_rim_in_the_flat_view(scene, flat_plotter, cube):
+    session = opened(scene, cube, sections=(MIDDLE,))
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    cell = int(crossing(cube, 2, 0.46)[7])
+    flat.update(changes.mark(session, cell), MIDDLE)
+    mark = flat_plotter.actors["marked"]
+    assert mark.visibility
+    drawn = flat.polygons.points[
+        flat.polygons.take(np.flatnonzero(flat.polygons.cells == cell)).connectivity
+    ]
+    assert mark.bounds[:2] == pytest.approx((drawn[:, 0].min(), drawn[:, 0].max()))
+    flat.update(changes.mark(session, 0), MIDDLE)
+    assert mark.visibility == (0 in crossing(cube, 2, 0.46))
+
+
+def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew", edges=False)
+    points = cube.points.copy()
+    inside = ((points > 0.3) & (points < 0.7)).all(axis=1)
+    points[inside] = 1.0 - points[inside]
+    later = stepped(session, points)
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, MIDDLE)
+    flat.fit()
+    assert count(flat_plotter, INVERTED_COLOUR, 30) == 0
+    flat.update(later, MIDDLE)
+    assert count(flat_plotter, INVERTED_COLOUR, 30) > 50
+    assert "inverted" in flat.summary
