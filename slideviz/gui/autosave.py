@@ -8,6 +8,7 @@ not end properly. Nothing is ever thrown away unasked: what cannot be read is re
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import time
@@ -92,7 +93,8 @@ class Autosave(QObject):
         """End; the file is not needed any more."""
         self._timer.stop()
         self._runner.close()
-        self.path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.path.unlink(missing_ok=True)
         if self._lock is not None:
             self._lock.unlock()
 

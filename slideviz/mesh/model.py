@@ -172,7 +172,7 @@ class Mesh:
         """Return 2 or 3."""
         return int(self.points.shape[1])
 
-    @property
+    @cached_property
     def extent(self) -> float:
         """Return the largest extent over the Cartesian axes."""
         return float(np.ptp(self.points, axis=0).max())

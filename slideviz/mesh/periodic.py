@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -131,17 +131,19 @@ def match(
             "choose other markers or remesh one of them"
         )
     kinds = ("translational", "rotational") if kind == "auto" else (kind,)
+    allowed = TOLERANCE * mesh.extent
     best: tuple[float, Pair] | None = None
     for one in kinds:
         pair, worst = _match_kind(mesh, (first, second), one, (tuple(axis), tuple(origin)))
-        if worst <= TOLERANCE * mesh.extent:
+        assert pair is not None
+        if worst <= allowed:
             return pair
         if best is None or worst < best[0]:
             best = worst, pair
     assert best is not None
     raise MeshError(
         f"{where}: with the best {best[1].kind} transformation ({best[1].describe()}) a node is "
-        f"{best[0]:.3g} from its image, allowed is {TOLERANCE * mesh.extent:.3g}; check the "
+        f"{best[0]:.3g} from its image, allowed is {allowed:.3g}; check the "
         "markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
     )
 
@@ -151,8 +153,13 @@ def _match_kind(
     names: tuple[str, str],
     kind: str,
     frame: tuple[tuple[float, ...], tuple[float, ...]],
-) -> tuple[Pair, float]:
-    """Return the best pair of one kind and its largest mismatch (inf when not one to one)."""
+    bound: float = np.inf,
+) -> tuple[Pair | None, float]:
+    """Return the best pair of one kind and its largest mismatch (inf when not one to one).
+
+    Nodes are looked for within ``bound`` of the images only: where there is none, there is no
+    pair. That is a hundred times faster for boundaries that are far from matching.
+    """
     a, b = (mesh.marker(name).nodes for name in names)
     xa, xb = mesh.points[a], mesh.points[b]
     axis, origin = (0.0, 0.0, 1.0) if mesh.dim == 2 else frame[0], frame[1]
@@ -167,7 +174,11 @@ def _match_kind(
         angle = float(np.angle(zb.sum() * np.conj(za.sum())))
         turned = za * np.exp(1j * angle)
         image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
-    distance, partner = (np.asarray(found) for found in cKDTree(target).query(image))
+    distance, partner = (
+        np.asarray(found) for found in cKDTree(target).query(image, distance_upper_bound=bound)
+    )
+    if not np.isfinite(distance).all():
+        return None, np.inf
     one_to_one = len(np.unique(partner)) == len(partner)
     # Two parts of one straight side are shifts of each other, but share a node: no images.
     one_to_one &= kind == "rotational" or not len(np.intersect1d(a, b))
@@ -251,11 +262,16 @@ def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
     )
 
 
-def find_pairs(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Pair, ...]:
+def find_pairs(
+    mesh: Mesh,
+    names: Sequence[str] | None = None,
+    going_on: Callable[[], object] = lambda: None,
+) -> tuple[Pair, ...]:
     """Return pairs of markers that match, each marker in one pair at most.
 
     Translations are tried first, then rotations about z, x and y through 0. A guess, to be
-    confirmed: the opposite sides of every box match.
+    confirmed: the opposite sides of every box match. ``going_on`` is called before each try;
+    what it raises ends the search.
     """
     chosen = list(names or mesh.marker_names)
     count = {name: len(mesh.marker(name).nodes) for name in chosen}
@@ -263,13 +279,15 @@ def find_pairs(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Pair, ..
     tries: list[tuple[Kind, tuple[float, float, float]]] = [("translational", _Z)]
     tries += [("rotational", axis) for axis in axes]
     found: list[Pair] = []
+    allowed = TOLERANCE * mesh.extent
     for kind, axis in tries:
         for first, second in combinations(chosen, 2):
             taken = {name for pair in found for name in (pair.first, pair.second)}
             if count[first] != count[second] or taken & {first, second}:
                 continue
-            try:
-                found.append(match(mesh, first, second, kind, axis))
-            except MeshError:
-                continue
+            going_on()
+            frame = (axis, (0.0, 0.0, 0.0))
+            pair, worst = _match_kind(mesh, (first, second), kind, frame, 2.0 * allowed)
+            if pair is not None and worst <= allowed:
+                found.append(pair)
     return tuple(found)

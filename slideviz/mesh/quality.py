@@ -7,6 +7,7 @@ Jacobians. ``f_skew`` is that of `slideviz.mesh.skew`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -110,7 +111,12 @@ class Quality:
         }
 
 
-def quality(mesh: Mesh, reference: Mesh | None = None, metric: Metric = "knupp") -> Quality:
+def quality(
+    mesh: Mesh,
+    reference: Mesh | None = None,
+    metric: Metric = "knupp",
+    going_on: Callable[[], object] = lambda: None,
+) -> Quality:
     """Return the quality of each cell, compared with the undeformed mesh.
 
     Parameters
@@ -122,6 +128,8 @@ def quality(mesh: Mesh, reference: Mesh | None = None, metric: Metric = "knupp")
         way round each cell is numbered.
     metric : {"knupp", "rbf-slide"}
         See `Quality`.
+    going_on : callable
+        Called every few thousand cells; what it raises ends the work.
 
     Raises
     ------
@@ -143,6 +151,7 @@ def quality(mesh: Mesh, reference: Mesh | None = None, metric: Metric = "knupp")
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
         skew_of = METRICS[metric][vtk]
         for part in chunks(nodes):
+            going_on()
             at, here = coordinates(columns, nodes[part]), ids[part]
             edges, turn = corner_edges(vtk, at), signs[here].astype(np.float64)
             alpha = determinant(edges) * turn

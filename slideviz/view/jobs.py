@@ -16,6 +16,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.view.changes import open_mesh
+from slideviz.view.formats import holds_quality
 from slideviz.view.keep import Camera, kept_camera
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface, find_surfaces
@@ -91,11 +92,15 @@ def prepare(
     surfaces = find_surfaces(mesh)
     require_going(stopped)
     report(Doing("Looking for periodic boundaries"))
-    pairs = find_pairs(mesh) if mesh.markers else ()
-    require_going(stopped)
+
+    def going_on() -> None:
+        require_going(stopped)
+
+    pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
     report(Doing("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
-    first = Frame(mesh, quality(mesh, metric=metric))
+    first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
+    going_on()
     session = open_mesh(first, path, pairs, case)
     if case is None:
         return Opened(session, surfaces)
@@ -123,11 +128,19 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
             tried = f"{now.total} step{'s' if now.total > 1 else ''}"
             report(Doing(f"Trying {tried}: step {now.step}, {phase}"))
 
-    for step in deform(case, mesh, progress=progress):
-        report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
-        report(Frame(step.mesh, quality(step.mesh, mesh, case.quality_metric), step))
-        if step.index < step.total:
+    unfinished = True
+
+    def going_on() -> None:
+        # When the last step is there, nothing is gained by dropping it.
+        if unfinished:
             require_going(stopped)
+
+    for step in deform(case, mesh, progress=progress):
+        unfinished = step.index < step.total
+        report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
+        measured = quality(step.mesh, mesh, case.quality_metric, going_on)
+        report(Frame(step.mesh, measured, step))
+        going_on()
 
 
 _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
@@ -155,7 +168,7 @@ def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, stopped
 
     report(Doing(f"Writing {path.name}"))
     data = None
-    if path.suffix.lower() != ".su2":
+    if holds_quality(path):
         measured = frame.quality
         data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
     write(path, frame.mesh, overwrite, data, lambda: require_going(stopped))
