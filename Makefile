@@ -5,7 +5,7 @@ BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format bench shots clean
+.PHONY: help setup demo test test-all lint format bench shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -39,7 +39,10 @@ bench: setup ## measure the speed (needs a quiet machine)
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/slideviz shots
 
+study: setup ## the thesis's cases into study/: tables, plots, pictures (ARGS=--quick: small ones)
+	$(BIN)/python -m tools.study $(ARGS)
+
 clean: ## remove what was built, the virtual environment and demo/ included
-	rm -rf .venv demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
+	rm -rf .venv demo study build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
 		.import_linter_cache
 	find slideviz tests -name __pycache__ -prune -exec rm -rf {} +

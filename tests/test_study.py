@@ -1,0 +1,129 @@
+"""The study: its cases exist, its table of published numbers is sound, differences are found."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from slideviz.case.cfg import set_key
+from slideviz.case.model import PERIODIC_MODES, Case
+from slideviz.case.samples import SAMPLES, VARIANTS
+from slideviz.view.compare import METHODS
+from tools.study import __main__ as study
+from tools.study.cases import CALLS, GREEDY
+from tools.study.dense import dense
+from tools.study.sections import SECTIONS
+from tools.study.summary import HERE, Line, write_summary
+
+HEAD = "method,periodic,steps,min,mean,inverted,problem"
+
+
+def published():
+    with (HERE / "published.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("call", CALLS, ids=lambda call: call.name)
+def test_every_call_is_one_that_can_be_made(call):
+    assert call.sample in SAMPLES
+    assert call.variant in ("", *VARIANTS[call.sample])
+    assert set(call.methods.split(",")) <= set(METHODS)
+    assert set(filter(None, call.periodic.split(","))) <= set(PERIODIC_MODES)
+    case = Case()
+    for text in call.settings:
+        case = set_key(case, *text.split("="))
+    assert (case != Case()) == bool(call.settings)
+
+
+def test_greedy_lines_are_settings_that_exist():
+    for line in GREEDY:
+        case = set_key(Case(), "DATA_REDUCTION", "YES")
+        for text in line.settings:
+            case = set_key(case, *text.split("="))
+        assert case.reduction.multilevel == ("levels of" in line.label)
+    assert len({(line.figure, line.label) for line in GREEDY}) == len(GREEDY)
+
+
+def test_published_numbers_have_a_source_and_a_case():
+    rows = published()
+    keys = [tuple(row[n] for n in ("case", "method", "periodic", "steps", "value")) for row in rows]
+    assert len(set(keys)) == len(keys)
+    names = {call.name for call in CALLS} | {"dense"}
+    for row in rows:
+        assert row["case"] in names
+        assert row["method"] in (*METHODS, "undeformed")
+        assert bool(row["thesis"]) == bool(row["source"])
+        assert row["thesis"] or row["rbf_slide"] or row["value"] == "mean"
+        for number in (row["thesis"], row["rbf_slide"]):
+            assert number in ("", "inverted") or float(number) > 0
+
+
+def test_sections_are_of_cases_that_are_run():
+    for section in SECTIONS:
+        assert section.call in {call.name for call in CALLS}
+
+
+@pytest.mark.parametrize(
+    ("thesis", "program", "ours", "other", "notable"),
+    [
+        ("0.100", "0.1", "0.1019", False, False),
+        ("0.100", "", "0.1021", False, True),
+        ("", "0.1", "0.097", False, True),
+        ("inverted", "inverted", "inverted", False, False),
+        ("0.1", "", "inverted", False, True),
+        ("inverted", "", "0.1", False, True),
+        ("0.9", "", "0.1", True, False),
+        ("", "", "0.1", False, False),
+    ],
+)
+def test_differences_over_two_percent_are_notable(thesis, program, ours, other, notable):
+    key = ("square", "ps", "none", "20", "min")
+    assert Line(key, thesis, program, ours, "", "", other).notable() == notable
+
+
+def test_the_summary_puts_numbers_beside_each_other(tmp_path):
+    for name, low in (("hexahedron", "0.2"), ("hexahedron-exact", "0.151")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "compare.csv").write_text(
+            f"{HEAD}\nnone,fixed,20,{low},0.5,0,\nnone,none,20,0.0,0.5,3,\nps,none,20,,,,no\n"
+        )
+    table, text = write_summary(tmp_path)
+    with table.open() as file:
+        rows = {(row["method"], row["periodic"]): row for row in csv.DictReader(file)}
+    assert set(rows) == {("none", "fixed"), ("none", "none")}
+    assert rows["none", "fixed"]["thesis"] == "0.151"
+    assert rows["none", "fixed"]["slideviz"] == "0.2"
+    assert rows["none", "fixed"]["exact"] == "0.151"
+    assert rows["none", "none"]["slideviz"] == "inverted"
+    assert text.read_text().count("differs") == 2
+
+
+@pytest.mark.slow
+def test_a_small_study_runs_from_sample_to_summary(tmp_path, capsys):
+    argv = ["--quick", "--only", "square-robust", "-o", str(tmp_path)]
+    assert study.main(argv) == 0
+    assert (tmp_path / "square-robust" / "compare.csv").exists()
+    assert (tmp_path / "summary.md").exists()
+    assert "summary.md" in capsys.readouterr().out
+
+
+def test_an_unknown_case_is_told(capsys):
+    with pytest.raises(SystemExit):
+        study.main(["--only", "squares"])
+    assert "no case 'squares'; there are square, " in capsys.readouterr().err
+
+
+def test_the_dense_square_gives_its_figures_and_counts(tmp_path, monkeypatch):
+    from tools.study import dense as module
+
+    lines = [line for line in GREEDY if line.figure == "5.21"]
+    monkeypatch.setattr(module, "GREEDY", lines)
+    monkeypatch.setattr(module, "TOLERANCE", 1e-3)
+    monkeypatch.setattr(module, "SHOWN", (1e-2, 1e-3))
+    paths = dense(tmp_path, 15)
+    assert {path.name for path in paths} == {"figure_5.21.png", "figure_5.21.svg", "nodes.csv"}
+    with (tmp_path / "nodes.csv").open() as file:
+        counts = [int(row["control_nodes"]) for row in csv.DictReader(file)]
+    assert len(counts) == 3 * 3 * 2
+    assert all(few < many for few, many in zip(counts[::2], counts[1::2], strict=True))

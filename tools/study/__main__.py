@@ -1,0 +1,73 @@
+"""``python -m tools.study``: runs the cases and writes tables and pictures into study/."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from slideviz.cli import run
+from tools.study.cases import CALLS, Call
+from tools.study.dense import dense
+from tools.study.sections import SECTIONS, draw_sections
+from tools.study.summary import write_summary
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run the study; 1 when a call failed."""
+    parser = argparse.ArgumentParser(prog="make study", description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="DIR")
+    parser.add_argument("--quick", action="store_true", help="small meshes and few steps")
+    parser.add_argument("--only", metavar="LIST", help="names of cases, with commas")
+    arguments = parser.parse_args(argv)
+    names = [call.name for call in CALLS] + ["dense"]
+    wanted = arguments.only.split(",") if arguments.only else names
+    for name in wanted:
+        if name not in names:
+            parser.error(f"no case {name!r}; there are {', '.join(names)}")
+    failed = []
+    begin = time.perf_counter()
+    for call in CALLS:
+        if call.name in wanted and (call.quick_steps or not arguments.quick):
+            _say(f"\n== {call.name}: {call.about}")
+            if _compare(call, arguments.output, arguments.quick):
+                failed.append(call.name)
+    for section in SECTIONS:
+        if section.call in wanted and not arguments.quick:
+            draw_sections(section, arguments.output)
+    if "dense" in wanted:
+        _say("\n== dense: Figures 5.19 to 5.23")
+        dense(arguments.output / "dense", 60 if arguments.quick else 200)
+    for path in write_summary(arguments.output):
+        _say(str(path))
+    _say(f"{time.perf_counter() - begin:.0f} s")
+    if failed:
+        _say(f"failed: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+def _compare(call: Call, output: Path, quick: bool) -> int:
+    """Write the sample and compare; return the exit code."""
+    folder = output / call.name
+    size = str(call.quick_size if quick else call.size)
+    variant = ["--variant", call.variant] if call.variant else []
+    code = run(["sample", call.sample, "-o", str(folder), "--size", size, "--force", *variant])
+    if code:
+        return code
+    argv = ["compare", str(folder / f"{call.sample}.cfg"), "-o", str(folder)]
+    argv += ["--methods", call.methods, "--steps", call.quick_steps if quick else call.steps]
+    argv += ["--periodic", call.periodic] if call.periodic else []
+    argv += [] if call.pictures else ["--no-pictures"]
+    argv += [word for text in call.settings for word in ("--set", text)]
+    return run(argv)
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
