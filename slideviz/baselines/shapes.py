@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from slideviz.mesh.model import Cells, FloatArray, IntArray
+from slideviz.mesh.model import Cells, FloatArray, IntArray, frozen_array
 
 PYRAMID = 14
 TETRAHEDRON = 10
@@ -112,7 +112,8 @@ def blocks(cells: Cells) -> list[Block]:
     found = []
     for vtk, (ids, nodes) in cells.by_type.items():
         if vtk == PYRAMID:
-            parts = np.concatenate([nodes[:, part] for part in PYRAMID_PARTS])
+            # Read-only like the mesh's own, for which the loops are compiled.
+            parts = frozen_array(np.concatenate([nodes[:, p] for p in PYRAMID_PARTS]), np.int64)
             found.append(Block(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5))
         else:
             found.append(Block(shape(vtk), nodes, ids, 1.0))

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
-from slideviz.case.model import Case, Sliding, Translate
+from slideviz.case.model import Case, Translate
 from slideviz.case.samples import sample
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.view.jobs import Stopped, require_going
 
-_RUNS: tuple[tuple[str, Sliding], ...] = (
+_RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     # The first compiles nearly everything: curved boundaries, and angles in the distance.
-    ("cylindrical", "ps"),
-    ("cylindrical", "ds"),
-    ("hexahedron", "ps"),
-    ("square", "ps"),
+    ("cylindrical", {"sliding": "ps"}),
+    ("cylindrical", {"sliding": "ds"}),
+    ("hexahedron", {"sliding": "ps"}),
+    ("square", {"sliding": "ps"}),
+    ("cylindrical", {"sliding": "ps", "method": "idw"}),
+    ("square", {"sliding": "ps", "method": "idw"}),
+    ("hexahedron", {"sliding": "ds", "method": "elastic"}),
 )
-"""Samples and methods that need every loop between them."""
+"""Samples and settings that need every loop between them."""
 
 
 def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
@@ -44,20 +48,21 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         contextlib.suppress(Cancelled, SlidevizError),
         event.install_listener("numba:compile", Listener()),
     ):
-        for name, sliding in _RUNS:
+        for name, settings in _RUNS:
             require_going(stopped)
-            _deform(name, sliding, stopped)
+            _deform(name, settings, stopped)
 
 
-def _deform(name: str, sliding: Sliding, stopped: Stopped) -> None:
+def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:
     from slideviz.staircase import deform
 
-    made = sample(name, size=4)
+    # Elasticity needs so many cells that its solver has more than one level.
+    made = sample(name, size=8 if settings.get("method") == "elastic" else 4)
     mesh = made.mesh
     (block,) = made.case.markers_with("moving")
     motion = Translate(block, (1e-3 * mesh.extent,) * mesh.dim)
     case: Case = made.case.change(
-        motions=(motion,), steps=1, sliding=sliding, periodic="moving", reduction=None
+        motions=(motion,), steps=1, periodic="moving", reduction=None, **settings
     )
     for _ in deform(case, mesh, progress=lambda _: require_going(stopped)):
         pass

@@ -1,5 +1,6 @@
 import pytest
 
+from slideviz.baselines import element_loops, sweeps, weighting
 from slideviz.rbf import closest, compiled
 from slideviz.view import warmup
 
@@ -7,7 +8,8 @@ from slideviz.view import warmup
 def signatures():
     return {
         name: len(loop.signatures)
-        for name, loop in (*vars(compiled).items(), *vars(closest).items())
+        for module in (compiled, closest, element_loops, sweeps, weighting)
+        for name, loop in vars(module).items()
         if hasattr(loop, "signatures")
     }
 
@@ -16,6 +18,8 @@ def test_it_makes_the_loops_ready_that_runs_use():
     warmup.warm_up(lambda: None, lambda: False)
     ready = signatures()
     for name in ("fill_matrix", "sum_three", "sum_four", "sum_rotational", "_build", "_query"):
+        assert ready[name], name
+    for name in ("weigh", "weigh_rotational", "volumes", "add", "sweep", "product"):
         assert ready[name], name
 
 
