@@ -211,7 +211,7 @@ _ROWS = (
         "DATA_RED_TOLERANCE",
         real(0.0),
         "tolerance",
-        "Largest error left before the boundary is corrected, in the mesh's length unit.",
+        "Largest error left before the boundary is corrected, over all steps, in the mesh's unit.",
     ),
     greedy(
         "DATA_RED_RELATIVE",

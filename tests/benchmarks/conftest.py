@@ -4,18 +4,53 @@ import os
 import platform
 from pathlib import Path
 
+from tests.benchmarks.rbf_slide import GROUP
+
+LONG = 0.3
+"""RBF-SliDe's seconds from which its processor time means something."""
+
 
 def pytest_terminal_summary(terminalreporter, config):
     session = getattr(config, "_benchmarksession", None)
-    rows = [bench for bench in session.benchmarks if bench.extra_info] if session else []
-    if not rows:
-        return
-    terminalreporter.section("what this is in pairs, cells and bytes")
-    load = os.getloadavg()[0]
-    terminalreporter.write_line(f"{_processor()}, {os.cpu_count()} cores, load {load:.1f}")
+    found = [bench for bench in session.benchmarks if bench.extra_info] if session else []
+    rows = [bench for bench in found if bench.group != GROUP]
+    if rows:
+        terminalreporter.section("what this is in pairs, cells and bytes")
+        load = os.getloadavg()[0]
+        terminalreporter.write_line(f"{_processor()}, {os.cpu_count()} cores, load {load:.1f}")
     for bench in rows:
         told = ", ".join(f"{name} {value:.4g}" for name, value in bench.extra_info.items())
         terminalreporter.write_line(f"{bench.name}: {bench.stats.min:.3f} s; {told}")
+    beside = [bench for bench in found if bench.group == GROUP]
+    if beside:
+        terminalreporter.section("beside RBF-SliDe at the same tolerance")
+        for line in _beside(beside):
+            terminalreporter.write_line(line)
+
+
+def _beside(benches):
+    """Yield a line for each row of RBF-SliDe's table, and the counts."""
+    yield "seconds, minimum quality and control nodes: ours / RBF-SliDe's"
+    rows = [(bench.stats.min, bench.extra_info) for bench in benches]
+    for bench, (seconds, told) in zip(benches, rows, strict=True):
+        name = bench.name.partition("[")[2].rstrip("]")
+        line = (
+            f"{name:38} {told['tolerance']:7.0e} {told['pick']:12} "
+            f"{seconds:6.2f} / {told['rbf_slide_seconds']:6.2f} s   "
+            f"{told['quality']:.4f} / {told['rbf_slide_quality']:.4f}   "
+            f"{told['control_nodes']:4d} / {told['rbf_slide_control_nodes']:4.0f}"
+        )
+        lower = told["quality"] < told["rbf_slide_quality"]
+        yield line + (f"   lower; exact method {told['exact_quality']:.4f}" if lower else "")
+    long = [(s, told["rbf_slide_seconds"]) for s, told in rows if told["rbf_slide_seconds"] > LONG]
+    yield f"faster in {sum(a < b for a, b in long)} of {len(long)} rows above {LONG} s"
+    lost = [told for _, told in rows if told["quality"] < told["rbf_slide_quality"]]
+    yield f"quality at least as good in {len(rows) - len(lost)} of {len(rows)} rows; none is nan"
+    for margin in (0.01, 0.05):
+        near = sum(t["quality"] < (1 - margin) * t["rbf_slide_quality"] for t in lost)
+        yield f"no more than {margin:.0%} lower in {len(rows) - near} of {len(rows)} rows"
+    below = sum(told["exact_quality"] < told["rbf_slide_quality"] for told in lost)
+    yield f"lost rows where the exact method is lower too: {below} of {len(lost)}"
 
 
 def _processor() -> str:

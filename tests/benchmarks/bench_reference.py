@@ -1,0 +1,103 @@
+"""Beside RBF-SliDe: its own times and qualities on the same meshes, ``make bench``."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.model import Reduction
+from tests.benchmarks.rbf_slide import GROUP, SHARED, asked, greedy_rows, load, write_whole_boundary
+
+pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason=f"needs the meshes of {SHARED}")
+
+THEIRS = {(row.sliding, row.tolerance): row for row in greedy_rows() if row.case == "stator"}
+
+NEARLY_EXACT = Reduction(tolerance=1e-7)
+"""The stator has 8,110 candidates; a hundredth of the smallest tolerance stands for all."""
+
+MEASURED = """
+import json, resource, sys
+from slideviz.cli import run
+code = run(sys.argv[1:])
+print(json.dumps(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6))
+sys.exit(code)
+"""
+"""Runs the command and prints the most memory it took, in GB."""
+
+
+def deformed(case, mesh):
+    """Return the last step."""
+    *_, last = sv.deform(case, mesh)
+    return last
+
+
+def lowest(last, mesh):
+    """Return the minimum quality, as RBF-SliDe measures it, and require finite results."""
+    assert np.isfinite(last.mesh.points).all()
+    found = sv.quality(last.mesh, mesh, "rbf-slide")
+    assert np.isfinite(found.values).all()
+    return found.min
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("tolerance", [4.5e-5, 1e-5, 1e-6])
+def test_stator(benchmark, sliding, tolerance):
+    """237,162 hexahedra; hub and shroud internal, periodic sides that move."""
+    mesh, case = load("stator")
+    case = case.change(
+        sliding=sliding, periodic="moving", steps=1, reduction=Reduction(tolerance=tolerance)
+    )
+    last = benchmark.pedantic(deformed, (case, mesh), rounds=3, warmup_rounds=1)
+    benchmark.extra_info.update(control_nodes=last.control_nodes, min_quality=lowest(last, mesh))
+    if (sliding, tolerance) in THEIRS:
+        row = THEIRS[sliding, tolerance]
+        benchmark.extra_info.update(rbf_slide_seconds=row.seconds, rbf_slide_quality=row.quality)
+
+
+def test_two_thousand_control_nodes_of_the_whole_boundary(benchmark, tmp_path):
+    """Regular method; a fifth of the displacement, for in full the blade leaves its passage."""
+    case = write_whole_boundary(tmp_path, 0.2, 2000)
+    report = tmp_path / "report.json"
+    call = [sys.executable, "-c", MEASURED, "run", str(case), "-q", "--json", str(report)]
+    done = benchmark.pedantic(
+        subprocess.run, (call,), {"capture_output": True, "text": True}, rounds=2
+    )
+    assert done.returncode in (0, 3), done.stderr
+    told = json.loads(report.read_text())
+    counts = told["node_counts"]
+    benchmark.extra_info.update(
+        candidates=sum(counts.values()) - counts["internal"],
+        control_nodes=told["control_nodes"][-1],
+        select_seconds=told["seconds"]["select"],
+        largest_memory_gb=float(done.stdout.splitlines()[-1]),
+    )
+
+
+@pytest.mark.parametrize("row", greedy_rows(), ids=str)
+def test_greedy_row(benchmark, row):
+    """One row of the table; where ours is lower, the exact method is run too."""
+    benchmark.group = GROUP
+    mesh, case = asked(row)
+    last = benchmark.pedantic(deformed, (case, mesh), rounds=2)
+    ours = lowest(last, mesh)
+    theirs = row.quality if row.quality > 0 else 0.0  # inverted cells, or no result: 0 as ours
+    exact = math.nan
+    if ours < theirs:
+        all_nodes = NEARLY_EXACT if row.case == "stator" else None
+        exact = lowest(deformed(case.change(reduction=all_nodes), mesh), mesh)
+    benchmark.extra_info.update(
+        tolerance=row.tolerance,
+        pick=row.pick,
+        rbf_slide_seconds=row.seconds,
+        quality=ours,
+        rbf_slide_quality=theirs,
+        exact_quality=exact,
+        control_nodes=last.control_nodes,
+        rbf_slide_control_nodes=row.control_nodes,
+    )
