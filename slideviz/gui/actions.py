@@ -19,6 +19,7 @@ TOGGLES = (
     ("undeformed", "Undeformed", "U", "Draw the undeformed boundaries as a ghost."),
     ("motion_ghost", "Motion ghost", "G", "Draw where the motions take the moving boundaries."),
     ("legend", "Legend", "L", "Draw the legend of roles or the colour bar."),
+    ("triad", "Axes", "T", "Draw the directions of the axes in a corner."),
     ("perspective", "Perspective", "P", "Perspective instead of parallel projection (3D meshes)."),
 )
 SIDE_KEYS = {"+x": "1", "-x": "Shift+1", "+y": "2", "-y": "Shift+2", "+z": "3", "-z": "Shift+3"}
@@ -165,7 +166,8 @@ class Actions:
         bar.addWidget(self.colour)
         bar.addSeparator()
         for name, *_ in TOGGLES:
-            bar.addAction(self.by_name[name])
+            if name != "triad":  # seldom switched, and the room is needed
+                bar.addAction(self.by_name[name])
         bar.addSeparator()
         bar.addAction(self.by_name["fit"])
         for side in ("+x", "+y", "+z", "iso"):

@@ -10,10 +10,12 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.boundaries import BoundariesPanel
+from slideviz.gui.display import DisplayPanel
 from slideviz.gui.log import LogPanel
 from slideviz.gui.method import MethodPanel
 from slideviz.gui.motions import MotionPanel
 from slideviz.gui.run import RunPanel
+from slideviz.gui.runs import RunsPanel
 
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -43,6 +45,14 @@ DOCKS: tuple[DockRow, ...] = (
     DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), bare=True),
     DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion", bare=True),
     DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), bare=True),
+    DockRow(
+        "runs",
+        "Runs",
+        RIGHT,
+        lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error),
+        bare=True,
+    ),
+    DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs", bare=True),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )
 """Every dock; the panels get the window and take from it what they need."""
@@ -77,7 +87,6 @@ class Docks:
             dock.setTitleBarWidget(QWidget())
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
-        self.window.addDockWidget(row.area, dock)
 
     def arrange(self) -> None:
         """Put every dock where it belongs at first."""
@@ -85,11 +94,14 @@ class Docks:
         for row in DOCKS:
             dock = self.by_name[row.name]
             dock.setFloating(False)
-            window.addDockWidget(row.area, dock)
-            dock.setVisible(row.shown)
+            # Without this, Qt leaves tab bars that belong to nothing over the panels.
+            window.removeDockWidget(dock)
         for row in DOCKS:
             if row.after:
                 window.tabifyDockWidget(self.by_name[row.after], self.by_name[row.name])
+            else:
+                window.addDockWidget(row.area, self.by_name[row.name])
+            self.by_name[row.name].setVisible(row.shown)
         for row in DOCKS:
             if not row.after and any(other.after == row.name for other in DOCKS):
                 self.by_name[row.name].raise_()
@@ -104,6 +116,7 @@ class Docks:
         right = [self.by_name[row.name] for row in DOCKS if row.area == RIGHT and not row.after]
         if right:
             window.resizeDocks(right[:1], [320], Qt.Orientation.Horizontal)
+            window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
 
     def lead_to(self, name: str) -> None:
         """Bring a dock to the front."""

@@ -35,7 +35,15 @@ _STROKES = {
     '<rect x="4" y="14" width="4" height="4" fill="{c}"/><path d="M11 16h9"/>',
     "perspective": '<path d="M4 8l6-3 10 2v10l-10 2-6-3z"/><path d="M10 5v14M4 8v8"/>',
     "add": '<path d="M12 5v14M5 12h14"/>',
+    "along": '<path d="M2.5 12s3.5-6 9.5-6 9.5 6 9.5 6-3.5 6-9.5 6-9.5-6-9.5-6z"/>'
+    '<circle cx="12" cy="12" r="2.6"/>',
     "remove": '<path d="M5 12h14"/>',
+    "beside": '<rect x="3" y="5" width="8" height="14" rx="1"/>'
+    '<rect x="13" y="5" width="8" height="14" rx="1"/>',
+    "settings": '<path d="M9 5L4 10l5 5"/><path d="M4 10h9a7 7 0 0 1 7 7v2"/>',
+    "copy": '<rect x="8" y="8" width="12" height="12" rx="1.5"/><path d="M16 8V4H4v12h4"/>',
+    "table": '<path d="M4 5h16v14H4zM4 10h16M10 10v9"/>',
+    "triad": '<path d="M8 16V4M5.5 6.5L8 4l2.5 2.5M8 16h12M17.5 13.5L20 16l-2.5 2.5M8 16l-4 4.5"/>',
     "edit": '<path d="M4 20l1-4L16 5l3 3L8 19z"/><path d="M13.5 7.5l3 3"/>',
     "up": '<path d="M12 19V6M6 11l6-6 6 6"/>',
     "down": '<path d="M12 5v13M6 13l6 6 6-6"/>',

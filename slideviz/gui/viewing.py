@@ -5,13 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from qtpy.QtCore import QPoint, Qt
-from qtpy.QtWidgets import QGridLayout, QLabel, QWidget
+from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
+from slideviz.gui.beside import CameraLink, TitleBar
 from slideviz.gui.boundaries import boundary_menu
 from slideviz.gui.canvas import View3D
 from slideviz.view import changes, jobs
 from slideviz.view.ghosts import Ghosts
 from slideviz.view.look import Look
+from slideviz.view.runs_table import brief, method_words
 from slideviz.view.scene import Scene
 from slideviz.view.state import Run, Session
 from slideviz.view.store import Store
@@ -25,7 +27,9 @@ class Viewing(QWidget):
     view, scene
         The first view and what it draws.
     second, second_scene
-        The other, None until it was needed.
+        The other, None while one is enough.
+    titles
+        What stands above each while there are two.
     """
 
     def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
@@ -37,29 +41,29 @@ class Viewing(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(2)
-        self.titles = [self._title(0), self._title(1)]
+        self.titles = [self._title(column) for column in (0, 1)]
         self.view = self._make_view()
         self._grid.addWidget(self.view, 1, 0)
         self.scene = Scene(self.view)
         self._connect(self.view, self.scene)
         self.second: View3D | None = None
         self.second_scene: Scene | None = None
+        self._link: CameraLink | None = None
 
     # Parts -----------------------------------------------------------------------------
 
-    def _title(self, column: int) -> QLabel:
-        label = QLabel()
-        label.setObjectName(f"view_title_{column}")
-        label.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        label.setContentsMargins(4, 3, 4, 3)
-        label.hide()
-        self._grid.addWidget(label, 0, column)
+    def _title(self, column: int) -> TitleBar:
+        title = TitleBar(f"view_title_{column}", closable=column == 1)
+        title.closed.connect(lambda: self.store.change(changes.show_beside, None))
+        self._grid.addWidget(title, 0, column)
         self._grid.setColumnStretch(column, 0 if column else 1)
-        return label
+        return title
 
     def _make_view(self) -> View3D:
         view = View3D(self, multi_samples=self._multi_samples)
         view.setMinimumSize(160, 120)
+        # Of two, each gets half, whatever sizes they had before.
+        view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         return view
 
     def _connect(self, view: View3D, scene: Scene) -> None:
@@ -68,8 +72,9 @@ class Viewing(QWidget):
         view.told.resized.connect(scene.resized)
         view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
-    def _make_second(self) -> None:
-        """Make the second view; from now on it has the camera of the first."""
+    def _make_second(self, session: Session) -> None:
+        """Make the second view; from now on what moves one camera moves the other."""
+        whole = self.scene.sees_all()
         self.second = self._make_view()
         self._grid.addWidget(self.second, 1, 1)
         self._grid.setColumnStretch(1, 1)
@@ -77,25 +82,36 @@ class Viewing(QWidget):
         self.second_scene = Scene(self.second, self.scene.look)
         self._connect(self.second, self.second_scene)
         self.second.spare_software()
-        session = self.store.session
         self.second.set_flat(session.mesh.dim == 2)
         self.second_scene.open(changes.seen_beside(session), self.surfaces)
-        self.second.renderer.camera = self.view.renderer.camera
-        self.view.renderer.camera.AddObserver("ModifiedEvent", lambda *_: self._camera_moved())
+        self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
+        self.second_scene.take_camera(self.scene)
+        self.scene.set_legend(False)
+        self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
+        self._rearranged(whole)
 
-    def _camera_moved(self) -> None:
-        for view in (self.view, self.second):
-            if view is not None and view.isVisible():
-                view.render_soon()
+    def _rearranged(self, whole: bool) -> None:
+        """Draw views of another width; who saw the whole mesh still does, who a detail too."""
+        self._grid.activate()
+        if whole:
+            self.fit()
+        self.render()
 
     def _drop_second(self) -> None:
         second, self.second, self.second_scene = self.second, None, None
         if second is None:
             return
+        whole = self.scene.sees_all()
+        self._link.end()
+        self._link = None
         self._grid.removeWidget(second)
         self._grid.setColumnStretch(1, 0)
         second.close()
         second.deleteLater()
+        for title in self.titles:
+            title.hide()
+        self.scene.set_legend(True)
+        self._rearranged(whole)
 
     # The session -----------------------------------------------------------------------
 
@@ -115,25 +131,39 @@ class Viewing(QWidget):
     def sync(self, old: Session, new: Session) -> None:
         """Show what changed."""
         if old.case != new.case and self._ghosts is not None and self._ghosts.mesh is new.mesh:
-            self.scene.set_motion_ghosts(self._ghosts.moved(new.case))
+            moved = self._ghosts.moved(new.case)
+            for scene in self._scenes():
+                scene.set_motion_ghosts(moved)
         if old.mesh is not new.mesh:
             return
-        self.scene.update(new)
-        self.view.render_soon()
-        self._sync_beside(new)
+        try:
+            self.scene.update(new)
+        finally:
+            # What can be drawn is drawn.
+            self.view.render_soon()
+            self._sync_beside(new)
+        if old.view.copies != new.view.copies:
+            # Neighbours that were asked for should be seen, and the mesh again when they go.
+            self.fit()
 
     def _sync_beside(self, session: Session) -> None:
-        other = session.run(session.view.beside)
-        if other is None:
+        beside = session.view.beside
+        other = session.run(beside)
+        if other is None and beside != changes.UNDEFORMED:
             self._drop_second()
-        elif self.second is None:
-            self._make_second()
+            return
+        for title, run in zip(self.titles, (session.run_shown, other), strict=True):
+            title.setVisible(True)
+            title.set_text(run_title(run) if run is not None else "Undeformed mesh")
+        if self.second is None:
+            self._make_second(session)
         else:
             self.second_scene.update(changes.seen_beside(session))
             self.second.render_soon()
-        for label, run in zip(self.titles, (session.run_shown, other), strict=True):
-            label.setVisible(other is not None)
-            label.setText(run_title(run) if run is not None else "Undeformed")
+
+    def _scenes(self) -> tuple[Scene, ...]:
+        """Return what is drawn, of one view or two."""
+        return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
 
     # Mouse -----------------------------------------------------------------------------
 
@@ -171,19 +201,19 @@ class Viewing(QWidget):
 
     def fit(self) -> None:
         """Make everything fill the view."""
-        self.scene.fit()
+        # Of two, the second has less room, beside the legend; the first follows.
+        self._scenes()[-1].fit()
         self.render()
 
     def look_from(self, side: str) -> None:
         """Look from a side."""
-        self.scene.look_from(side)
+        self._scenes()[-1].look_from(side)
         self.render()
 
     def set_look(self, look: Look) -> None:
         """Take other colours."""
-        self.scene.set_look(look)
-        if self.second_scene is not None:
-            self.second_scene.set_look(look)
+        for scene in self._scenes():
+            scene.set_look(look)
         self.render()
 
     def write_picture(self, path: Path, size: tuple[int, int], transparent: bool) -> None:
@@ -207,9 +237,4 @@ class Viewing(QWidget):
 
 def run_title(run: Run) -> str:
     """Return what a run is called: its number and what sets it apart."""
-    case = run.case
-    words = {"none": "no sliding", "ps": "pseudo sliding", "ds": "direct sliding"}
-    count = len(run.frames)
-    steps = f"{count} step{'' if count == 1 else 's'}"
-    periodic = f", periodic {case.periodic}" if case.periodic != "none" else ""
-    return f"Run {run.number}: {words[case.sliding]}{periodic}, {steps}"
+    return f"Run {run.number}: {method_words(run.case)} · {brief(run)}"

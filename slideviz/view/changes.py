@@ -35,6 +35,9 @@ TASTE = (
 )
 """Settings of the view that suit any mesh, so that they stay when another is opened."""
 
+UNDEFORMED = 0
+"""Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
+
 Place = Literal["open", "boundaries", "motion", "method"]
 
 
@@ -229,8 +232,12 @@ def show_run(session: Session, number: int) -> Session:
 
 
 def show_beside(session: Session, number: int | None) -> Session:
-    """Return the session with another run in a second view beside the first; None: no such."""
-    if number == session.shown or (number is not None and session.run(number) is None):
+    """Return the session with another run in a second view beside the first; None: no such.
+
+    ``UNDEFORMED`` stands for the undeformed mesh.
+    """
+    known = number == UNDEFORMED or session.run(number) is not None
+    if number == session.shown or not known:
         number = None
     return set_view(session, beside=number)
 
@@ -246,7 +253,7 @@ def remove_run(session: Session, number: int) -> Session:
     if session.shown != number:
         return session
     if not rest:
-        return show_frame(replace(session, shown=None), 0)
+        return show_frame(set_view(replace(session, shown=None), beside=None), 0)
     return show_run(session, rest[-1].number)
 
 
@@ -260,6 +267,8 @@ def take_settings(session: Session, number: int) -> Session:
 
 def seen_beside(session: Session) -> Session:
     """Return the session as the second view shows it: the other run, at the matching step."""
+    if session.view.beside == UNDEFORMED:
+        return show_frame(session, 0)
     run, other = session.run_shown, session.run(session.view.beside)
     if other is None:
         return session

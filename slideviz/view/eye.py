@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from slideviz.view.pick import to_display
 from slideviz.view.stage import Stage
 
 FILL = 0.92
 """How much of the free height or width a mesh takes."""
+
+SLACK = 0.25
+"""The box around a mesh may be outside the view by this much of it, with the mesh inside."""
 
 SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "+x": ((1, 0, 0), (0, 0, 1)),
@@ -123,14 +127,33 @@ class Eye:
         renderer.ResetCameraClippingRange()
 
     def take(self, other: Eye) -> None:
-        """Look from where another eye looks."""
+        """Look from where another eye looks; the strip of the legend stays as it is here."""
         camera, theirs = self._camera, other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
         camera.up, camera.view_angle = theirs.up, theirs.view_angle
         camera.parallel_projection = theirs.parallel_projection
         camera.parallel_scale = theirs.parallel_scale
-        camera.SetWindowCenter(*theirs.GetWindowCenter())
+        self.shift()
         self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def sees_all(self) -> bool:
+        """Tell whether the boxes around all that should be seen are within the view."""
+        boxes = [np.array(shape.bounds).reshape(3, 2) for shape in self._shapes()]
+        corners = [np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes]
+        if not corners:
+            return True
+        seen = to_display(self.stage.plotter, np.concatenate(corners))
+        size = np.array(self.stage.plotter.window_size)
+        return bool((seen >= -SLACK * size).all() and (seen <= (1 + SLACK) * size).all())
+
+    def looks_like(self, other: Eye) -> bool:
+        """Tell whether another eye looks from the same place in the same way."""
+        camera, theirs = self._camera, other._camera
+        return (
+            self.place == other.place
+            and camera.parallel_projection == theirs.parallel_projection
+            and camera.view_angle == theirs.view_angle
+        )
 
     @property
     def place(self) -> tuple[float, ...]:

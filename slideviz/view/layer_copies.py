@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -97,7 +96,7 @@ class CopyLayer:
         """Return the points of every neighbour."""
         own = [shape for shape, _ in self._sources().values()]
         return [
-            SimpleNamespace(points=moved(np.asarray(shape.points), matrix))
+            pv.PolyData(moved(np.asarray(shape.points), matrix))
             for matrix in self._matrices.values()
             for shape in own
         ]

@@ -50,7 +50,7 @@ class LegendLayer:
         self._drawn = key
         clear_legend(stage.plotter)
         style = (stage.look, stage.font_scale)
-        if not new.view.legend or mesh is None:
+        if not (new.view.legend and stage.has_legend) or mesh is None:
             return
         if what == "role":
             used = {new.role(name) for name in mesh.marker_names}
@@ -79,8 +79,9 @@ class LegendLayer:
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         place = tuple(self.stage.plotter.window_size)
         colours = (view.colour_by, view.colour_map, session.colour_range)
-        points = self.stage.point_words
-        return (id(mesh), view.legend, colours, said, points, self.stage.look, place)
+        points, style = self.stage.point_words, (self.stage.look, self.stage.font_scale)
+        shown = view.legend and self.stage.has_legend
+        return (id(mesh), shown, colours, said, points, style, place)
 
 
 def has_inverted(session: Session) -> bool:

@@ -43,7 +43,8 @@ class TriadLayer:
         plotter = self.stage.plotter
         shown = new.view.triad and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
-        key = (shown, flat, self.stage.look, tuple(plotter.window_size))
+        style = (self.stage.look, self.stage.font_scale)
+        key = (shown, flat, style, tuple(plotter.window_size))
         if key == self._drawn or not (shown or self._axes):
             return
         self._drawn = key

@@ -114,7 +114,8 @@ def add_colour_bar(
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
-    set_letters(bar.GetTitleTextProperty(), look, 14 * font_scale)
+    # A longer word would be cut off at the edge of the view.
+    set_letters(bar.GetTitleTextProperty(), look, (14 if len(title) < 11 else 13) * font_scale)
     set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
     bar.SetBarRatio(0.24)

@@ -46,6 +46,8 @@ class Stage:
         The colours of values, and of inverted cells below them; changed in place.
     point_words : tuple of (str, str)
         Words and colours of the nodes drawn as points, for the legend.
+    has_legend : bool
+        Whether the legend is drawn, if it is wanted, and its strip kept free.
     """
 
     def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
@@ -54,6 +56,7 @@ class Stage:
         self.font_scale = font_scale
         self.table = lookup_table()
         self.point_words: tuple[tuple[str, str], ...] = ()
+        self.has_legend = True
         self._values: tuple[object, FloatArray] | None = None
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:
@@ -92,6 +95,8 @@ class Stage:
 
     def strip(self) -> float:
         """Return how many pixels at the right are the legend's."""
+        if not self.has_legend:
+            return 0.0
         return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:

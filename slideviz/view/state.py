@@ -112,8 +112,8 @@ class ViewState:
     colour_by : {"role", "size_skew", "size", "skew", "displacement"}
         What the colours say.
     colour_range : (float, float) or None
-        Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to the largest
-        of all runs for the displacement.
+        Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
+        above the largest of all runs for the displacement.
     colour_map : str
         A key of `slideviz.view.look.COLOUR_MAPS`.
     threshold : (float, float) or None
@@ -145,7 +145,7 @@ class ViewState:
     marked : int or None
         The cell that is marked, by its number in the mesh.
     beside : int or None
-        The number of a run shown in a second view beside the first.
+        The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
     """
 
     colour_by: ColourBy = "role"
@@ -274,7 +274,7 @@ class Session:
             return self.view.colour_range
         if self.view.colour_by != "displacement":
             return 0.0, 1.0
-        return 0.0, self.largest_displacement or 1.0
+        return 0.0, round_above(self.largest_displacement) or 1.0
 
     @cached_property
     def largest_displacement(self) -> float:
@@ -288,6 +288,19 @@ class Session:
     def role(self, marker: str) -> Role:
         """Return the role of a boundary; those nobody named are fixed."""
         return self.case.roles.get(marker, "fixed")
+
+
+def round_above(value: float) -> float:
+    """Return a number of few digits that is at least ``value``, also after division by five."""
+    if not value > 0:
+        return 0.0
+    power = float(10.0 ** np.floor(np.log10(value)))
+    fit = (
+        digits
+        for digits in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+        if digits * power >= value
+    )
+    return float(f"{next(fit, 10.0) * power:.3g}")
 
 
 def essence(case: Case) -> Case:

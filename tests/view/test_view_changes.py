@@ -215,3 +215,21 @@ def test_store_tells_nobody_when_nothing_changed(session):
     assert not told
     store.change(changes.set_case, steps=3)
     assert [new.case.steps for new in told] == [3]
+
+
+def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
+    frame = Frame(session.mesh.with_points(session.mesh.points * 2.0), session.first.quality)
+    ran = changes.add_frames(changes.start_run(session), [frame, frame])
+    both = changes.show_beside(ran, changes.UNDEFORMED)
+    assert both.view.beside == changes.UNDEFORMED
+    assert changes.seen_beside(both).frame is session.first
+    assert both.frame is frame
+    gone = changes.remove_run(changes.end_run(both, "done"), 1)
+    assert gone.view.beside is None
+
+
+def test_the_range_of_the_displacement_ends_at_a_round_number():
+    from slideviz.view.state import round_above
+
+    for value, wanted in ((0.0202, 0.025), (1.0, 1.0), (9.1, 10.0), (3e-7, 3e-7), (0.0, 0.0)):
+        assert round_above(value) == pytest.approx(wanted, rel=1e-12)

@@ -170,7 +170,7 @@ def require_valid(session: Session):
     assert 0 <= view.frame < len(session.frames)
     assert session.frame is session.frames[view.frame]
     assert session.shown is None or session.run_shown is not None
-    assert view.beside is None or (
+    assert view.beside in (None, changes.UNDEFORMED) or (
         session.run(view.beside) is not None and view.beside != session.shown
     )
     numbers = [run.number for run in session.runs]

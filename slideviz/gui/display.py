@@ -1,0 +1,331 @@
+"""The display panel: colours and their range, chosen cells, points, neighbours, what is drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QIcon, QImage, QPixmap
+from qtpy.QtWidgets import (
+    QCheckBox,
+    QFormLayout,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.case.view_keys import MAPS
+from slideviz.gui.fields import Choice, NumberField, number_text
+from slideviz.mesh.periodic import Pair
+from slideviz.view import changes
+from slideviz.view.copies import passages_around
+from slideviz.view.layer_copies import Period
+from slideviz.view.state import COLOUR_BY, POINTS, Session
+from slideviz.view.store import Store
+
+MOST_COPIES = 9
+"""Neighbours on each side that can be chosen where a row has no end."""
+
+SHOWN: dict[str, tuple[str, str]] = {
+    "edges": ("Mesh edges", "Draw the edges of the cells."),
+    "undeformed": ("Undeformed", "Draw the undeformed boundaries as a ghost."),
+    "motion_ghost": ("Motion ghost", "Draw where the motions take the moving boundaries."),
+    "legend": ("Legend", "Draw the legend of roles or the colour bar."),
+    "triad": ("Axes", "Draw the directions of the axes in a corner."),
+    "perspective": ("Perspective", "Perspective instead of parallel projection."),
+}
+"""What can be drawn or not, with words and a sentence for it."""
+
+NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
+
+
+class Copies(QSpinBox):
+    """How many neighbouring passages are drawn, in words; the last value is all of a wheel."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("copies")
+        self.around: int | None = None
+        self.set_around(None)
+
+    def set_around(self, around: int | None) -> None:
+        """Take how many passages the wheel has; None: a row without an end."""
+        self.around = around
+        self.setRange(0, MOST_COPIES if around is None else max(around // 2, 1))
+
+    def textFromValue(self, value: int) -> str:  # noqa: N802
+        """Return the words for a number of neighbours."""
+        if value == 0:
+            return "none"
+        if self.around is not None and value == self.maximum():
+            return f"all {self.around} around"
+        return f"{value} on each side"
+
+    def valueFromText(self, text: str) -> int:  # noqa: N802
+        """Return the number that is typed, or that words stand for."""
+        if text.strip().startswith("all"):
+            return self.maximum()
+        digits = "".join(sign for sign in text if sign.isdigit())
+        return min(int(digits), self.maximum()) if digits else 0
+
+    def validate(self, text: str, at: int) -> object:
+        """Let anything be typed that a number can be read from."""
+        from qtpy.QtGui import QValidator
+
+        good = any(sign.isdigit() for sign in text) or text.strip() in ("none", "all")
+        state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
+        return state, text, at
+
+    def wheelEvent(self, event) -> None:  # noqa: N802
+        """Leave the wheel to the panel, which scrolls."""
+        event.ignore()
+
+
+class Span(QWidget):
+    """Two numbers, the first below the second."""
+
+    def __init__(self, name: str, changed) -> None:
+        super().__init__()
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(4)
+        self.low = NumberField(0.0, lambda value: self._must(value < self.high.value, value, "<"))
+        self.high = NumberField(1.0, lambda value: self._must(value > self.low.value, value, ">"))
+        for end, field in (("low", self.low), ("high", self.high)):
+            field.setObjectName(f"{name}_{end}")
+            field.setAccessibleName(f"{name} {end}")
+            field.changed.connect(lambda _: changed((self.low.value, self.high.value)))
+        row.addWidget(self.low, 1)
+        row.addWidget(QLabel("to"))
+        row.addWidget(self.high, 1)
+
+    def _must(self, good: bool, value: float, sign: str) -> str:
+        """Return why a number may not be at its end; empty where it may."""
+        if good:
+            return ""
+        than, other = ("less", self.high) if sign == "<" else ("greater", self.low)
+        return f"{number_text(value)} must be {than} than {number_text(other.value)}"
+
+    def show_values(self, values: tuple[float, float]) -> None:
+        """Show two numbers without telling."""
+        for field, value in zip((self.low, self.high), values, strict=True):
+            if value != field.value:
+                field.show_value(value)
+            field.setCursorPosition(0)
+
+    def set_tip(self, text: str) -> None:
+        """Explain both."""
+        self.low.set_tip(text)
+        self.high.set_tip(text)
+
+
+class DisplayPanel(QWidget):
+    """Shows how the mesh is looked at, and changes it."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__()
+        self.store = store
+        self._period = Period()
+        self._key: tuple[object, ...] = ()
+        self.form = QFormLayout(self._make_scroll())
+        self.form.setContentsMargins(6, 6, 6, 4)
+        self.form.setVerticalSpacing(5)
+        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._make_colours()
+        self._make_threshold()
+        self._make_rest()
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_scroll(self) -> QWidget:
+        outside = QVBoxLayout(self)
+        outside.setContentsMargins(0, 0, 0, 0)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QWidget()
+        scroll.setWidget(inside)
+        outside.addWidget(scroll)
+        return inside
+
+    def _make_colours(self) -> None:
+        self.colour_by = self._choice("display_colour_by", dict(COLOUR_BY), "colour_by")
+        self.colour_by.setToolTip("What the colours of the view say.")
+        self.form.addRow("Colour by", self.colour_by)
+        self.map = self._choice("colour_map", {name: name for name in MAPS}, "colour_map")
+        self.map.setIconSize(QSize(64, 12))
+        for index, name in enumerate(MAPS):
+            self.map.setItemIcon(index, map_icon(name))
+        self.map.setToolTip("The colours of values; all are told apart by colour-blind people.")
+        self.form.addRow("Colours", self.map)
+        self.range = Span("range", lambda values: self._set(colour_range=values))
+        self.range.set_tip("The values at the ends of the colour bar.")
+        row = QHBoxLayout()
+        row.setSpacing(3)
+        row.addWidget(self.range, 1)
+        self.fit_range = self._button("fit_range", "Fit", "From the lowest to the highest value "
+            "of the cells that are shown now", self._fit_range)  # fmt: skip
+        self.reset_range = self._button("reset_range", "Auto", "", self._reset_range)
+        row.addWidget(self.fit_range)
+        row.addWidget(self.reset_range)
+        self.form.addRow("Range", row)
+
+    def _make_threshold(self) -> None:
+        self.only = QCheckBox("Only cells")
+        self.only.setObjectName("only")
+        self.only.setToolTip("Draw only the cells whose value is within these two numbers.")
+        self.only.toggled.connect(self._only)
+        self.threshold = Span("threshold", lambda values: self._set(threshold=values))
+        self.threshold.set_tip("The lowest and highest value of the cells that are drawn.")
+        self.form.addRow(self.only, self.threshold)
+
+    def _make_rest(self) -> None:
+        self.points = self._choice("points", dict(POINTS), "points")
+        self.points.setToolTip(
+            "Draw nodes as points: those of the boundaries with what they may do, or the control "
+            "nodes that the step was interpolated with."
+        )
+        self.form.addRow("Points", self.points)
+        self.copies = Copies()
+        self.copies.valueChanged.connect(self._copies)
+        self.copies_label = QLabel("Passages")
+        self.form.addRow(self.copies_label, self.copies)
+        grid = QGridLayout()
+        grid.setVerticalSpacing(3)
+        self.shown: dict[str, QCheckBox] = {}
+        for index, (name, (word, tip)) in enumerate(SHOWN.items()):
+            box = QCheckBox(word)
+            box.setObjectName(f"show_{name}")
+            box.setToolTip(tip)
+            box.toggled.connect(lambda on, name=name: self._set(**{name: on}))
+            grid.addWidget(box, index // 2, index % 2)
+            self.shown[name] = box
+        self.form.addRow("Show", grid)
+
+    def _choice(self, name: str, words: dict, field: str) -> Choice:
+        choice = Choice(words)
+        choice.setObjectName(name)
+        choice.chosen.connect(lambda value: self._set(**{field: value}))
+        return choice
+
+    def _button(self, name: str, text: str, tip: str, function) -> QPushButton:
+        button = QPushButton(text)
+        button.setObjectName(name)
+        button.setFixedWidth(button.fontMetrics().horizontalAdvance(text) + 16)
+        button.setToolTip(tip)
+        button.clicked.connect(lambda _=False: function())
+        return button
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session; nothing is done while only steps or selection change."""
+        case, view = session.case, session.view
+        periodic = case.markers_with("periodic"), case.periodic_type, case.axis, case.origin
+        runs = session.runs if view.colour_by == "displacement" else ()
+        key = (session.mesh, session.pairs, view.style, periodic, runs)
+        if key == self._key:
+            return
+        self._key = key
+        widgets = (self.only, self.copies, *self.shown.values())
+        for widget in widgets:
+            widget.blockSignals(True)
+        try:
+            self._sync(session)
+        finally:
+            for widget in widgets:
+                widget.blockSignals(False)
+
+    def _sync(self, session: Session) -> None:
+        view, opened = session.view, session.mesh is not None
+        self.setEnabled(opened)
+        self.colour_by.show_value(view.colour_by)
+        self.map.show_value(view.colour_map)
+        valued = view.colour_by != "role"
+        for widget in (self.map, self.range, self.fit_range):
+            widget.setEnabled(valued)
+        self.range.show_values(session.colour_range)
+        self.reset_range.setEnabled(valued and view.colour_range is not None)
+        usual = "0 to the largest of all runs" if view.colour_by == "displacement" else "0 to 1"
+        self.reset_range.setToolTip(f"Back to {usual}")
+        self.only.setChecked(view.threshold is not None)
+        self.threshold.setEnabled(view.threshold is not None)
+        if view.threshold is not None:
+            self.threshold.show_values(view.threshold)
+        self.points.show_value(view.points)
+        self._sync_copies(session, self._period.of(session) if opened else None)
+        for name, box in self.shown.items():
+            box.setChecked(getattr(view, name))
+        flat = opened and session.mesh.dim == 2
+        self.shown["perspective"].setEnabled(not flat)
+        tip = (
+            "A 2D mesh is always shown in parallel projection." if flat else SHOWN["perspective"][1]
+        )
+        self.shown["perspective"].setToolTip(tip)
+
+    def _sync_copies(self, session: Session, pair: Pair | None) -> None:
+        self.copies.setEnabled(pair is not None)
+        self.copies_label.setEnabled(pair is not None)
+        if pair is None:
+            self.copies.setToolTip(NOT_PERIODIC)
+            self.copies_label.setToolTip(NOT_PERIODIC)
+            self.copies.setValue(0)
+            return
+        self.copies.set_around(passages_around(pair))
+        count = session.view.copies
+        self.copies.setValue(self.copies.maximum() if count < 0 else count)
+        tip = (
+            f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} repeat "
+            f"by {pair.describe()}."
+        )
+        self.copies.setToolTip(tip)
+        self.copies_label.setToolTip(tip)
+
+    # Widgets to state ------------------------------------------------------------------
+
+    def _set(self, **values: Any) -> None:
+        self.store.change(changes.set_view, **values)
+
+    def _reset_range(self) -> None:
+        self._set(colour_range=None)
+
+    def _values(self) -> np.ndarray:
+        """Return the values of the cells of the step that is shown."""
+        session = self.store.session
+        if session.frame is None:
+            return np.empty(0)
+        values = session.frame.values(session.view.colour_by, session.mesh)
+        return values[np.isfinite(values)]
+
+    def _fit_range(self) -> None:
+        values = self._values()
+        if len(values) and values.min() < values.max():
+            low, high = (float(f"{value:.3g}") for value in (values.min(), values.max()))
+            self._set(colour_range=(low, high) if low < high else None)
+
+    def _only(self, on: bool) -> None:
+        low, high = self.store.session.colour_range
+        # The worse half of the qualities is what one looks for.
+        self._set(threshold=(low, low + 0.5 * (high - low)) if on else None)
+
+    def _copies(self, value: int) -> None:
+        whole = self.copies.around is not None and value == self.copies.maximum()
+        self._set(copies=-1 if whole else value)
+
+
+def map_icon(name: str) -> QIcon:
+    """Return a picture of a colour map, from low to high."""
+    from matplotlib import colormaps
+
+    row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
+    pixels = np.ascontiguousarray(np.repeat(row[None], 12, axis=0))
+    image = QImage(pixels.tobytes(), 64, 12, 64 * 4, QImage.Format.Format_RGBA8888)
+    return QIcon(QPixmap.fromImage(image.copy()))

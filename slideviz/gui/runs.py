@@ -1,0 +1,374 @@
+"""The runs panel: what was computed with which settings, and how good it is."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QIcon, QPalette
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QMenu,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QToolButton,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.errors import SlidevizError
+from slideviz.gui import dialogs
+from slideviz.gui.icons import icon
+from slideviz.view import changes
+from slideviz.view.look import Look
+from slideviz.view.runs_table import best, brief, described, method_words, table_text, write_table
+from slideviz.view.state import Run, Session
+from slideviz.view.store import Store
+
+RUN, MIN, MEAN, INVERTED = range(4)
+NUMBER = Qt.ItemDataRole.UserRole
+EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
+TIP_UNDEFORMED = "Compare with the undeformed mesh, side by side"
+TABLE_FILTERS = "Table (*.csv)"
+PAD = 4
+TIPS = (
+    "Number and method; below it the settings. A double click shows a run beside the shown one.",
+    "Lowest quality of a cell after the last step; the best of all runs is bold.",
+    "Mean quality of the cells after the last step.",
+    "Inverted cells after the last step.",
+)
+
+
+class _FirstLine(QStyledItemDelegate):
+    """Draws a cell in the upper half of its row: the lower half is one line for all columns."""
+
+    def sizeHint(self, option, index) -> QSize:
+        item = QStyleOptionViewItem(option)
+        self.initStyleOption(item, index)  # the best is bold, thus wider
+        width = item.fontMetrics.horizontalAdvance(item.text) + 2 * PAD + 4
+        return QSize(width, 2 * option.fontMetrics.height() + 2 * PAD)
+
+    def paint(self, painter, option, index) -> None:
+        item = QStyleOptionViewItem(option)
+        self.initStyleOption(item, index)
+        element = QStyle.PrimitiveElement.PE_PanelItemViewItem
+        item.widget.style().drawPrimitive(element, item, painter, item.widget)
+        rect = item.rect.adjusted(PAD, PAD, -PAD, 0)
+        rect.setHeight(item.fontMetrics.height())
+        painter.save()
+        painter.setFont(item.font)
+        painter.setPen(text_colour(item, QPalette.ColorRole.Text))
+        image = index.data(Qt.ItemDataRole.DecorationRole)
+        if image is not None and not image.isNull():
+            image.paint(painter, rect.right() - 15, rect.top(), 16, rect.height())
+            rect.setRight(rect.right() - 18)
+        shown = item.fontMetrics.elidedText(item.text, Qt.TextElideMode.ElideRight, rect.width())
+        painter.drawText(rect, item.displayAlignment, shown)
+        painter.restore()
+
+
+def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
+    """Return the colour of letters in a row, chosen or not."""
+    chosen = bool(option.state & QStyle.StateFlag.State_Selected)
+    active = bool(option.state & QStyle.StateFlag.State_Active)
+    group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
+    return option.palette.color(group, QPalette.ColorRole.HighlightedText if chosen else plain)
+
+
+class RunTree(QTreeWidget):
+    """A row for each run: numbers in columns, and below them a line over the whole width."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("runs")
+        self.setColumnCount(4)
+        self.setHeaderLabels(["Run", "Min", "Mean", "Inv."])
+        self.setRootIsDecorated(False)
+        self.setUniformRowHeights(True)
+        self.setAlternatingRowColors(True)
+        self.setAllColumnsShowFocus(True)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.setItemDelegate(_FirstLine(self))
+        self.setMinimumHeight(80)
+        for column, tip in enumerate(TIPS):
+            self.headerItem().setToolTip(column, tip)
+        header = self.header()
+        header.setStretchLastSection(False)
+        header.setMinimumSectionSize(36)
+        header.setSectionResizeMode(RUN, QHeaderView.ResizeMode.Stretch)
+        for column in (MIN, MEAN, INVERTED):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+            self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        self.seen_before: tuple[int | None, int, int | None] = (None, 0, None)
+        self.session: Callable[[], Session] = Session
+
+    def mousePressEvent(self, event) -> None:
+        # A double click begins with a click, which shows the run: what was shown before it is
+        # what the run is to be compared with.
+        now = self.session()
+        self.seen_before = now.shown, now.view.frame, now.view.beside
+        super().mousePressEvent(event)
+
+    def drawRow(self, painter, option, index) -> None:
+        super().drawRow(painter, option, index)
+        rect = self.visualRect(index.siblingAtColumn(RUN))
+        height = option.fontMetrics.height()
+        rect = rect.adjusted(PAD, height + PAD, 0, 0)
+        rect.setRight(self.viewport().width() - PAD)
+        rect.setHeight(height)
+        row = QStyleOptionViewItem(option)
+        if self.selectionModel().isSelected(index):
+            row.state |= QStyle.StateFlag.State_Selected
+        painter.save()
+        painter.setPen(text_colour(row, QPalette.ColorRole.PlaceholderText))
+        text = str(index.siblingAtColumn(RUN).data(NUMBER + 1))
+        shown = option.fontMetrics.elidedText(text, Qt.TextElideMode.ElideRight, rect.width())
+        painter.drawText(rect, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, shown)
+        painter.restore()
+
+
+class RunsPanel(QWidget):
+    """Lists the runs; a click shows one, a double click shows it beside the one that is shown.
+
+    Parameters
+    ----------
+    store : Store
+    save_mesh : callable
+        Asks for a name and writes the mesh that is shown.
+    tell_error : callable
+        Shows an error.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        save_mesh: Callable[[], None] = lambda: None,
+        tell_error: Callable[[BaseException], None] = lambda _: None,
+    ) -> None:
+        super().__init__()
+        self.store, self._save, self._tell_error = store, save_mesh, tell_error
+        self._syncing = False
+        self._drawn: tuple[object, ...] = ()
+        self._colour = "#3b4652"
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 4)
+        layout.setSpacing(4)
+        self.empty = QLabel(EMPTY)
+        self.empty.setWordWrap(True)
+        self.empty.setProperty("hint", True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.tree = RunTree()
+        self.tree.session = lambda: self.store.session
+        self.tree.currentItemChanged.connect(self._chosen)
+        self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
+        self.tree.customContextMenuRequested.connect(self._menu_wanted)
+        layout.addWidget(self.empty, 1)
+        layout.addWidget(self.tree, 1)
+        layout.addLayout(self._make_buttons())
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(2)
+        self.buttons: dict[str, QToolButton] = {}
+        for name, image, tip, function in (
+            ("undeformed", "undeformed", TIP_UNDEFORMED, self.compare_undeformed),
+            ("settings", "settings", "Put its settings back into the panels", self.take_settings),
+            ("save", "save", "Save the mesh of this run", self.save_mesh),
+            ("remove", "remove", "Remove this run from the list", self.remove),
+            ("copy", "copy", "Copy the table of all runs", self.copy_table),
+            ("export", "table", "Export the table of all runs as CSV", self.export_table),
+        ):
+            button = QToolButton()
+            button.setObjectName(f"runs_{name}")
+            button.setToolTip(tip)
+            button.setIconSize(QSize(18, 18))
+            button.setProperty("image", image)
+            button.clicked.connect(lambda _=False, function=function: function())
+            self.buttons[name] = button
+            if name == "copy":
+                row.addStretch(1)
+            row.addWidget(button)
+        self.buttons["undeformed"].setCheckable(True)
+        self.take_theme(None, self._colour)
+        return row
+
+    def take_theme(self, _look: Look | None, colour: str) -> None:
+        """Draw the icons in the colours of another theme."""
+        self._colour = colour
+        for button in self.buttons.values():
+            button.setIcon(icon(button.property("image"), colour))
+        self._drawn = ()
+        if hasattr(self, "tree") and self.store.session.runs:
+            self.sync(self.store.session)
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session; the rows are touched only when a run or the choice differs."""
+        key = (session.runs, session.shown, session.view.beside)
+        if key == self._drawn:
+            return
+        self._drawn = key
+        self._syncing = True
+        try:
+            self._fill(session)
+        finally:
+            self._syncing = False
+        self.empty.setVisible(not session.runs)
+        self.tree.setVisible(bool(session.runs))
+        run = session.run_shown
+        done = run is not None and run.last is not None
+        for name, can in (
+            ("undeformed", done),
+            ("settings", run is not None),
+            ("save", done and bool(run.end)),
+            ("remove", run is not None and bool(run.end)),
+            ("copy", bool(session.runs)),
+            ("export", bool(session.runs)),
+        ):
+            self.buttons[name].setEnabled(can)
+        self.buttons["undeformed"].setChecked(session.view.beside == changes.UNDEFORMED)
+
+    def _fill(self, session: Session) -> None:
+        tree, runs = self.tree, session.runs
+        while tree.topLevelItemCount() > len(runs):
+            tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
+        while tree.topLevelItemCount() < len(runs):
+            tree.addTopLevelItem(QTreeWidgetItem())
+        champion = best(runs)
+        for place, run in enumerate(runs):
+            self._sync_row(tree.topLevelItem(place), run, session, run.number == champion)
+        shown = next((place for place, run in enumerate(runs) if run.number == session.shown), None)
+        tree.setCurrentItem(tree.topLevelItem(shown) if shown is not None else None)
+
+    def _sync_row(self, item: QTreeWidgetItem, run: Run, session: Session, champion: bool) -> None:
+        last = run.last
+        texts = [f"{run.number}  {method_words(run.case)}", "–", "–", "–"]
+        if last is not None:
+            quality = last.quality
+            texts[1:] = f"{quality.min:.4f}", f"{quality.mean:.4f}", f"{quality.inverted:,}"
+        beside = run.number == session.view.beside
+        tip = described(run)
+        if champion:
+            tip += "\n\nIts minimum quality is the highest of all runs."
+        for column, text in enumerate(texts):
+            item.setText(column, text)
+            item.setToolTip(column, tip)
+            if column != RUN:
+                item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        font = item.font(MIN)
+        font.setBold(champion)
+        item.setFont(MIN, font)
+        item.setData(RUN, NUMBER, run.number)
+        item.setData(RUN, NUMBER + 1, ("beside · " if beside else "") + brief(run))
+        item.setIcon(RUN, icon("beside", self._colour) if beside else QIcon())
+
+    # Widgets to state ------------------------------------------------------------------
+
+    @property
+    def _number(self) -> int | None:
+        item = self.tree.currentItem()
+        return None if item is None else item.data(RUN, NUMBER)
+
+    def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
+        if not self._syncing and item is not None:
+            self.store.change(changes.show_run, item.data(RUN, NUMBER))
+
+    def _double_clicked(self) -> None:
+        """Show the run beside the one that was shown before, or end the comparison with it."""
+        number, (before, frame, beside) = self._number, self.tree.seen_before
+        if number is None:
+            return
+        if before is None or before == number:
+            self.store.change(changes.show_beside, None)
+            return
+        self.store.change(changes.show_run, before)
+        self.store.change(changes.show_beside, None if beside == number else number)
+        self.store.change(changes.show_frame, frame)
+
+    def _menu_wanted(self, where) -> None:
+        item = self.tree.itemAt(where)
+        if item is None:
+            return
+        self.menu(item.data(RUN, NUMBER)).popup(self.tree.viewport().mapToGlobal(where))
+
+    def menu(self, number: int) -> QMenu:
+        """Return what can be done with a run."""
+        session, menu = self.store.session, QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        run = session.run(number)
+        beside = session.view.beside == number
+        for text, can, function in (
+            ("Show", True, lambda: self.store.change(changes.show_run, number)),
+            (
+                "End the comparison" if beside else "Show beside the run that is shown",
+                beside or number != session.shown,
+                lambda: self.store.change(changes.show_beside, None if beside else number),
+            ),
+            ("Put its settings back into the panels", True, lambda: self.take_settings(number)),
+            ("Save its mesh…", bool(run.frames and run.end), lambda: self.save_mesh(number)),
+            ("Remove", bool(run.end), lambda: self.remove(number)),
+            ("", True, None),
+            ("Copy the table", True, self.copy_table),
+            ("Export the table…", True, self.export_table),
+        ):
+            if not text:
+                menu.addSeparator()
+                continue
+            act = menu.addAction(text)
+            act.setEnabled(can)
+            act.triggered.connect(lambda _=False, function=function: function())
+        return menu
+
+    # What can be done ------------------------------------------------------------------
+
+    def compare_undeformed(self) -> None:
+        """Show the undeformed mesh beside the run that is shown, or no longer."""
+        ends = self.store.session.view.beside == changes.UNDEFORMED
+        self.store.change(changes.show_beside, None if ends else changes.UNDEFORMED)
+
+    def take_settings(self, number: int | None = None) -> None:
+        """Put the settings of a run back into the panels."""
+        self.store.change(changes.take_settings, number or self._number)
+
+    def save_mesh(self, number: int | None = None) -> None:
+        """Show a run and save the mesh of its last step."""
+        self.store.change(changes.show_run, number or self._number)
+        self._save()
+
+    def remove(self, number: int | None = None) -> None:
+        """Remove a run from the list."""
+        self.store.change(changes.remove_run, number or self._number)
+
+    def copy_table(self) -> None:
+        """Put the table into the clipboard, for a spreadsheet."""
+        QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
+
+    def export_table(self) -> None:
+        """Ask for a name and write the table."""
+        session = self.store.session
+        folder = session.path.parent if session.path is not None else Path.home()
+        stem = session.path.stem if session.path is not None else "mesh"
+        default = folder / f"{stem}_runs.csv"
+        path = dialogs.ask_save(self, "Export the table of runs", default, TABLE_FILTERS)
+        if path is None:
+            return
+        try:
+            write_table(path, session.runs)
+        except SlidevizError as error:
+            self._tell_error(error)

@@ -1,0 +1,206 @@
+"""The display panel, driven by mouse and keyboard."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from qtpy.QtCore import Qt
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
+
+from slideviz.case.samples import write_sample
+from slideviz.gui.display import MOST_COPIES, NOT_PERIODIC, SHOWN, Copies
+from slideviz.view import changes
+from slideviz.view.layer_copies import CopyLayer
+from slideviz.view.pick import to_display
+
+
+@pytest.fixture
+def shown(driver, sample_folder):
+    """The case of the passage, with the panel in front."""
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    driver.window.docks["display"].raise_()
+    driver.qtbot.waitUntil(panel(driver).isVisible)
+    return driver
+
+
+def panel(driver):
+    return driver.window.docks_.panels["display"]
+
+
+def view(driver):
+    return driver.session.view
+
+
+def test_colours_and_map_are_chosen_and_undone(shown):
+    shown.choose(panel(shown).colour_by, "skew")
+    assert view(shown).colour_by == "skew"
+    assert shown.window.actions_.colour.currentData() == "skew"
+    shown.choose(panel(shown).map, "cividis")
+    assert view(shown).colour_map == "cividis"
+    assert shown.window.scene.stage.table.cmap.name == "cividis"
+    shown.window.actions_.by_name["undo"].trigger()
+    assert view(shown).colour_map == "viridis"
+    assert panel(shown).map.currentData() == "viridis"
+
+
+def test_the_range_is_typed_checked_and_reset(shown):
+    box = panel(shown)
+    assert not box.range.isEnabled(), "roles have no range"
+    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    assert box.range.isEnabled()
+    assert (box.range.low.text(), box.range.high.text()) == ("0", "1")
+    assert not box.reset_range.isEnabled()
+    shown.type(box.range.low, "0.4")
+    assert view(shown).colour_range == (0.4, 1.0)
+    assert tuple(shown.window.scene.stage.table.scalar_range) == (0.4, 1.0)
+    box.range.high.setFocus()
+    box.range.high.selectAll()
+    QTest.keyClicks(box.range.high, "0.3")
+    assert box.range.high.property("bad")
+    assert box.range.high.toolTip() == "0.3 must be greater than 0.4"
+    assert view(shown).colour_range == (0.4, 1.0)
+    shown.click(box.reset_range)
+    assert view(shown).colour_range is None
+    assert (box.range.low.value, box.range.high.value) == (0.0, 1.0)
+
+
+def test_the_range_fits_the_values_of_the_step(shown):
+    shown.window.store.change(changes.set_view, colour_by="skew")
+    shown.click(panel(shown).fit_range)
+    low, high = view(shown).colour_range
+    values = shown.session.frame.quality.skew
+    assert low == pytest.approx(values.min(), rel=1e-2)
+    assert high == pytest.approx(values.max(), rel=1e-2)
+    shown.click(panel(shown).reset_range)
+    assert view(shown).colour_range is None
+
+
+def test_only_cells_of_a_range_are_chosen(shown):
+    box = panel(shown)
+    assert not box.threshold.isEnabled()
+    shown.click(box.only)
+    assert view(shown).threshold == (0.0, 0.5)
+    shown.type(box.threshold.high, "0.7")
+    assert view(shown).threshold == (0.0, 0.7)
+    shown.type(box.threshold.low, "0.9")
+    assert view(shown).threshold == (0.0, 0.7), "0.9 to 0.7 is no range"
+    assert box.threshold.low.text() == "0"
+    shown.click(box.only)
+    assert view(shown).threshold is None
+
+
+def test_points_are_chosen_and_drawn(shown):
+    shown.choose(panel(shown).points, "types")
+    assert view(shown).points == "types"
+    assert shown.window.view.actors["points:nodes"].visibility
+    shown.choose(panel(shown).points, "none")
+    assert not shown.window.view.actors["points:nodes"].visibility
+
+
+@pytest.fixture(scope="module")
+def stator(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stator")
+    write_sample("stator", folder, size=5000)
+    return folder / "stator.cfg"
+
+
+def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
+    box = panel(shown)
+    assert box.copies.isEnabled()
+    assert box.copies.text() == "none"
+    assert box.copies.maximum() == MOST_COPIES
+    QTest.keyClick(box.copies, Qt.Key.Key_Up)
+    assert view(shown).copies == 1
+    assert box.copies.text() == "1 on each side"
+    scene = shown.window.scene
+    copies = next(layer for layer in scene.layers if isinstance(layer, CopyLayer))
+    seen = to_display(scene.plotter, np.concatenate([one.points for one in copies.shapes()]))
+    assert seen.min() >= 0, "the view fits them"
+    assert (seen.max(axis=0) <= scene.plotter.window_size).all()
+    shown.open(stator)
+    assert box.copies.text() == "none"
+    assert "41" not in box.copies.toolTip()
+    assert "8.78049° about z" in box.copies.toolTip()
+    box.copies.setValue(box.copies.maximum())
+    assert box.copies.text() == "all 41 around"
+    assert view(shown).copies == -1
+    assert len([n for n in shown.window.view.actors if n.startswith("copy:")]) == 40 * 7
+    shown.window.actions_.by_name["undo"].trigger()
+    assert view(shown).copies == 0
+    assert box.copies.value() == 0
+
+
+def test_a_mesh_that_does_not_repeat_says_why_there_are_no_neighbours(shown):
+    session = shown.session
+    lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
+    shown.window.store.put(replace(lonely, pairs=()))
+    assert not panel(shown).copies.isEnabled()
+    assert panel(shown).copies.toolTip() == NOT_PERIODIC
+
+
+def test_a_number_of_neighbours_can_be_typed(qtbot):
+    box = Copies()
+    qtbot.addWidget(box)
+    box.set_around(41)
+    assert box.maximum() == 20
+    for text, wanted in (
+        ("3", 3),
+        ("7 on each side", 7),
+        ("all 41 around", 20),
+        ("none", 0),
+        ("99", 20),
+    ):
+        box.lineEdit().setText(text)
+        box.interpretText()
+        assert box.value() == wanted, text
+    box.set_around(None)
+    assert box.value() <= MOST_COPIES
+    box.set_around(2)
+    box.setValue(1)
+    assert box.text() == "all 2 around"
+
+
+@pytest.mark.parametrize("name", [name for name in SHOWN if name != "perspective"])
+def test_what_is_drawn_is_switched_and_agrees_with_the_menu(shown, name):
+    box, before = panel(shown).shown[name], getattr(view(shown), name)
+    shown.click(box)
+    assert getattr(view(shown), name) != before
+    action = shown.window.actions_.by_name[name]
+    assert action.isChecked() != before
+    action.trigger()
+    assert box.isChecked() == before == getattr(view(shown), name)
+
+
+def test_perspective_is_for_solid_meshes(shown, sample_folder):
+    box = panel(shown).shown["perspective"]
+    assert not box.isEnabled()
+    assert "2D" in box.toolTip()
+    shown.open(sample_folder / "hexahedron" / "mesh.su2")
+    assert box.isEnabled()
+    shown.click(box)
+    assert not shown.window.view.camera.parallel_projection
+
+
+def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file):
+    assert not panel(driver).isEnabled()
+    driver.open(passage_file)
+    assert panel(driver).isEnabled()
+    driver.window.docks["display"].raise_()
+    QApplication.processEvents()
+    box = panel(driver)
+    for widget in (box.colour_by, box.threshold, box.copies, *box.shown.values()):
+        right = widget.mapTo(box, widget.rect().topRight()).x()
+        assert right < box.width(), widget.objectName()
+        assert widget.width() >= widget.minimumSizeHint().width(), widget.objectName()
+
+
+def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
+    synced = []
+    monkeypatch.setattr(panel(shown), "_sync", lambda session: synced.append(session))
+    shown.window.store.change(changes.select, ("airfoil",))
+    shown.window.store.change(changes.mark, 3)
+    shown.window.store.change(changes.start_run)
+    assert not synced
+    shown.window.store.change(changes.set_view, edges=False)
+    assert len(synced) == 1

@@ -1,0 +1,351 @@
+"""The runs panel and two views side by side, driven by mouse and keyboard."""
+
+import csv
+import gc
+import weakref
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QCoreApplication, QEvent, QPoint, QPointF, Qt
+from qtpy.QtGui import QWheelEvent
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
+
+from slideviz.gui.runs import INVERTED, MEAN, MIN, NUMBER, RUN
+from slideviz.view import changes
+from slideviz.view.look import DARK
+from slideviz.view.pick import to_display
+
+
+@pytest.fixture
+def ran(driver, sample_folder):
+    """Two runs of the passage: pseudo sliding in its steps, direct sliding in three."""
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    window = driver.window
+    for settings in ({"sliding": "ps", "steps": 2}, {"sliding": "ds", "steps": 3}):
+        window.store.change(changes.set_case, **settings)
+        window.start_run()
+        driver.settle()
+    window.docks["runs"].raise_()
+    driver.qtbot.waitUntil(lambda: window.docks_.panels["runs"].tree.isVisible())
+    return driver
+
+
+def panel(driver):
+    return driver.window.docks_.panels["runs"]
+
+
+def row(driver, number):
+    tree = panel(driver).tree
+    items = [tree.topLevelItem(place) for place in range(tree.topLevelItemCount())]
+    return next(item for item in items if item.data(RUN, NUMBER) == number)
+
+
+def click(driver, number, double=False):
+    tree = panel(driver).tree
+    where = tree.visualItemRect(row(driver, number)).center()
+    button = Qt.MouseButton.LeftButton
+    QTest.mouseClick(tree.viewport(), button, pos=where)
+    if double:
+        QTest.mouseDClick(tree.viewport(), button, pos=where)
+
+
+def actions(driver, number):
+    return {act.text(): act for act in panel(driver).menu(number).actions() if act.text()}
+
+
+# The panel --------------------------------------------------------------------------------
+
+
+def test_without_runs_the_panel_says_what_will_be_there(driver, passage_file):
+    driver.open(passage_file)
+    driver.window.docks["runs"].raise_()
+    assert "Nothing was computed yet" in panel(driver).empty.text()
+    assert not panel(driver).tree.isVisibleTo(panel(driver))
+    assert not any(button.isEnabled() for button in panel(driver).buttons.values())
+
+
+def test_each_run_has_a_row_with_its_quality_and_the_best_is_bold(ran):
+    runs = ran.session.runs
+    best = max(runs, key=lambda run: run.last.quality.min).number
+    for run in runs:
+        item, quality = row(ran, run.number), run.last.quality
+        assert item.text(MIN) == f"{quality.min:.4f}"
+        assert item.text(MEAN) == f"{quality.mean:.4f}"
+        assert item.text(INVERTED) == str(quality.inverted)
+        assert item.font(MIN).bold() == (run.number == best)
+        assert f"{run.last.step.control_nodes:,} nodes" in item.data(RUN, NUMBER + 1)
+        assert f"steps: {len(run.frames)}" in item.toolTip(RUN)
+    assert row(ran, 1).text(RUN) == "1  pseudo sliding"
+    assert row(ran, 2).text(RUN) == "2  direct sliding"
+    assert panel(ran).tree.currentItem() is row(ran, 2)
+
+
+def test_a_click_and_the_arrow_keys_show_a_run(ran):
+    click(ran, 1)
+    assert ran.session.shown == 1
+    assert ran.session.view.frame == 2
+    QTest.keyClick(panel(ran).tree, Qt.Key.Key_Down)
+    assert ran.session.shown == 2
+    assert ran.session.view.frame == 3
+
+
+def test_a_double_click_compares_with_the_run_that_was_shown(ran):
+    ran.window.store.change(changes.show_frame, 1)
+    click(ran, 1, double=True)
+    session = ran.session
+    assert (session.shown, session.view.beside, session.view.frame) == (2, 1, 1)
+    assert ran.window.viewing.second is not None
+    assert "beside" in row(ran, 1).data(RUN, NUMBER + 1)
+    click(ran, 1, double=True)
+    assert (ran.session.shown, ran.session.view.beside) == (2, None)
+    assert ran.window.viewing.second is None
+
+
+def test_a_row_grows_while_its_run_goes_on(ran):
+    session = ran.session
+    running = changes.add_frames(changes.start_run(session), session.runs[1].frames[:1])
+    ran.window.store.put(running)
+    assert "running · " in row(ran, 3).data(RUN, NUMBER + 1)
+    assert "1 of 3 steps" in row(ran, 3).data(RUN, NUMBER + 1)
+    assert not panel(ran).buttons["remove"].isEnabled()
+    ran.window.store.change(changes.add_frames, session.runs[1].frames[1:])
+    ran.window.store.change(changes.end_run, "done")
+    assert row(ran, 3).data(RUN, NUMBER + 1).split(" · ")[:2] == ["moving vertices", "3 steps"]
+    assert panel(ran).buttons["remove"].isEnabled()
+
+
+def test_settings_are_put_back_and_that_can_be_undone(ran):
+    assert ran.session.case.sliding == "ds"
+    click(ran, 1)
+    ran.click(panel(ran).buttons["settings"])
+    assert (ran.session.case.sliding, ran.session.case.steps) == ("ps", 2)
+    assert ran.window.method.sliding.currentData() == "ps"
+    ran.window.actions_.by_name["undo"].trigger()
+    assert (ran.session.case.sliding, ran.session.case.steps) == ("ds", 3)
+
+
+def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
+    assert not actions(ran, 2)["Show beside the run that is shown"].isEnabled()
+    actions(ran, 1)["Show beside the run that is shown"].trigger()
+    assert ran.session.view.beside == 1
+    actions(ran, 1)["End the comparison"].trigger()
+    assert ran.session.view.beside is None
+    answers("ask_save", tmp_path / "one.su2")
+    actions(ran, 1)["Save its mesh…"].trigger()
+    ran.settle()
+    assert (tmp_path / "one.su2").exists()
+    assert ran.session.run(1).saved
+    assert not ran.session.run(2).saved
+    actions(ran, 1)["Remove"].trigger()
+    assert [run.number for run in ran.session.runs] == [2]
+    assert ran.session.shown == 2
+    assert panel(ran).tree.topLevelItemCount() == 1
+
+
+def test_the_table_is_exported_and_copied(ran, answers, tmp_path):
+    answers("ask_save", tmp_path / "runs.csv")
+    ran.click(panel(ran).buttons["export"])
+    with (tmp_path / "runs.csv").open() as file:
+        found = list(csv.DictReader(file))
+    assert [line["method"] for line in found] == ["pseudo sliding", "direct sliding"]
+    ran.click(panel(ran).buttons["copy"])
+    lines = QApplication.clipboard().text().splitlines()
+    assert len(lines) == 3
+    assert lines[1].split("\t")[1] == "pseudo sliding"
+
+
+def test_a_table_that_cannot_be_written_is_told(ran, answers, tmp_path):
+    answers("ask_save", tmp_path / "nowhere" / "runs.csv")
+    ran.click(panel(ran).buttons["export"])
+    assert "the folder does not exist" in ran.window.banner.text.text()
+    answers("ask_save", None)
+    ran.click(panel(ran).buttons["export"])
+
+
+def test_playing_does_not_touch_the_rows(ran, monkeypatch):
+    filled = []
+    monkeypatch.setattr(panel(ran), "_fill", lambda session: filled.append(session))
+    for frame in (0, 1, 2, 3):
+        ran.window.store.change(changes.show_frame, frame)
+    assert not filled
+
+
+# Side by side -----------------------------------------------------------------------------
+
+
+def compare(driver, number=1):
+    driver.window.store.change(changes.show_beside, number)
+    viewing = driver.window.viewing
+    driver.qtbot.waitUntil(lambda: viewing.second.isVisible())
+    return viewing
+
+
+def test_both_views_have_half_the_room_and_a_title(ran):
+    viewing = compare(ran)
+    QApplication.processEvents()
+    assert abs(viewing.view.width() - viewing.second.width()) <= 2
+    assert viewing.titles[0].text.startswith("Run 2: direct sliding")
+    assert viewing.titles[1].text.startswith("Run 1: pseudo sliding")
+    assert viewing.titles[1].isVisible()
+    ran.click(viewing.titles[1].close_button)
+    assert ran.session.view.beside is None
+    assert viewing.second is None
+    assert not viewing.titles[0].isVisible()
+
+
+def test_one_legend_and_one_range_serve_both(ran):
+    viewing = compare(ran)
+    ran.window.store.change(changes.set_view, colour_by="displacement")
+    assert not viewing.view.scalar_bars.keys()
+    assert list(viewing.second.scalar_bars.keys()) == ["displacement"]
+    ranges = [tuple(scene.stage.table.scalar_range) for scene in viewing._scenes()]
+    assert ranges[0] == ranges[1] == ran.session.colour_range
+    ran.window.store.change(changes.show_beside, None)
+    assert list(viewing.view.scalar_bars.keys()) == ["displacement"]
+
+
+def test_the_whole_mesh_is_seen_in_both_and_a_detail_stays_one(ran):
+    viewing = compare(ran)
+    for view, scene in ((viewing.view, viewing.scene), (viewing.second, viewing.second_scene)):
+        points = np.concatenate([one.shape.points for one in scene.drawn.values()])
+        seen = to_display(view, points)
+        assert seen.min() >= 0
+        assert (seen.max(axis=0) <= view.window_size).all()
+    ran.window.store.change(changes.show_beside, None)
+    viewing.scene.zoom_at(200, 200, 5.0)
+    scale = viewing.view.camera.parallel_scale
+    compare(ran)
+    assert viewing.second.camera.parallel_scale == viewing.view.camera.parallel_scale == scale
+
+
+@pytest.mark.parametrize("leads", [0, 1])
+def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
+    viewing = compare(ran)
+    views = (viewing.view, viewing.second)
+    QApplication.processEvents()
+    painted = []
+    views[1 - leads].told.resized.disconnect()
+    views[1 - leads]._soon.timeout.connect(lambda: painted.append(1))
+    where = QPointF(60, 90)
+    none = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase
+    wheel = QWheelEvent(where, where, QPoint(), QPoint(0, 120), *none, False)
+    before = viewing.scene.eye.place
+    QApplication.sendEvent(views[leads], wheel)
+    assert viewing.scene.eye.place != before
+    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    ran.qtbot.waitUntil(lambda: bool(painted))
+    before = viewing.scene.eye.place
+    left = Qt.MouseButton.LeftButton
+    QTest.mousePress(views[leads], left, pos=QPoint(80, 80))
+    for step in range(1, 6):
+        QTest.mouseMove(views[leads], QPoint(80 + 8 * step, 80 + 4 * step))
+    QTest.mouseRelease(views[leads], left, pos=QPoint(120, 100))
+    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    for name in ("fit",):
+        ran.window.actions_.by_name[name].trigger()
+        assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+
+
+def test_linked_views_come_to_rest(ran, qtbot):
+    viewing = compare(ran)
+    drawn = []
+    for view in (viewing.view, viewing.second):
+        view._soon.timeout.connect(lambda: drawn.append(1))
+    viewing.scene.zoom_at(50, 50, 1.1)
+    qtbot.waitUntil(lambda: bool(drawn))
+    for _ in range(40):
+        QApplication.processEvents()
+    assert len(drawn) < 8
+
+
+def test_look_from_and_rotation_of_a_solid_mesh_are_shared(driver, sample_folder):
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    driver.window.start_run()
+    driver.settle()
+    viewing = compare(driver, changes.UNDEFORMED)
+    assert viewing.titles[1].text == "Undeformed mesh"
+    for side in ("+x", "-y", "iso"):
+        driver.window.actions_.by_name[f"side{side}"].trigger()
+        assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    driver.window.store.change(changes.set_view, perspective=True)
+    assert not viewing.second.camera.parallel_projection
+    viewing.second.camera.Azimuth(20)
+    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    block = {
+        name: scene.drawn["BLOCK"].shape.points
+        for name, scene in zip("ab", viewing._scenes(), strict=True)
+    }
+    assert np.allclose(
+        block["b"], driver.session.mesh.points[viewing.scene.drawn["BLOCK"].surface.nodes]
+    )
+    assert not np.allclose(block["a"], block["b"])
+
+
+def test_steps_hiding_and_selection_act_on_both(ran):
+    viewing = compare(ran)
+    store = ran.window.store
+    shown = {step: (0, 1, 1, 2)[step] for step in range(4)}
+    for step, other in shown.items():
+        store.change(changes.show_frame, step)
+        frame = ran.session.run(1).frames[other - 1] if other else ran.session.first
+        nodes = viewing.scene.drawn["airfoil"].surface.nodes
+        seen = np.asarray(viewing.second_scene.drawn["airfoil"].shape.points)[:, :2]
+        assert np.allclose(seen, frame.mesh.points[nodes]), step
+    store.change(changes.show, ("airfoil",), False)
+    store.change(changes.select, ("inlet",) if "inlet" in ran.session.case.roles else ("airfoil",))
+    for scene in viewing._scenes():
+        assert not scene.drawn["airfoil"].actor.visibility
+    store.change(changes.show, ("airfoil",))
+    for scene in viewing._scenes():
+        assert scene.drawn["airfoil"].actor.visibility
+
+
+def test_a_click_in_the_second_view_selects(ran):
+    viewing = compare(ran)
+    scene = viewing.second_scene
+    viewing.second.snapshot()
+    points = np.asarray(scene.drawn["airfoil"].shape.points)
+    x, y = to_display(viewing.second, points[:1])[0] / viewing.second.devicePixelRatioF()
+    where = QPoint(round(x), round(viewing.second.height() - 1 - y))
+    QTest.mouseClick(viewing.second, Qt.MouseButton.LeftButton, pos=where)
+    assert ran.session.view.selected == ("airfoil",)
+    for one in viewing._scenes():
+        assert one.drawn["airfoil"].band.visibility
+
+
+def test_the_theme_reaches_both(ran):
+    viewing = compare(ran)
+    ran.window.set_theme("dark")
+    assert [scene.look for scene in viewing._scenes()] == [DARK, DARK]
+    assert viewing.second.snapshot()[-3, 3].max() < 60
+
+
+def test_comparing_twenty_times_leaves_nothing_behind(ran):
+    viewing, gone = ran.window.viewing, []
+    observed = viewing.view.camera.HasObserver
+    for turn in range(20):
+        compare(ran, turn % 2)
+        gone += [weakref.ref(viewing.second), weakref.ref(viewing.second_scene)]
+        ran.window.store.change(changes.show_beside, None)
+        QApplication.processEvents()
+    assert not observed("ModifiedEvent")
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.collect()
+    assert [one() for one in gone if one() is not None] == []
+
+
+def test_another_mesh_ends_the_comparison(ran, passage_file, answers):
+    viewing = compare(ran)
+    answers("ask_unsaved", "discard")
+    ran.open(passage_file)
+    assert viewing.second is None
+    assert not any(title.isVisible() for title in viewing.titles)
+    assert ran.session.view.beside is None
+
+
+def test_the_window_closes_during_a_comparison(ran, answers):
+    compare(ran)
+    answers("ask_unsaved", "discard")
+    ran.window.close()
+    assert not ran.window.isVisible()
