@@ -157,7 +157,7 @@ def test_renumbering_nodes_renumbers_the_result(tmp_path, sliding):
     case, mesh = case_of("square", tmp_path, 15)
     found = sample("square", 15, "motion")
     case = found.case.change(
-        sliding=sliding, periodic="periodic", steps=1, reduction=Reduction(tolerance=1e-4)
+        sliding=sliding, periodic="periodic", steps=3, reduction=Reduction(tolerance=1e-4)
     )
     order = np.random.default_rng(0).permutation(len(mesh.points))
     back = np.argsort(order)
@@ -175,9 +175,12 @@ def test_renumbering_nodes_renumbers_the_result(tmp_path, sliding):
     np.testing.assert_allclose(b.mesh.points, a.mesh.points[order], atol=1e-12)
 
 
-def test_threads_and_chunks_change_nothing(tmp_path, monkeypatch):
+@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
+def test_threads_and_chunks_change_nothing(tmp_path, monkeypatch, sliding):
     case, mesh = case_of("cylindrical", tmp_path, 9)
-    case = case.change(steps=1, reduction=Reduction(tolerance=1e-4))
+    case = case.change(
+        sliding=sliding, periodic="fixed", steps=3, reduction=Reduction(tolerance=1e-4)
+    )
     first = last_of(case, mesh)
     threads = numba.get_num_threads()
     try:
