@@ -23,6 +23,10 @@ _SEPARATORS = str.maketrans(",;", "  ")
 _ENOUGH = 1000
 
 
+PART = 4000
+"""Lines that are turned into numbers at a time."""
+
+
 @dataclass(frozen=True, eq=False)
 class Displacements:
     """Prescribed displacements.
@@ -101,7 +105,7 @@ def _table(path: Path, lines: list[str], dim: int) -> FloatArray:
     if not any(line.strip() for line in lines):
         raise CaseError(f"{path}: the file lists no node; needed are lines {_columns(dim)}")
     try:
-        table = np.loadtxt(lines, dtype=np.float64, comments=None, ndmin=2)
+        table = _numbers([line for line in lines if line.strip()])
     except ValueError:
         table = np.empty((0, 0))
     if table.shape[1] == 1 + dim and np.isfinite(table).all():
@@ -117,6 +121,14 @@ def _table(path: Path, lines: list[str], dim: int) -> FloatArray:
     if problems:
         raise CaseError(listed(path, problems))
     return np.array(rows, np.float64)
+
+
+def _numbers(lines: list[str]) -> FloatArray:
+    """Return the numbers of lines that hold some; other threads get a turn between two parts."""
+    parts = (lines[first : first + PART] for first in range(0, len(lines), PART))
+    return np.concatenate(
+        [np.loadtxt(part, dtype=np.float64, comments=None, ndmin=2) for part in parts]
+    )
 
 
 def _row(content: str, dim: int) -> list[list[float]]:

@@ -15,6 +15,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.faults import caught, crash_log
 from slideviz.gui.icons import logo
+from slideviz.gui.warm import prepare_drawing
 from slideviz.gui.window import MainWindow
 
 WARM_UP_MS = 300
@@ -49,6 +50,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
             be_quick()
             window.show()
             window.restore.look(crashes)
+            QTimer.singleShot(0, lambda: prepare_drawing(window.view, window.scene.stage))
             QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
             if path is not None:
                 QTimer.singleShot(0, lambda: window.files.open_path(path))

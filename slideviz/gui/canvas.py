@@ -4,10 +4,22 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 from pyvistaqt import QtInteractor
 from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
 from qtpy.QtWidgets import QApplication
+from vtkmodules.vtkRenderingCore import vtkProp
+
+PART_CELLS = 10_000
+"""Faces that are handed to the graphics in one turn."""
+
+
+def _cells_of(actor: vtkProp) -> int:
+    """Return how many cells an actor draws; 0 for letters and the like."""
+    data = getattr(getattr(actor, "mapper", None), "dataset", None)
+    return 0 if data is None else int(data.GetNumberOfCells())
 
 
 class ViewSignals(QObject):
@@ -35,8 +47,10 @@ class View3D(QtInteractor):
         self.flat = False
         self._soon = QTimer(self)
         self._soon.setSingleShot(True)
-        self._soon.setInterval(0)
+        # Not 0: that would wait for every other timer that is due, one that plays for example.
+        self._soon.setInterval(1)
         self._soon.timeout.connect(self.render)
+        self._veiled: list[list[vtkProp]] = []
 
     def render(self) -> None:
         """Schedule one repaint; pyvista calls this everywhere."""
@@ -52,8 +66,44 @@ class View3D(QtInteractor):
         """
         self._soon.start()
 
+    def unveil(self) -> None:
+        """Draw what is new in the scene part by part, one in each turn of the event loop.
+
+        To hand a large mesh to the graphics takes longer than to draw it, and the window must
+        answer meanwhile.
+        """
+        parts: list[list[vtkProp]] = [[]]
+        cells = 0
+        for actor in list(self.renderer.actors.values()):
+            size = _cells_of(actor)
+            if cells and cells + size > PART_CELLS:
+                parts.append([])
+                cells = 0
+            cells += size
+            parts[-1].append(actor)
+        self._veiled = parts[1:]
+        for actor in chain(*self._veiled):
+            self.renderer.RemoveViewProp(actor)
+        self.render_soon()
+
+    def _unveil_next(self) -> None:
+        if self._veiled:
+            # Some may have left the scene since.
+            here = set(self.renderer.actors.values())
+            for actor in self._veiled.pop(0):
+                if actor in here and not self.renderer.HasViewProp(actor):
+                    self.renderer.AddViewProp(actor)
+            self.render()
+
+    def paintGL(self) -> None:
+        super().paintGL()
+        if self._veiled:
+            QTimer.singleShot(0, self._unveil_next)
+
     def snapshot(self) -> np.ndarray:
         """Return what the view shows now, (height, width, 3)."""
+        while self._veiled:
+            self._unveil_next()
         self._render()
         return np.asarray(self.screenshot(return_img=True))
 

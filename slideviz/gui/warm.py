@@ -5,10 +5,40 @@ from __future__ import annotations
 import contextlib
 import gc
 from threading import Event, Thread
+from typing import Any
 
-from qtpy.QtCore import QObject, Signal
+import pyvista as pv
+from qtpy.QtCore import QObject, QTimer, Signal
 
 from slideviz.view import warmup
+from slideviz.view.actors import VALUES
+from slideviz.view.stage import Stage
+
+
+def prepare_drawing(view: Any, stage: Stage) -> None:
+    """Draw a face in every way that meshes are drawn, unseen below the start page.
+
+    What the graphics compile for that takes a tenth of a second each time, which would be felt
+    later.
+    """
+    face = pv.Plane(i_resolution=1, j_resolution=1)
+    face.cell_data[VALUES] = [0.5]
+    ways = [(lit, valued) for lit in (True, False) for valued in (False, True)]
+
+    def draw() -> None:
+        if not ways or stage.plotter.renderer.actors:
+            stage.remove("warm-up")
+            return
+        lit, valued = ways.pop()
+        actor = stage.add(face, "warm-up", lighting=lit)
+        actor.mapper.scalar_visibility = valued
+        stage.edges(actor.prop, True)
+        view.repaint()
+        stage.remove("warm-up")
+        QTimer.singleShot(0, draw)
+
+    view.spare_software()
+    draw()
 
 
 class WarmUp(QObject):

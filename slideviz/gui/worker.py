@@ -157,5 +157,7 @@ def _stand_back() -> None:
     Without a graphics card the picture is drawn by the same processor that computes.
     """
     if sys.platform == "linux":  # only there it is for one thread, not for the whole program
+        thread = get_native_id()
         with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, get_native_id(), NICENESS)
+            before = os.getpriority(os.PRIO_PROCESS, thread)
+            os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)

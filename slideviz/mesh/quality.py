@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -65,17 +66,17 @@ class Quality:
     def __len__(self) -> int:
         return len(self.values)
 
-    @property
+    @cached_property
     def min(self) -> float:
         """Return the lowest value."""
         return float(self.values.min())
 
-    @property
+    @cached_property
     def mean(self) -> float:
         """Return the arithmetic mean of the values."""
         return float(self.values.mean())
 
-    @property
+    @cached_property
     def inverted(self) -> int:
         """Return the number of inverted cells."""
         return int(np.count_nonzero(self.status == INVERTED))

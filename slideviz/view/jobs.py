@@ -17,6 +17,7 @@ from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.view.changes import open_mesh
 from slideviz.view.formats import holds_quality
+from slideviz.view.ghosts import Ghosts
 from slideviz.view.keep import Camera, kept_camera
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import Surface, find_surfaces
@@ -48,10 +49,12 @@ class Opened:
     """The outcome of `open_file`: the session, and the boundaries ready to be drawn.
 
     ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
+    ``ghosts`` has read the displacement files.
     """
 
     session: Session
     surfaces: tuple[Surface, ...]
+    ghosts: Ghosts
     kept: bool = False
     camera: Camera | None = None
 
@@ -102,9 +105,11 @@ def prepare(
     first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
     going_on()
     session = open_mesh(first, path, pairs, case)
+    ghosts = Ghosts(mesh)
+    ghosts.moved(session.case)
     if case is None:
-        return Opened(session, surfaces)
-    return Opened(session, surfaces, bool(case.view), kept_camera(case))
+        return Opened(session, surfaces, ghosts)
+    return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case))
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:

@@ -1,0 +1,350 @@
+"""The session is kept while the program runs, and offered again after a bad end."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from qtpy.QtWidgets import QMessageBox
+
+from slideviz.case.model import Case
+from slideviz.gui import autosave, dialogs
+from slideviz.gui.autosave import find_sessions
+from slideviz.gui.window import MainWindow
+from slideviz.view import changes
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "data of slideviz" / "sessions"
+
+
+@pytest.fixture
+def make(qtbot, settings, monkeypatch, folder):
+    def made():
+        window = MainWindow(settings, multi_samples=0, kept=folder)
+
+        def close(window):
+            monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+            window.close()
+
+        qtbot.addWidget(window, before_close_func=close)
+        with qtbot.waitExposed(window):
+            window.show()
+        return window
+
+    return made
+
+
+@pytest.fixture
+def case_file(sample_folder):
+    return next((sample_folder / "hexahedron").glob("*.cfg"))
+
+
+def open_in(window, path, qtbot):
+    window.files.open_path(path)
+    qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
+
+
+def kept(window, qtbot):
+    """Wait until the session is written as it is, and return what is in the file."""
+    keeper = window.autosave
+    keeper.save()
+    qtbot.waitUntil(lambda: not keeper._runner.busy and keeper.path.exists())
+    return Case.read(keeper.path)
+
+
+@pytest.fixture
+def crashed(make, qtbot, folder, case_file):
+    """The file of a session that did not end properly: with other settings, and a view."""
+    window = make()
+    open_in(window, case_file, qtbot)
+    window.store.change(changes.set_case, steps=7)
+    window.store.change(changes.set_view, colour_by="skew")
+    kept(window, qtbot)
+    text = window.autosave.path.read_text()
+    window.store.put(window.store.session)
+    window.close()
+    left = folder / "session-4194399-1.cfg"
+    left.write_text(text)
+    return left
+
+
+@pytest.fixture(autouse=True)
+def nothing_asked(monkeypatch):
+    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+
+
+def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypatch):
+    monkeypatch.setattr(autosave, "DELAY_MS", 20)
+    window = make()
+    open_in(window, case_file, qtbot)
+    qtbot.waitUntil(window.autosave.path.exists)
+    window.store.change(changes.set_case, steps=9)
+    qtbot.waitUntil(lambda: Case.read(window.autosave.path).steps == 9)
+    window.store.change(changes.set_view, edges=False)
+    qtbot.waitUntil(lambda: "VIEW_SHOW" in Case.read(window.autosave.path).view)
+
+
+def test_files_in_it_are_found_from_its_folder(make, qtbot, case_file):
+    window = make()
+    open_in(window, case_file, qtbot)
+    case = kept(window, qtbot)
+    original = Case.read(case_file)
+    assert case.mesh_file.samefile(original.mesh_file)
+    assert case.motions[0].path.samefile(original.motions[0].path)
+    assert case.roles == original.roles
+
+
+def test_a_proper_end_leaves_nothing(make, qtbot, case_file, folder):
+    window = make()
+    open_in(window, case_file, qtbot)
+    kept(window, qtbot)
+    window.close()
+    assert list(folder.iterdir()) == []
+
+
+def test_nothing_is_written_before_a_mesh_is_open(make, folder):
+    window = make()
+    window.autosave.save()
+    assert not window.autosave._runner.busy
+    assert not folder.exists()
+
+
+def test_the_session_of_a_window_that_is_open_is_not_offered(make, qtbot, case_file, folder):
+    first = make()
+    open_in(first, case_file, qtbot)
+    kept(first, qtbot)
+    assert find_sessions(folder) == ([], [])
+    other = make()
+    other.restore.look()
+    assert not other.offer.isVisible()
+    assert other.autosave.path != first.autosave.path
+
+
+def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_file, folder):
+    window = make()
+    window.restore.look()
+    assert window.offer.isVisible()
+    text = window.offer.text.text()
+    assert "did not end properly" in text
+    assert "mesh.su2" in text
+    window.offer.answers["Restore"].click()
+    qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
+    session = window.store.session
+    assert session.case.steps == 7
+    assert session.view.colour_by == "skew"
+    assert session.case.source == case_file
+    assert session.unsaved_case
+    assert not window.offer.isVisible()
+    assert case_file not in (window.files.recent() or [None])[:0]
+    qtbot.waitUntil(lambda: not crashed.exists())
+    assert Case.read(window.autosave.path).steps == 7, "it is safe under its new name"
+    assert find_sessions(folder) == ([], [])
+
+
+def test_discard_throws_it_away(make, crashed, folder):
+    window = make()
+    window.restore.look()
+    window.offer.answers["Discard"].click()
+    assert not window.offer.isVisible()
+    assert list(folder.iterdir()) == []
+
+
+def test_a_closed_offer_comes_again_at_the_next_start_only(make, crashed, qtbot):
+    window = make()
+    window.restore.look()
+    window.offer._closed()
+    assert not window.offer.isVisible()
+    assert crashed.exists()
+    second = make()
+    second.restore.look()
+    assert not second.offer.isVisible(), "the first window holds it"
+    window.close()
+    window.restore._later.clear()
+    second.restore.look()
+    assert second.offer.isVisible()
+
+
+def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
+    older = crashed.with_name("session-4194398-1.cfg")
+    older.write_text(crashed.read_text().replace("STEPS= 7", "STEPS= 3"))
+    os.utime(older, (1e9, 1e9))
+    window = make()
+    window.restore.look()
+    assert [found.case.steps for found in window.restore.waiting] == [7, 3]
+    assert "1 more" in window.offer.text.text()
+    window.offer.answers["Discard"].click()
+    assert older.exists()
+    assert "2001" in window.offer.text.text()
+    window.offer.answers["Discard"].click()
+    assert not older.exists()
+
+
+def test_a_session_whose_mesh_is_gone_is_told_and_kept(make, crashed, qtbot, case_file):
+    mesh = Case.read(case_file).mesh_file
+    away = mesh.rename(mesh.with_suffix(".away"))
+    try:
+        window = make()
+        window.restore.look()
+        window.offer.answers["Restore"].click()
+        qtbot.waitUntil(lambda: window.banner.isVisible())
+        assert "no such file" in window.banner.text.text()
+        assert crashed.exists()
+    finally:
+        away.rename(mesh)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "MESH_FILENAME= ", "NONSENSE= 3\n", "STEPS= 3\n", "MESH_FILENAME= a.su2\nSTE"]
+)
+def test_a_session_that_cannot_be_read_is_told_and_kept(make, folder, text):
+    folder.mkdir(parents=True)
+    bad = folder / "session-4194399-1.cfg"
+    bad.write_text(text)
+    (folder / "session-4194399-1.cfg.broken").write_text("an earlier one")
+    window = make()
+    window.restore.look()
+    assert "cannot be read" in window.banner.text.text()
+    assert not window.offer.isVisible()
+    assert not bad.exists()
+    assert (folder / "session-4194399-1.cfg.2.broken").read_text() == text
+    assert (folder / "session-4194399-1.cfg.broken").read_text() == "an earlier one"
+    window.banner.hide()
+    window.restore.look()
+    assert not window.banner.isVisible()
+
+
+def test_a_half_written_file_is_told_and_kept_unless_it_is_being_written(make, folder):
+    folder.mkdir(parents=True)
+    old, new = folder / ".slideviz-01.tmp", folder / ".slideviz-02.tmp"
+    for path in (old, new):
+        path.write_text("MESH_FILEN")
+    os.utime(old, (1e9, 1e9))
+    _, problems = find_sessions(folder)
+    assert len(problems) == 1
+    assert "being written" in problems[0]
+    assert (folder / "slideviz-01.tmp.broken").read_text() == "MESH_FILEN"
+    assert new.exists()
+
+
+def test_a_folder_that_cannot_be_written_is_logged_and_the_window_goes_on(
+    make, qtbot, case_file, folder, caplog
+):
+    folder.parent.mkdir()
+    folder.write_text("no folder")
+    window = make()
+    open_in(window, case_file, qtbot)
+    window.autosave.save()
+    qtbot.waitUntil(lambda: "could not be kept" in caplog.text)
+    assert window.faults.count == 0
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from qtpy.QtCore import QSettings
+from qtpy.QtWidgets import QApplication
+from slideviz.gui.window import MainWindow
+from slideviz.view import changes
+
+app = QApplication([])
+folder = Path(sys.argv[1])
+settings = QSettings(str(folder.parent / "s.ini"), QSettings.Format.IniFormat)
+window = MainWindow(settings, 0, kept=folder)
+window.files.open_path(Path(sys.argv[2]))
+while window.store.session.mesh is None:
+    app.processEvents()
+window.store.change(changes.set_case, steps=11)
+window.autosave.save()
+while not window.autosave.path.exists():
+    app.processEvents()
+os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_program_that_was_killed_leaves_its_session(tmp_path, folder, case_file):
+    folder.mkdir(parents=True)
+    call = [sys.executable, "-c", KILLED, str(folder), str(case_file)]
+    subprocess.run(call, timeout=120, check=False)
+    found, problems = find_sessions(folder)
+    assert problems == []
+    assert [one.case.steps for one in found] == [11]
+    assert found[0].source == case_file
+    assert Path(found[0].case.mesh_file).is_file()
+
+
+# Unsaved changes --------------------------------------------------------------------------
+
+
+def run_in(window, qtbot):
+    window.start_run()
+    qtbot.waitUntil(lambda: not window.runner.busy, timeout=60_000)
+    assert window.store.session.unsaved_mesh
+
+
+def test_the_mesh_and_then_the_case_are_saved_before_the_window_closes(
+    make, qtbot, case_file, monkeypatch, tmp_path
+):
+    window = make()
+    open_in(window, case_file, qtbot)
+    window.store.change(changes.set_case, steps=2)
+    run_in(window, qtbot)
+    asked, answers = [], iter(["mesh", "case"])
+    names = iter([tmp_path / "out.su2", tmp_path / "out.cfg"])
+
+    def ask(_parent, what, can_save):
+        asked.append((what, tuple(can_save)))
+        return next(answers)
+
+    monkeypatch.setattr(dialogs, "ask_unsaved", ask)
+    monkeypatch.setattr(dialogs, "ask_save", lambda *_: next(names))
+    window.store.change(changes.show_frame, 1)
+    assert not window.close(), "first the mesh is written"
+    qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
+    assert [can for _, can in asked] == [("case", "mesh"), ("case",)]
+    assert "mesh has not been saved" in asked[0][0]
+    assert (tmp_path / "out.cfg").is_file()
+    from slideviz.mesh.files import read
+
+    last = window.store.session.frames[-1].mesh
+    assert (read(tmp_path / "out.su2").points == last.points).all(), "the last step, not that shown"
+
+
+def test_cancel_at_the_second_question_keeps_the_window(
+    make, qtbot, case_file, monkeypatch, tmp_path
+):
+    window = make()
+    open_in(window, case_file, qtbot)
+    window.store.change(changes.set_case, steps=2)
+    run_in(window, qtbot)
+    answers = iter(["case", "cancel"])
+    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: next(answers))
+    monkeypatch.setattr(dialogs, "ask_save", lambda *_: tmp_path / "out.cfg")
+    assert not window.close()
+    assert window.isVisible()
+    assert not window.store.session.unsaved_case
+
+
+@pytest.mark.parametrize(
+    ("can_save", "words"),
+    [
+        (("case", "mesh"), ["Save case…", "Save mesh…", "Discard", "Cancel"]),
+        (("mesh",), ["Save mesh…", "Discard", "Cancel"]),
+        ((), ["Discard", "Cancel"]),
+    ],
+)
+def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, words):
+    window = make()
+    monkeypatch.undo()
+    seen = []
+
+    def look(box):
+        seen.append([button.text() for button in box.buttons()])
+        next(b for b in box.buttons() if b.text() == words[0]).click()
+
+    monkeypatch.setattr(QMessageBox, "exec", look)
+    answer = dialogs.ask_unsaved(window, "The case has changes.", can_save)
+    assert sorted(seen[0]) == sorted(words)
+    assert answer == (can_save[0] if can_save else "discard")
