@@ -184,6 +184,6 @@ def _drawn(
             pictures = sheet([row for row in rows if row.combination.steps == steps], mesh)
             if pictures is not None:
                 files += save_figure(
-                    pictures, folder, f"quality_{steps_name(steps)}", DPI, (".png",)
+                    pictures, folder, f"quality_{steps_name(steps)}", DPI, (".png",), tight=True
                 )
     return files

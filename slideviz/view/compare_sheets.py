@@ -28,6 +28,8 @@ DPI = 300
 _WHITE = 250
 _OVERSAMPLED = 2
 """Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
+_SMALL = 10
+"""Pixels: cells smaller than this, on average, are drawn without edges."""
 _WORDS = 0.42
 """Inches below a picture for its numbers."""
 _BAR = 1.0
@@ -76,13 +78,23 @@ def _images(results: Sequence[Result], base: Mesh, inches: float) -> list[Image]
         portrait = Portrait(plotter, results[0].mesh, base)
         if portrait.detail is None:
             _fit(plotter, [base, *(result.mesh for result in results)])
+        shown = list(plotter.actors.values())
         images = []
         for result in results:
             portrait.show(Frame(result.mesh, result.quality))
             for name in list(plotter.scalar_bars.keys()):
                 plotter.remove_scalar_bar(name, render=False)
+            if not images and _crowded(image_of(plotter), shown):
+                for actor in shown:
+                    actor.prop.show_edges = False
             images.append(image_of(plotter))
     return images
+
+
+def _crowded(image: Image, actors: Sequence[Any]) -> bool:
+    """Tell whether cells are so small that their edges would hide their colours."""
+    cells = sum(actor.mapper.dataset.n_cells for actor in actors)
+    return int((image < _WHITE).any(axis=2).sum()) < cells * _SMALL**2
 
 
 def _fit(plotter: Any, meshes: Sequence[Mesh]) -> None:

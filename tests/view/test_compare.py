@@ -294,3 +294,16 @@ def test_a_figure_that_cannot_be_written_is_told(rows, tmp_path):
 
 def test_names_of_files_sort_by_steps():
     assert [steps_name(n) for n in (0, 1, 20)] == ["auto_steps", "01_steps", "20_steps"]
+
+
+@pytest.mark.parametrize(("cells", "edges"), [(6, True), (240, False)])
+def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
+    made = sample("square", cells, "motion")
+    (block,) = made.case.markers_with("moving")
+    case = made.case.change(motions=(Translate(block, (1e-9, 0.0)),))
+    (row,) = compare(case, made.mesh, combinations(("ps",), ("none",), (1,)))
+    figure = sheet([row], made.mesh)
+    image = figure.axes[0].images[0].get_array()
+    middle = image[image.shape[0] // 8 : image.shape[0] // 4, image.shape[1] // 4 :]
+    # All cells are perfect: without edges there is one colour.
+    assert (len(np.unique(middle.reshape(-1, 3), axis=0)) > 3) == edges
