@@ -79,7 +79,7 @@ def _images(results: Sequence[Result], base: Mesh, inches: float) -> list[Image]
         if portrait.detail is None:
             _fit(plotter, [base, *(result.mesh for result in results)])
         shown = list(plotter.actors.values())
-        images = []
+        images: list[Image] = []
         for result in results:
             portrait.show(Frame(result.mesh, result.quality))
             for name in list(plotter.scalar_bars.keys()):
