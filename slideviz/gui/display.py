@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from qtpy.QtCore import QSize, Qt
-from qtpy.QtGui import QIcon, QImage, QPixmap
 from qtpy.QtWidgets import (
     QCheckBox,
     QFormLayout,
@@ -16,22 +15,19 @@ from qtpy.QtWidgets import (
     QLabel,
     QPushButton,
     QScrollArea,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from slideviz.case.view_keys import MAPS
-from slideviz.gui.fields import Choice, NumberField, number_text
+from slideviz.gui.display_fields import Copies, Span, map_icon
+from slideviz.gui.fields import Choice
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
 from slideviz.view.copies import passages_around
 from slideviz.view.layer_copies import Period
 from slideviz.view.state import COLOUR_BY, POINTS, Session
 from slideviz.view.store import Store
-
-MOST_COPIES = 9
-"""Neighbours on each side that can be chosen where a row has no end."""
 
 SHOWN: dict[str, tuple[str, str]] = {
     "edges": ("Mesh edges", "Draw the edges of the cells."),
@@ -43,87 +39,13 @@ SHOWN: dict[str, tuple[str, str]] = {
 }
 """What can be drawn or not, with words and a sentence for it."""
 
+TIPS = {
+    "map": "The colours of values; all are told apart by colour-blind people.",
+    "range": "The values at the ends of the colour bar.",
+    "fit": "From the lowest to the highest value of the cells that are shown now.",
+}
+ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
-
-
-class Copies(QSpinBox):
-    """How many neighbouring passages are drawn, in words; the last value is all of a wheel."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setObjectName("copies")
-        self.around: int | None = None
-        self.set_around(None)
-
-    def set_around(self, around: int | None) -> None:
-        """Take how many passages the wheel has; None: a row without an end."""
-        self.around = around
-        self.setRange(0, MOST_COPIES if around is None else max(around // 2, 1))
-
-    def textFromValue(self, value: int) -> str:  # noqa: N802
-        """Return the words for a number of neighbours."""
-        if value == 0:
-            return "none"
-        if self.around is not None and value == self.maximum():
-            return f"all {self.around} around"
-        return f"{value} on each side"
-
-    def valueFromText(self, text: str) -> int:  # noqa: N802
-        """Return the number that is typed, or that words stand for."""
-        if text.strip().startswith("all"):
-            return self.maximum()
-        digits = "".join(sign for sign in text if sign.isdigit())
-        return min(int(digits), self.maximum()) if digits else 0
-
-    def validate(self, text: str, at: int) -> object:
-        """Let anything be typed that a number can be read from."""
-        from qtpy.QtGui import QValidator
-
-        good = any(sign.isdigit() for sign in text) or text.strip() in ("none", "all")
-        state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
-        return state, text, at
-
-    def wheelEvent(self, event) -> None:  # noqa: N802
-        """Leave the wheel to the panel, which scrolls."""
-        event.ignore()
-
-
-class Span(QWidget):
-    """Two numbers, the first below the second."""
-
-    def __init__(self, name: str, changed) -> None:
-        super().__init__()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(4)
-        self.low = NumberField(0.0, lambda value: self._must(value < self.high.value, value, "<"))
-        self.high = NumberField(1.0, lambda value: self._must(value > self.low.value, value, ">"))
-        for end, field in (("low", self.low), ("high", self.high)):
-            field.setObjectName(f"{name}_{end}")
-            field.setAccessibleName(f"{name} {end}")
-            field.changed.connect(lambda _: changed((self.low.value, self.high.value)))
-        row.addWidget(self.low, 1)
-        row.addWidget(QLabel("to"))
-        row.addWidget(self.high, 1)
-
-    def _must(self, good: bool, value: float, sign: str) -> str:
-        """Return why a number may not be at its end; empty where it may."""
-        if good:
-            return ""
-        than, other = ("less", self.high) if sign == "<" else ("greater", self.low)
-        return f"{number_text(value)} must be {than} than {number_text(other.value)}"
-
-    def show_values(self, values: tuple[float, float]) -> None:
-        """Show two numbers without telling."""
-        for field, value in zip((self.low, self.high), values, strict=True):
-            if value != field.value:
-                field.show_value(value)
-            field.setCursorPosition(0)
-
-    def set_tip(self, text: str) -> None:
-        """Explain both."""
-        self.low.set_tip(text)
-        self.high.set_tip(text)
 
 
 class DisplayPanel(QWidget):
@@ -164,16 +86,13 @@ class DisplayPanel(QWidget):
         self.map.setIconSize(QSize(64, 12))
         for index, name in enumerate(MAPS):
             self.map.setItemIcon(index, map_icon(name))
-        self.map.setToolTip("The colours of values; all are told apart by colour-blind people.")
         self.form.addRow("Colours", self.map)
         self.range = Span("range", lambda values: self._set(colour_range=values))
-        self.range.set_tip("The values at the ends of the colour bar.")
         row = QHBoxLayout()
         row.setSpacing(3)
         row.addWidget(self.range, 1)
-        self.fit_range = self._button("fit_range", "Fit", "From the lowest to the highest value "
-            "of the cells that are shown now", self._fit_range)  # fmt: skip
-        self.reset_range = self._button("reset_range", "Auto", "", self._reset_range)
+        self.fit_range = self._button("fit_range", "Fit", self._fit_range)
+        self.reset_range = self._button("reset_range", "Auto", self._reset_range)
         row.addWidget(self.fit_range)
         row.addWidget(self.reset_range)
         self.form.addRow("Range", row)
@@ -184,7 +103,6 @@ class DisplayPanel(QWidget):
         self.only.setToolTip("Draw only the cells whose value is within these two numbers.")
         self.only.toggled.connect(self._only)
         self.threshold = Span("threshold", lambda values: self._set(threshold=values))
-        self.threshold.set_tip("The lowest and highest value of the cells that are drawn.")
         self.form.addRow(self.only, self.threshold)
 
     def _make_rest(self) -> None:
@@ -216,11 +134,10 @@ class DisplayPanel(QWidget):
         choice.chosen.connect(lambda value: self._set(**{field: value}))
         return choice
 
-    def _button(self, name: str, text: str, tip: str, function) -> QPushButton:
+    def _button(self, name: str, text: str, function) -> QPushButton:
         button = QPushButton(text)
         button.setObjectName(name)
         button.setFixedWidth(button.fontMetrics().horizontalAdvance(text) + 16)
-        button.setToolTip(tip)
         button.clicked.connect(lambda _=False: function())
         return button
 
@@ -252,10 +169,16 @@ class DisplayPanel(QWidget):
         valued = view.colour_by != "role"
         for widget in (self.map, self.range, self.fit_range):
             widget.setEnabled(valued)
+        self.map.setToolTip(TIPS["map"] if valued else ROLES_ONLY)
+        self.range.set_tip(TIPS["range"] if valued else ROLES_ONLY)
+        self.fit_range.setToolTip(TIPS["fit"] if valued else ROLES_ONLY)
         self.range.show_values(session.colour_range)
         self.reset_range.setEnabled(valued and view.colour_range is not None)
         usual = "0 to the largest of all runs" if view.colour_by == "displacement" else "0 to 1"
-        self.reset_range.setToolTip(f"Back to {usual}")
+        self.reset_range.setToolTip(f"Back to {usual}" if valued else ROLES_ONLY)
+        low_high = "The lowest and highest value of the cells that are drawn."
+        on = view.threshold is not None
+        self.threshold.set_tip(low_high if on else "Switch on “Only cells” to choose a range.")
         self.only.setChecked(view.threshold is not None)
         self.threshold.setEnabled(view.threshold is not None)
         if view.threshold is not None:
@@ -319,13 +242,3 @@ class DisplayPanel(QWidget):
     def _copies(self, value: int) -> None:
         whole = self.copies.around is not None and value == self.copies.maximum()
         self._set(copies=-1 if whole else value)
-
-
-def map_icon(name: str) -> QIcon:
-    """Return a picture of a colour map, from low to high."""
-    from matplotlib import colormaps
-
-    row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
-    pixels = np.ascontiguousarray(np.repeat(row[None], 12, axis=0))
-    image = QImage(pixels.tobytes(), 64, 12, 64 * 4, QImage.Format.Format_RGBA8888)
-    return QIcon(QPixmap.fromImage(image.copy()))

@@ -49,7 +49,7 @@ DOCKS: tuple[DockRow, ...] = (
         "runs",
         "Runs",
         RIGHT,
-        lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error),
+        lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error, w.say),
         bare=True,
     ),
     DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs", bare=True),

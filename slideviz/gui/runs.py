@@ -1,26 +1,18 @@
 """The runs panel: what was computed with which settings, and how good it is."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
 from qtpy.QtCore import QSize, Qt
-from qtpy.QtGui import QIcon, QPalette
+from qtpy.QtGui import QIcon
 from qtpy.QtWidgets import (
-    QAbstractItemView,
     QApplication,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QMenu,
-    QStyle,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QToolButton,
-    QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
@@ -29,115 +21,16 @@ from qtpy.QtWidgets import (
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
 from slideviz.gui.icons import icon
+from slideviz.gui.runs_tree import MIN, NUMBER, RUN, WORDS, RunTree
 from slideviz.view import changes
 from slideviz.view.look import Look
 from slideviz.view.runs_table import best, brief, described, method_words, table_text, write_table
 from slideviz.view.state import Run, Session
 from slideviz.view.store import Store
 
-RUN, MIN, MEAN, INVERTED = range(4)
-NUMBER = Qt.ItemDataRole.UserRole
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
 TIP_UNDEFORMED = "Compare with the undeformed mesh, side by side"
 TABLE_FILTERS = "Table (*.csv)"
-PAD = 4
-TIPS = (
-    "Number and method; below it the settings. A double click shows a run beside the shown one.",
-    "Lowest quality of a cell after the last step; the best of all runs is bold.",
-    "Mean quality of the cells after the last step.",
-    "Inverted cells after the last step.",
-)
-
-
-class _FirstLine(QStyledItemDelegate):
-    """Draws a cell in the upper half of its row: the lower half is one line for all columns."""
-
-    def sizeHint(self, option, index) -> QSize:
-        item = QStyleOptionViewItem(option)
-        self.initStyleOption(item, index)  # the best is bold, thus wider
-        width = item.fontMetrics.horizontalAdvance(item.text) + 2 * PAD + 4
-        return QSize(width, 2 * option.fontMetrics.height() + 2 * PAD)
-
-    def paint(self, painter, option, index) -> None:
-        item = QStyleOptionViewItem(option)
-        self.initStyleOption(item, index)
-        element = QStyle.PrimitiveElement.PE_PanelItemViewItem
-        item.widget.style().drawPrimitive(element, item, painter, item.widget)
-        rect = item.rect.adjusted(PAD, PAD, -PAD, 0)
-        rect.setHeight(item.fontMetrics.height())
-        painter.save()
-        painter.setFont(item.font)
-        painter.setPen(text_colour(item, QPalette.ColorRole.Text))
-        image = index.data(Qt.ItemDataRole.DecorationRole)
-        if image is not None and not image.isNull():
-            image.paint(painter, rect.right() - 15, rect.top(), 16, rect.height())
-            rect.setRight(rect.right() - 18)
-        shown = item.fontMetrics.elidedText(item.text, Qt.TextElideMode.ElideRight, rect.width())
-        painter.drawText(rect, item.displayAlignment, shown)
-        painter.restore()
-
-
-def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
-    """Return the colour of letters in a row, chosen or not."""
-    chosen = bool(option.state & QStyle.StateFlag.State_Selected)
-    active = bool(option.state & QStyle.StateFlag.State_Active)
-    group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
-    return option.palette.color(group, QPalette.ColorRole.HighlightedText if chosen else plain)
-
-
-class RunTree(QTreeWidget):
-    """A row for each run: numbers in columns, and below them a line over the whole width."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setObjectName("runs")
-        self.setColumnCount(4)
-        self.setHeaderLabels(["Run", "Min", "Mean", "Inv."])
-        self.setRootIsDecorated(False)
-        self.setUniformRowHeights(True)
-        self.setAlternatingRowColors(True)
-        self.setAllColumnsShowFocus(True)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.setItemDelegate(_FirstLine(self))
-        self.setMinimumHeight(80)
-        for column, tip in enumerate(TIPS):
-            self.headerItem().setToolTip(column, tip)
-        header = self.header()
-        header.setStretchLastSection(False)
-        header.setMinimumSectionSize(36)
-        header.setSectionResizeMode(RUN, QHeaderView.ResizeMode.Stretch)
-        for column in (MIN, MEAN, INVERTED):
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-            self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
-        self.seen_before: tuple[int | None, int, int | None] = (None, 0, None)
-        self.session: Callable[[], Session] = Session
-
-    def mousePressEvent(self, event) -> None:
-        # A double click begins with a click, which shows the run: what was shown before it is
-        # what the run is to be compared with.
-        now = self.session()
-        self.seen_before = now.shown, now.view.frame, now.view.beside
-        super().mousePressEvent(event)
-
-    def drawRow(self, painter, option, index) -> None:
-        super().drawRow(painter, option, index)
-        rect = self.visualRect(index.siblingAtColumn(RUN))
-        height = option.fontMetrics.height()
-        rect = rect.adjusted(PAD, height + PAD, 0, 0)
-        rect.setRight(self.viewport().width() - PAD)
-        rect.setHeight(height)
-        row = QStyleOptionViewItem(option)
-        if self.selectionModel().isSelected(index):
-            row.state |= QStyle.StateFlag.State_Selected
-        painter.save()
-        painter.setPen(text_colour(row, QPalette.ColorRole.PlaceholderText))
-        text = str(index.siblingAtColumn(RUN).data(NUMBER + 1))
-        shown = option.fontMetrics.elidedText(text, Qt.TextElideMode.ElideRight, rect.width())
-        painter.drawText(rect, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, shown)
-        painter.restore()
 
 
 class RunsPanel(QWidget):
@@ -150,6 +43,8 @@ class RunsPanel(QWidget):
         Asks for a name and writes the mesh that is shown.
     tell_error : callable
         Shows an error.
+    say : callable
+        Shows that something was done.
     """
 
     def __init__(
@@ -157,9 +52,10 @@ class RunsPanel(QWidget):
         store: Store,
         save_mesh: Callable[[], None] = lambda: None,
         tell_error: Callable[[BaseException], None] = lambda _: None,
+        say: Callable[[str], None] = lambda _: None,
     ) -> None:
         super().__init__()
-        self.store, self._save, self._tell_error = store, save_mesh, tell_error
+        self.store, self._save, self._tell_error, self._say = store, save_mesh, tell_error, say
         self._syncing = False
         self._drawn: tuple[object, ...] = ()
         self._colour = "#3b4652"
@@ -275,7 +171,7 @@ class RunsPanel(QWidget):
         font.setBold(champion)
         item.setFont(MIN, font)
         item.setData(RUN, NUMBER, run.number)
-        item.setData(RUN, NUMBER + 1, ("beside · " if beside else "") + brief(run))
+        item.setData(RUN, WORDS, ("beside · " if beside else "") + brief(run))
         item.setIcon(RUN, icon("beside", self._colour) if beside else QIcon())
 
     # Widgets to state ------------------------------------------------------------------
@@ -358,6 +254,7 @@ class RunsPanel(QWidget):
     def copy_table(self) -> None:
         """Put the table into the clipboard, for a spreadsheet."""
         QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
+        self._say("Copied the table of runs")
 
     def export_table(self) -> None:
         """Ask for a name and write the table."""
@@ -372,3 +269,5 @@ class RunsPanel(QWidget):
             write_table(path, session.runs)
         except SlidevizError as error:
             self._tell_error(error)
+            return
+        self._say(f"Saved {path}")

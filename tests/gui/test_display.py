@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 from slideviz.case.samples import write_sample
-from slideviz.gui.display import MOST_COPIES, NOT_PERIODIC, SHOWN, Copies
+from slideviz.gui.display import NOT_PERIODIC, ROLES_ONLY, SHOWN
+from slideviz.gui.display_fields import MOST_COPIES, Copies
 from slideviz.view import changes
 from slideviz.view.layer_copies import CopyLayer
 from slideviz.view.pick import to_display
@@ -47,6 +48,7 @@ def test_colours_and_map_are_chosen_and_undone(shown):
 def test_the_range_is_typed_checked_and_reset(shown):
     box = panel(shown)
     assert not box.range.isEnabled(), "roles have no range"
+    assert box.range.low.toolTip() == box.map.toolTip() == ROLES_ONLY
     shown.window.store.change(changes.set_view, colour_by="size_skew")
     assert box.range.isEnabled()
     assert (box.range.low.text(), box.range.high.text()) == ("0", "1")
@@ -79,14 +81,14 @@ def test_the_range_fits_the_values_of_the_step(shown):
 def test_only_cells_of_a_range_are_chosen(shown):
     box = panel(shown)
     assert not box.threshold.isEnabled()
-    shown.click(box.only)
+    QTest.mouseClick(box.only, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
     assert view(shown).threshold == (0.0, 0.5)
     shown.type(box.threshold.high, "0.7")
     assert view(shown).threshold == (0.0, 0.7)
     shown.type(box.threshold.low, "0.9")
     assert view(shown).threshold == (0.0, 0.7), "0.9 to 0.7 is no range"
     assert box.threshold.low.text() == "0"
-    shown.click(box.only)
+    QTest.mouseClick(box.only, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
     assert view(shown).threshold is None
 
 
@@ -164,7 +166,8 @@ def test_a_number_of_neighbours_can_be_typed(qtbot):
 @pytest.mark.parametrize("name", [name for name in SHOWN if name != "perspective"])
 def test_what_is_drawn_is_switched_and_agrees_with_the_menu(shown, name):
     box, before = panel(shown).shown[name], getattr(view(shown), name)
-    shown.click(box)
+    # Beside its word a check box is deaf.
+    QTest.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
     assert getattr(view(shown), name) != before
     action = shown.window.actions_.by_name[name]
     assert action.isChecked() != before
@@ -178,7 +181,7 @@ def test_perspective_is_for_solid_meshes(shown, sample_folder):
     assert "2D" in box.toolTip()
     shown.open(sample_folder / "hexahedron" / "mesh.su2")
     assert box.isEnabled()
-    shown.click(box)
+    QTest.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
     assert not shown.window.view.camera.parallel_projection
 
 

@@ -11,7 +11,7 @@ from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.runs import INVERTED, MEAN, MIN, NUMBER, RUN
+from slideviz.gui.runs_tree import INVERTED, MEAN, MIN, NUMBER, RUN, WORDS
 from slideviz.view import changes
 from slideviz.view.look import DARK
 from slideviz.view.pick import to_display
@@ -74,7 +74,7 @@ def test_each_run_has_a_row_with_its_quality_and_the_best_is_bold(ran):
         assert item.text(MEAN) == f"{quality.mean:.4f}"
         assert item.text(INVERTED) == str(quality.inverted)
         assert item.font(MIN).bold() == (run.number == best)
-        assert f"{run.last.step.control_nodes:,} nodes" in item.data(RUN, NUMBER + 1)
+        assert f"{run.last.step.control_nodes:,} nodes" in item.data(RUN, WORDS)
         assert f"steps: {len(run.frames)}" in item.toolTip(RUN)
     assert row(ran, 1).text(RUN) == "1  pseudo sliding"
     assert row(ran, 2).text(RUN) == "2  direct sliding"
@@ -96,7 +96,7 @@ def test_a_double_click_compares_with_the_run_that_was_shown(ran):
     session = ran.session
     assert (session.shown, session.view.beside, session.view.frame) == (2, 1, 1)
     assert ran.window.viewing.second is not None
-    assert "beside" in row(ran, 1).data(RUN, NUMBER + 1)
+    assert "beside" in row(ran, 1).data(RUN, WORDS)
     click(ran, 1, double=True)
     assert (ran.session.shown, ran.session.view.beside) == (2, None)
     assert ran.window.viewing.second is None
@@ -106,12 +106,12 @@ def test_a_row_grows_while_its_run_goes_on(ran):
     session = ran.session
     running = changes.add_frames(changes.start_run(session), session.runs[1].frames[:1])
     ran.window.store.put(running)
-    assert "running · " in row(ran, 3).data(RUN, NUMBER + 1)
-    assert "1 of 3 steps" in row(ran, 3).data(RUN, NUMBER + 1)
+    assert "running · " in row(ran, 3).data(RUN, WORDS)
+    assert "1 of 3 steps" in row(ran, 3).data(RUN, WORDS)
     assert not panel(ran).buttons["remove"].isEnabled()
     ran.window.store.change(changes.add_frames, session.runs[1].frames[1:])
     ran.window.store.change(changes.end_run, "done")
-    assert row(ran, 3).data(RUN, NUMBER + 1).split(" · ")[:2] == ["moving vertices", "3 steps"]
+    assert row(ran, 3).data(RUN, WORDS).split(" · ")[:2] == ["moving vertices", "3 steps"]
     assert panel(ran).buttons["remove"].isEnabled()
 
 
@@ -148,6 +148,7 @@ def test_the_table_is_exported_and_copied(ran, answers, tmp_path):
     ran.click(panel(ran).buttons["export"])
     with (tmp_path / "runs.csv").open() as file:
         found = list(csv.DictReader(file))
+    assert ran.window.statusBar().currentMessage() == f"Saved {tmp_path / 'runs.csv'}"
     assert [line["method"] for line in found] == ["pseudo sliding", "direct sliding"]
     ran.click(panel(ran).buttons["copy"])
     lines = QApplication.clipboard().text().splitlines()
@@ -242,9 +243,8 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
         QTest.mouseMove(views[leads], QPoint(80 + 8 * step, 80 + 4 * step))
     QTest.mouseRelease(views[leads], left, pos=QPoint(120, 100))
     assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
-    for name in ("fit",):
-        ran.window.actions_.by_name[name].trigger()
-        assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    ran.window.actions_.by_name["fit"].trigger()
+    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
 
 
 def test_linked_views_come_to_rest(ran, qtbot):
