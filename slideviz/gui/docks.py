@@ -10,12 +10,15 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.boundaries import BoundariesPanel
+from slideviz.gui.curves import CurvesPanel
 from slideviz.gui.display import DisplayPanel
+from slideviz.gui.histogram import HistogramPanel
 from slideviz.gui.log import LogPanel
 from slideviz.gui.method import MethodPanel
 from slideviz.gui.motions import MotionPanel
 from slideviz.gui.run import RunPanel
 from slideviz.gui.runs import RunsPanel
+from slideviz.gui.worst import WorstPanel
 
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -45,6 +48,16 @@ DOCKS: tuple[DockRow, ...] = (
     DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), bare=True),
     DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion", bare=True),
     DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), bare=True),
+    DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store), bare=True),
+    DockRow(
+        "worst",
+        "Worst cells",
+        RIGHT,
+        lambda w: WorstPanel(w.store, w.viewing.fly_to, w.viewing.fly_back),
+        "histogram",
+        bare=True,
+    ),
+    DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram", bare=True),
     DockRow(
         "runs",
         "Runs",

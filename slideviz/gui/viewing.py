@@ -10,6 +10,7 @@ from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 from slideviz.gui.beside import CameraLink, TitleBar
 from slideviz.gui.boundaries import boundary_menu
 from slideviz.gui.canvas import View3D
+from slideviz.gui.hover import CellHover
 from slideviz.view import changes, jobs
 from slideviz.view.ghosts import Ghosts
 from slideviz.view.look import Look
@@ -48,6 +49,7 @@ class Viewing(QWidget):
         self._connect(self.view, self.scene)
         self.second: View3D | None = None
         self.second_scene: Scene | None = None
+        self._before: tuple[float, ...] | None = None
         self._link: CameraLink | None = None
 
     # Parts -----------------------------------------------------------------------------
@@ -70,6 +72,7 @@ class Viewing(QWidget):
         view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
         view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
         view.told.resized.connect(scene.resized)
+        CellHover(view, scene, self.store)
         view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
@@ -118,6 +121,7 @@ class Viewing(QWidget):
     def open(self, opened: jobs.Opened, session: Session) -> None:
         """Show another mesh, from where its case was looked at if that is known."""
         self._drop_second()
+        self._before = None
         self.surfaces = opened.surfaces
         self._ghosts = Ghosts(session.mesh)
         self.view.spare_software()
@@ -168,6 +172,8 @@ class Viewing(QWidget):
     # Mouse -----------------------------------------------------------------------------
 
     def _clicked(self, view: View3D, scene: Scene, where: QPoint, modifiers) -> None:
+        if modifiers & Qt.KeyboardModifier.AltModifier:
+            return  # means a cell
         name = scene.pick(*view.to_pixels(where))
         chosen = self.store.session.view.selected
         if modifiers & Qt.KeyboardModifier.ControlModifier and name:
@@ -201,9 +207,26 @@ class Viewing(QWidget):
 
     def fit(self) -> None:
         """Make everything fill the view."""
+        self._before = None
         # Of two, the second has less room, beside the legend; the first follows.
         self._scenes()[-1].fit()
         self.render()
+
+    def fly_to(self, cell: int) -> None:
+        """Look at a cell of the mesh that is shown; `fly_back` returns."""
+        if self._before is None:
+            self._before = self.scene.eye.place
+        self.scene.fly_to(cell)
+        self.render()
+
+    def fly_back(self) -> None:
+        """Look from where one looked before flying to cells; at all of the mesh if one did not."""
+        before, self._before = self._before, None
+        if before is None:
+            self.fit()
+        else:
+            self.scene.eye.go(before)
+            self.render()
 
     def look_from(self, side: str) -> None:
         """Look from a side."""

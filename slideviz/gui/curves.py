@@ -1,0 +1,204 @@
+"""The curves: quality by step, convergence of the selection, quality along the span."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from slideviz.errors import SlidevizError
+from slideviz.gui.fields import Choice
+from slideviz.gui.plot_canvas import (
+    PLOT_FILTERS,
+    PlotArea,
+    PlotCanvas,
+    ask_and_write,
+    folder_of,
+    write_plot,
+)
+from slideviz.view import changes, curves
+from slideviz.view.look import SELECTED_COLOUR
+from slideviz.view.plots import convergence, quality_by_step
+from slideviz.view.plots_style import add_legend
+from slideviz.view.spanwise import spanwise
+from slideviz.view.state import Session
+from slideviz.view.store import Store
+
+KINDS = {
+    "steps": "Quality by step",
+    "greedy": "Convergence",
+    "span": "Along the span",
+}
+TIPS = {
+    "steps": "Minimum and mean quality against the step; click at a step to go there.",
+    "greedy": "Largest error against control nodes, as the greedy selection adds them.",
+    "span": "Quality in layers from hub to shroud, or along an axis.",
+}
+WHAT = {"minimum": "minimum", "mean": "mean"}
+
+
+class CurveCanvas(PlotCanvas):
+    """A plot that tells the value of the horizontal axis where it is clicked."""
+
+    def __init__(self, draw_on) -> None:
+        super().__init__(draw_on)
+        self.picked = lambda _value: None
+
+    def mouseReleaseEvent(self, event) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
+            return
+        axes = self.figure.axes[0]
+        x = event.position().x() * self.devicePixelRatioF()
+        self.picked(float(axes.transData.inverted().transform((x, 0.0))[0]))
+
+
+class CurvesPanel(QWidget):
+    """One plot of three, of the shown run and of the others."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._profiles = curves.Profiles()
+        self._mesh: object = None
+        self.area = PlotArea(self.draw_on, CurveCanvas)
+        self.canvas: CurveCanvas = self.area.canvas
+        self.canvas.picked = self._picked
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 4, 4, 4)
+        column.setSpacing(3)
+        column.addLayout(self._make_head())
+        column.addWidget(self.area, 1)
+        column.addWidget(self._make_span())
+        store.listen(self._changed)
+        self.sync(store.session)
+
+    def _make_head(self) -> QHBoxLayout:
+        self.kind = Choice(dict(KINDS))
+        self.kind.setObjectName("curve_kind")
+        for index, tip in enumerate(TIPS.values()):
+            self.kind.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
+        self.kind.chosen.connect(lambda _: self.sync(self.store.session))
+        self.save = QPushButton("Save…")
+        self.save.setToolTip("Save the plot as PNG, SVG or PDF.")
+        self.save.clicked.connect(self._save)
+        row = QHBoxLayout()
+        row.addWidget(self.kind, 1)
+        row.addWidget(self.save)
+        return row
+
+    def _make_span(self) -> QWidget:
+        self.span_row = QWidget()
+        self.what = Choice(dict(WHAT))
+        self.what.setToolTip("The lowest or the mean quality of each layer.")
+        self.coordinate = Choice({})
+        self.coordinate.setToolTip(
+            "What the layers are counted along; the radius is that about the axis of the case."
+        )
+        row = QHBoxLayout(self.span_row)
+        row.setContentsMargins(0, 0, 0, 0)
+        for choice in (self.what, self.coordinate):
+            choice.chosen.connect(lambda _: self.canvas.ask())
+            row.addWidget(choice, 1)
+        return self.span_row
+
+    # State to widgets ------------------------------------------------------------------
+
+    def _changed(self, old: Session, new: Session) -> None:
+        same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
+        turned = old.case.axis != new.case.axis or old.case.origin != new.case.origin
+        if not same or turned:
+            self.sync(new)
+
+    def sync(self, session: Session) -> None:
+        """Show the session."""
+        if session.mesh is not self._mesh:
+            self._mesh = session.mesh
+            self.coordinate.clear()
+            for name, text in curves.coordinates(session).items():
+                self.coordinate.addItem(text, name)
+            self.coordinate.show_value(curves.natural(session))
+        kind = self.kind.currentData()
+        missing = self._missing(session, kind)
+        self.kind.setToolTip(TIPS[kind])
+        self.span_row.setVisible(kind == "span" and not missing)
+        self.save.setEnabled(not missing)
+        shape = Qt.CursorShape.PointingHandCursor if kind == "steps" else Qt.CursorShape.ArrowCursor
+        self.canvas.setCursor(shape)
+        self.canvas.setToolTip(TIPS["steps"] if kind == "steps" else "")
+        if missing:
+            self.area.say(missing)
+        else:
+            self.area.plot()
+
+    def _missing(self, session: Session, kind: str) -> str:
+        """Return why there is no such plot, or an empty text."""
+        if session.mesh is None:
+            return "Open a mesh first: here are the curves of its runs."
+        if kind == "steps" and not curves.step_runs(session):
+            return "Run the case to see minimum and mean quality of each step."
+        if kind == "greedy" and curves.greedy_run(session) is None:
+            if session.run_shown is None or not session.run_shown.frames:
+                return "Run the case with data reduction to see how its error falls."
+            if session.view.frame == 0:
+                return "The undeformed mesh is shown: go to a step to see how its error fell."
+            return (
+                "This step used all boundary nodes. With data reduction (panel Method, More) "
+                "you see here how the error falls as control nodes are added."
+            )
+        return ""
+
+    def take_theme(self, look, _colour: str) -> None:
+        """Take the colours of the theme."""
+        self.canvas.set_look(look)
+
+    # Drawing ---------------------------------------------------------------------------
+
+    def draw_on(self, figure, style) -> None:
+        """Draw the plot that is chosen."""
+        session, kind = self.store.session, self.kind.currentData()
+        if not self._missing(session, kind):
+            {"steps": self._draw_steps, "greedy": self._draw_greedy, "span": self._draw_span}[kind](
+                figure.add_subplot(), session, style
+            )
+
+    @staticmethod
+    def _draw_steps(axes, session: Session, style) -> None:
+        quality_by_step(axes, curves.step_runs(session), style)
+        at = session.view.frame
+        axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
+        last = max(len(run.frames) for run in session.runs)
+        axes.set_xlim(-0.03 * last, 1.03 * last)
+
+    @staticmethod
+    def _draw_greedy(axes, session: Session, style) -> None:
+        run = curves.greedy_run(session)
+        convergence(axes, [run], style=style)
+        axes.set_title(run.label, fontsize=style.size, color=style.look.text)
+
+    def _draw_span(self, axes, session: Session, style) -> None:
+        try:
+            profiles = self._profiles.of(session, self.coordinate.currentData())
+        except SlidevizError as error:
+            axes.set_axis_off()
+            figure = axes.get_figure()
+            figure.text(
+                0.5, 0.5, str(error), ha="center", va="center", wrap=True,
+                fontsize=style.size, color=style.look.text,
+            )  # fmt: skip
+            return
+        spanwise(axes, profiles, self.what.currentData(), style=style)
+        add_legend(axes, style, loc="best")
+
+    # What the user does ----------------------------------------------------------------
+
+    def _picked(self, value: float) -> None:
+        """Go to the step that was clicked."""
+        if self.kind.currentData() == "steps" and not self.area.empty:
+            self.store.change(changes.show_frame, round(value))
+
+    def _save(self) -> None:
+        default = folder_of(self) / f"{self.kind.currentText().lower().replace(' ', '_')}.png"
+        ask_and_write(
+            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.draw_on)
+        )

@@ -1,0 +1,248 @@
+"""The histogram: how many cells have which quality, and a brush that shows only some of them."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import numpy as np
+from qtpy.QtCore import Qt, QTimer
+from qtpy.QtGui import QKeySequence, QShortcut
+from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from slideviz.gui.brush import BrushCanvas, Range
+from slideviz.gui.plot_canvas import (
+    PLOT_FILTERS,
+    PlotArea,
+    ask_and_write,
+    folder_of,
+    is_seen,
+    write_plot,
+)
+from slideviz.view import changes
+from slideviz.view.actors import shown_values
+from slideviz.view.curves import look_of
+from slideviz.view.distribution import Distribution, Outline, distribution, draw_distribution
+from slideviz.view.inspect import ONLY_INVERTED, chosen_cells
+from slideviz.view.state import COLOUR_BY, ColourBy, Frame, Session
+from slideviz.view.store import Store
+
+
+class HistogramPanel(QWidget):
+    """The values of the step that is shown, of the undeformed mesh and of other runs."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._kept: dict[tuple[int, str, Range], tuple[Frame, Distribution]] = {}
+        self._wanted: Range | None = None
+        self._told: Frame | None = None
+        self.area = PlotArea(self.draw_on, BrushCanvas)
+        self.canvas: BrushCanvas = self.area.canvas
+        self.canvas.brushed.connect(self._brushed)
+        self.numbers = QLabel()
+        self.numbers.setTextFormat(Qt.TextFormat.RichText)
+        self.numbers.setWordWrap(True)
+        self.range_text = QLabel()
+        self.range_text.setWordWrap(True)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 4, 4, 4)
+        column.setSpacing(3)
+        column.addWidget(self.area, 1)
+        column.addWidget(self.numbers)
+        column.addWidget(self.range_text)
+        column.addLayout(self._make_buttons())
+        # Cells are chosen while the mouse moves, but not with each of its pixels.
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(120)
+        self._soon.timeout.connect(self._choose)
+        escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
+        escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        escape.activated.connect(self.clear_range)
+        store.listen(self._changed)
+        self.sync(store.session)
+
+    def _make_buttons(self) -> QHBoxLayout:
+        self.log = QCheckBox("log")
+        self.log.setToolTip("Counts on a logarithmic axis, which shows a few bad cells.")
+        self.log.setChecked(True)
+        self.log.toggled.connect(lambda _: self.canvas.ask())
+        self.show_all = QPushButton("Show all cells")
+        self.show_all.setObjectName("show_all_cells")
+        self.show_all.setToolTip("Show cells of any value again (Esc).")
+        self.show_all.clicked.connect(self.clear_range)
+        self.save = QPushButton("Save…")
+        self.save.setToolTip("Save the histogram as PNG, SVG or PDF.")
+        self.save.clicked.connect(self._save)
+        row = QHBoxLayout()
+        row.addWidget(self.log)
+        row.addStretch(1)
+        row.addWidget(self.show_all)
+        row.addWidget(self.save)
+        return row
+
+    # State to widgets ------------------------------------------------------------------
+
+    def _changed(self, old: Session, new: Session) -> None:
+        parts = (
+            old.frame is new.frame,
+            old.runs is new.runs or old.runs == new.runs,
+            old.view.colour_by == new.view.colour_by,
+            old.view.colour_map == new.view.colour_map,
+            old.colour_range == new.colour_range,
+            old.view.threshold == new.view.threshold,
+        )
+        if not all(parts):
+            self.sync(new)
+
+    def sync(self, session: Session) -> None:
+        """Show the session."""
+        for widget in (self.numbers, self.log, self.save):
+            widget.setVisible(session.frame is not None)
+        self.show_all.setVisible(session.frame is not None)
+        self.show_all.setEnabled(session.view.threshold is not None)
+        if not self._soon.isActive():
+            self.canvas.show_band(session.view.threshold)
+        if session.frame is None:
+            self._kept.clear()
+            self.range_text.hide()
+            self.area.say("Open a mesh first: here is how many of its cells have which quality.")
+            return
+        self.area.plot()
+        if is_seen(self):
+            self._sync_words(session)
+        else:
+            self._told = None
+
+    def _sync_words(self, session: Session) -> None:
+        if session.frame is None:
+            return
+        self._told = session.frame
+        what = shown_measure(session)
+        values = shown_values(session.frame, what, session.mesh)
+        plain = session.frame.values(what, session.mesh)
+        bad = session.frame.quality.inverted
+        low = "highest" if what == "displacement" else "min"
+        ends = plain.max() if what == "displacement" else plain.min()
+        red = " style='color:#e8112d'" if bad else ""
+        self.numbers.setText(
+            f"{low} <b>{ends:.4g}</b>&nbsp; mean <b>{plain.mean():.4g}</b>&nbsp; "
+            f"<span{red}>inverted <b>{bad:,}</b></span>"
+        )
+        threshold = session.view.threshold
+        self.range_text.setVisible(threshold is not None)
+        if threshold is not None:
+            count = len(chosen_cells(values, threshold))
+            self.range_text.setText(
+                f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"
+            )
+
+    def paintEvent(self, event) -> None:
+        super().paintEvent(event)
+        # Behind another tab nothing was told.
+        if self._told is None and self.store.session.frame is not None:
+            QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
+
+    def take_theme(self, look, _colour: str) -> None:
+        """Take the colours of the theme."""
+        self.canvas.set_look(look)
+
+    # Drawing ---------------------------------------------------------------------------
+
+    def draw_on(self, figure, style) -> None:
+        """Draw the histogram of what is shown now."""
+        session = self.store.session
+        if session.frame is None:
+            return
+        what = shown_measure(session)
+        limits = session.colour_range if what == "displacement" else (0.0, 1.0)
+        shown = self._distribution(session, session.frame, limits)
+        label = "undeformed" if session.view.frame == 0 else f"run {session.shown}"
+        words = label, "displacement [mesh unit]" if what == "displacement" else _words(what)
+        table = _colours(session, shown)
+        axes = figure.add_subplot()
+        outlines = self._outlines(session, limits)
+        draw_distribution(axes, shown, outlines, words, table, self.log.isChecked(), style)
+
+    def _outlines(self, session: Session, limits: Range) -> list[Outline]:
+        found = []
+        if session.view.frame > 0 and shown_measure(session) != "displacement":
+            first = self._distribution(session, session.first, limits)
+            found.append(Outline("undeformed", first, None))
+        for run in session.runs:
+            if run.last is None or run.last is session.frame:
+                continue
+            if run.number == session.shown:
+                continue  # its own last step is what is played to
+            last = self._distribution(session, run.last, limits)
+            found.append(Outline(f"run {run.number}", last, look_of(run)))
+        return found
+
+    def _distribution(self, session: Session, frame: Frame, limits: Range) -> Distribution:
+        """Return the counts of a frame, made once as long as it is there."""
+        what = shown_measure(session)
+        key = id(frame), what, limits
+        kept = self._kept.get(key)
+        if kept is None or kept[0] is not frame:
+            if len(self._kept) > 64:
+                self._kept.clear()
+            kept = frame, distribution(frame, what, limits, session.mesh)
+            self._kept[key] = kept
+        return kept[1]
+
+    # What the user does ----------------------------------------------------------------
+
+    def _brushed(self, band: Range | None) -> None:
+        if band is None:
+            self.clear_range()
+            return
+        # Left of the values only inverted cells are; from there on they belong to it.
+        low, high = band
+        self._wanted = ONLY_INVERTED if high < 0.0 else (max(low, 0.0), high)
+        if not self._soon.isActive():
+            self._soon.start()
+
+    def _choose(self) -> None:
+        if self._wanted is not None:
+            self.store.change(changes.set_view, threshold=self._wanted)
+
+    def clear_range(self) -> None:
+        """Show cells of any value again."""
+        self._soon.stop()
+        self._wanted = None
+        if self.store.session.view.threshold is not None:
+            self.store.change(changes.set_view, threshold=None)
+        self.canvas.show_band(None)
+
+    def _save(self) -> None:
+        default = folder_of(self) / "histogram.png"
+        ask_and_write(
+            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.draw_on)
+        )
+
+
+def shown_measure(session: Session) -> ColourBy:
+    """Return what the histogram counts: what the cells are coloured by, or size-skew."""
+    by = session.view.colour_by
+    return "size_skew" if by == "role" else by
+
+
+def range_words(threshold: Range) -> str:
+    """Return a range in words."""
+    if threshold[1] < 0.0:
+        return "inverted cells"
+    return f"{threshold[0]:.3g} to {threshold[1]:.3g}"
+
+
+def _words(what: ColourBy) -> str:
+    return f"{COLOUR_BY[what]} quality [-]"
+
+
+def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
+    """Return the colours of the bars: those of their values in the view."""
+    import matplotlib as mpl
+
+    low, high = session.colour_range
+    middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
+    part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
+    return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]

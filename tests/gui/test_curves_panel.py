@@ -1,0 +1,161 @@
+"""The panel of the curves, by itself."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
+from test_worst import session_with_runs
+
+from slideviz.gui import plot_canvas
+from slideviz.gui.curves import CurvesPanel
+from slideviz.view import changes
+from slideviz.view.look import DARK
+from slideviz.view.state import Session
+from slideviz.view.store import Store
+
+
+@pytest.fixture
+def panel(qtbot, monkeypatch):
+    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
+    made = CurvesPanel(Store())
+    made.resize(300, 400)
+    qtbot.addWidget(made)
+    with qtbot.waitExposed(made):
+        made.show()
+    return made
+
+
+@pytest.fixture
+def full(panel, qtbot):
+    with qtbot.waitSignal(panel.canvas.drawn):
+        panel.store.put(session_with_runs())
+    return panel
+
+
+def choose(panel, kind):
+    panel.kind.setCurrentIndex(panel.kind.findData(kind))
+    panel.kind.activated.emit(panel.kind.currentIndex())
+
+
+def lines(panel):
+    axes = panel.canvas.figure.axes[0]
+    return {line.get_gid() or line.get_label(): line for line in axes.lines}
+
+
+@pytest.mark.parametrize("kind", ["steps", "greedy", "span"])
+def test_without_a_mesh_it_says_what_to_do(panel, kind):
+    choose(panel, kind)
+    assert panel.area.empty
+    assert "Open a mesh first" in panel.area.words.text()
+    assert not panel.save.isEnabled()
+
+
+def test_without_a_run_it_says_what_is_to_be_seen(panel):
+    session = session_with_runs()
+    panel.store.put(replace(session, runs=(), shown=None))
+    assert "Run the case to see minimum and mean" in panel.area.words.text()
+    choose(panel, "greedy")
+    assert "Run the case with data reduction" in panel.area.words.text()
+
+
+def test_minimum_and_mean_by_step_of_each_run(full):
+    session = full.store.session
+    drawn = lines(full)
+    for run in session.runs:
+        wanted = [session.first.quality.min, *(frame.quality.min for frame in run.frames)]
+        assert list(drawn[f"minimum:run {run.number}"].get_ydata()) == wanted
+        assert f"mean:run {run.number}" in drawn
+    assert list(drawn["shown"].get_xdata()) == [2, 2]
+
+
+def test_the_mark_follows_the_step(full, qtbot):
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.store.change(changes.show_frame, 1)
+    assert list(lines(full)["shown"].get_xdata()) == [1, 1]
+
+
+def test_a_click_in_the_plot_goes_to_that_step(full):
+    axes = full.canvas.figure.axes[0]
+    for step in (0, 1):
+        x = axes.transData.transform((step + 0.2, 0))[0] / full.canvas.devicePixelRatioF()
+        where = QPoint(round(x), full.canvas.height() // 2)
+        QTest.mouseClick(full.canvas, Qt.MouseButton.LeftButton, pos=where)
+        assert full.store.session.view.frame == step
+
+
+def test_a_click_in_another_plot_goes_nowhere(full, qtbot):
+    with qtbot.waitSignal(full.canvas.drawn):
+        choose(full, "span")
+    QTest.mouseClick(full.canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
+    assert full.store.session.view.frame == 2
+
+
+def test_convergence_of_the_shown_step_or_why_there_is_none(full, qtbot):
+    choose(full, "greedy")
+    assert "used all boundary nodes" in full.area.words.text()
+    session = full.store.session
+    cycles = tuple(
+        SimpleNamespace(control_nodes=4 * k, error=0.1 / k, level=1) for k in range(1, 6)
+    )
+    run = session.runs[1]
+    step = SimpleNamespace(index=2, history=cycles, seconds={})
+    frames = (run.frames[0], replace(run.frames[1], step=step))
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.store.put(replace(session, runs=(session.runs[0], replace(run, frames=frames))))
+    assert not full.area.empty
+    assert list(lines(full)["run 2, step 2"].get_xdata()) == [4, 8, 12, 16, 20]
+    full.store.change(changes.show_frame, 0)
+    assert "The undeformed mesh is shown" in full.area.words.text()
+
+
+def test_along_the_span_the_shown_step_others_and_the_undeformed_mesh(full, qtbot):
+    with qtbot.waitSignal(full.canvas.drawn):
+        choose(full, "span")
+    assert full.span_row.isVisible()
+    axes = full.canvas.figure.axes[0]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["run 2", "run 1", "undeformed"]
+    assert axes.get_ylabel().startswith("y ")
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.coordinate.setCurrentIndex(full.coordinate.findData("x"))
+        full.coordinate.activated.emit(full.coordinate.currentIndex())
+    assert full.canvas.figure.axes[0].get_ylabel().startswith("x ")
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.what.setCurrentIndex(full.what.findData("mean"))
+        full.what.activated.emit(full.what.currentIndex())
+    assert full.canvas.figure.axes[0].get_xlabel().startswith("mean")
+
+
+def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbot, monkeypatch):
+    from slideviz.errors import SlidevizError
+    from slideviz.gui import curves
+
+    def refuse(*_):
+        raise SlidevizError("the mesh has no extent along r; choose another")
+
+    monkeypatch.setattr(curves.curves.Profiles, "of", refuse)
+    with qtbot.waitSignal(full.canvas.drawn):
+        choose(full, "span")
+    texts = [text.get_text() for text in full.canvas.figure.texts]
+    assert texts == ["the mesh has no extent along r; choose another"]
+
+
+def test_another_mesh_is_begun_with(full):
+    full.store.put(Session())
+    assert full.area.empty
+    assert full.coordinate.count() > 0
+
+
+def test_it_is_dark_in_the_dark(full, qtbot):
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.take_theme(DARK, "#ffffff")
+    assert full.canvas.grab().toImage().pixelColor(3, 3).name() == DARK.background
+
+
+def test_the_plot_is_saved(full, tmp_path, answers):
+    asked = answers("ask_save", tmp_path / "steps.svg")
+    QTest.mouseClick(full.save, Qt.MouseButton.LeftButton)
+    assert asked[0][1].name == "quality_by_step.png"
+    assert b"<svg" in (tmp_path / "steps.svg").read_bytes()

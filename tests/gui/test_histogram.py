@@ -1,0 +1,212 @@
+"""The histogram panel, by itself: what it draws, the brush, the words."""
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
+from test_worst import session_with_runs
+
+from slideviz.gui import dialogs, plot_canvas
+from slideviz.gui.histogram import HistogramPanel
+from slideviz.view import changes
+from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.look import DARK
+from slideviz.view.store import Store
+
+
+@pytest.fixture
+def panel(qtbot, monkeypatch):
+    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
+    made = HistogramPanel(Store())
+    made.resize(300, 400)
+    qtbot.addWidget(made)
+    with qtbot.waitExposed(made):
+        made.show()
+    return made
+
+
+@pytest.fixture
+def full(panel, qtbot):
+    with qtbot.waitSignal(panel.canvas.drawn):
+        panel.store.put(session_with_runs())
+    return panel
+
+
+def labels(panel):
+    return [text.get_text() for text in panel.canvas.figure.axes[0].get_legend().get_texts()]
+
+
+def drag(panel, low, high, release=True):
+    canvas = panel.canvas
+    y = canvas.height() // 2
+    a, b = (QPoint(round(canvas.pixel_of(value)), y) for value in (low, high))
+    QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=a)
+    QTest.mouseMove(canvas, (a + b) / 2)
+    QTest.mouseMove(canvas, b)
+    if release:
+        QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=b)
+
+
+def test_without_a_mesh_it_says_what_to_do(panel):
+    assert panel.area.empty
+    assert "Open a mesh first" in panel.area.words.text()
+    assert not panel.save.isVisible()
+
+
+def test_it_shows_the_step_the_undeformed_mesh_and_other_runs(full, qtbot):
+    assert not full.area.empty
+    assert sorted(labels(full)) == ["run 1", "run 2", "undeformed"]
+    quality = full.store.session.frame.quality
+    assert f"{quality.min:.4g}" in full.numbers.text()
+    assert f"{quality.mean:.4g}" in full.numbers.text()
+    assert f"inverted <b>{quality.inverted}" in full.numbers.text()
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.store.change(changes.show_frame, 0)
+    assert sorted(labels(full)) == ["run 1", "undeformed"]
+
+
+def test_it_follows_the_colours_of_the_view(full, qtbot):
+    for by, word in (("skew", "skew quality"), ("displacement", "displacement")):
+        with qtbot.waitSignal(full.canvas.drawn):
+            full.store.change(changes.set_view, colour_by=by)
+        assert full.canvas.figure.axes[0].get_xlabel().startswith(word)
+    limit = full.store.session.colour_range[1]
+    assert full.canvas.figure.axes[0].get_xlim()[1] == pytest.approx(limit)
+    assert "highest" in full.numbers.text()
+
+
+def test_the_count_can_be_linear(full, qtbot):
+    assert full.canvas.figure.axes[0].get_yscale() == "log"
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.log.setChecked(False)
+    assert full.canvas.figure.axes[0].get_yscale() == "linear"
+
+
+def test_the_brush_chooses_the_cells_between(full, qtbot):
+    drag(full, 0.6, 0.9)
+    qtbot.waitUntil(lambda: full.store.session.view.threshold is not None)
+    low, high = full.store.session.view.threshold
+    assert (low, high) == pytest.approx((0.6, 0.9), abs=0.01)
+    values = full.store.session.frame.quality.values
+    count = int(((values >= low) & (values <= high)).sum())
+    assert f"{count:,} of {len(values):,} cells" in full.range_text.text()
+    assert full.show_all.isEnabled()
+    # One end is taken up again.
+    drag(full, high, 0.7)
+    qtbot.waitUntil(lambda: full.store.session.view.threshold[1] < 0.72)
+    assert full.store.session.view.threshold[0] == pytest.approx(low)
+
+
+def test_from_the_strip_of_the_inverted_the_range_begins_at_0(full, qtbot):
+    quality = full.store.session.frame.quality
+    assert quality.inverted
+    drag(full, -0.05, 0.5)
+    qtbot.waitUntil(lambda: full.store.session.view.threshold is not None)
+    assert full.store.session.view.threshold[0] == 0.0
+    full.clear_range()
+    drag(full, -0.09, -0.01)
+    qtbot.waitUntil(lambda: full.store.session.view.threshold is not None)
+    assert full.store.session.view.threshold == ONLY_INVERTED
+    assert f"inverted cells, {quality.inverted} of" in full.range_text.text()
+
+
+@pytest.mark.parametrize("how", ["button", "click", "escape"])
+def test_the_choice_ends(full, qtbot, how):
+    full.store.change(changes.set_view, threshold=(0.2, 0.4))
+    assert full.canvas.band == (0.2, 0.4)
+    if how == "button":
+        QTest.mouseClick(full.show_all, Qt.MouseButton.LeftButton)
+    elif how == "click":
+        QTest.mouseClick(
+            full.canvas,
+            Qt.MouseButton.LeftButton,
+            pos=QPoint(round(full.canvas.pixel_of(0.8)), 90),
+        )
+    else:
+        full.activateWindow()
+        qtbot.waitUntil(full.isActiveWindow)
+        full.canvas.setFocus()
+        QTest.keyClick(full.canvas, Qt.Key.Key_Escape)
+    assert full.store.session.view.threshold is None
+    assert full.canvas.band is None
+    assert not full.show_all.isEnabled()
+
+
+def test_a_range_set_elsewhere_is_shown(full):
+    full.store.change(changes.set_view, threshold=(0.25, 0.5))
+    assert full.canvas.band == (0.25, 0.5)
+    assert full.range_text.isVisible()
+    assert full.range_text.text().startswith("Shown: 0.25 to 0.5")
+    before = full.canvas.grab().toImage()
+    full.store.change(changes.set_view, threshold=None)
+    after = full.canvas.grab().toImage()
+    x, y = round(full.canvas.pixel_of(0.4)), round(full.canvas.height() * 0.7)
+    assert before.pixelColor(x, y) != after.pixelColor(x, y)
+
+
+def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
+    full.hide()
+    told = []
+    full.canvas.drawn.connect(lambda: told.append(1))
+    for frame in (0, 1, 2):
+        full.store.change(changes.show_frame, frame)
+    qtbot.wait(60)
+    assert not told
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.show()
+    assert f"{full.store.session.frame.quality.min:.4g}" in full.numbers.text()
+
+
+def test_playing_draws_less_often_than_it_steps(full, qtbot, monkeypatch):
+    monkeypatch.setattr(plot_canvas, "REST_MS", 10_000)
+    full.canvas.fill()
+    told = []
+    full.canvas.drawn.connect(lambda: told.append(1))
+    for frame in (0, 1, 2, 1, 0):
+        full.store.change(changes.show_frame, frame)
+        qtbot.wait(5)
+    assert not told
+    assert full.canvas._timer.isActive()
+
+
+def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
+    from slideviz.gui import histogram
+
+    asked = []
+    real = histogram.distribution
+    monkeypatch.setattr(histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v))
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.store.change(changes.show_frame, 1)
+    assert asked == [full.store.session.frame]
+
+
+def test_it_is_dark_in_the_dark(full, qtbot):
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.take_theme(DARK, "#ffffff")
+    assert full.canvas.grab().toImage().pixelColor(3, 3).name() == DARK.background
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("h.png", b"\x89PNG"), ("h.svg", b"<?xml"), ("h.pdf", b"%PDF")]
+)
+def test_it_is_saved_as_a_figure(full, tmp_path, answers, name, start):
+    answers("ask_save", tmp_path / name)
+    QTest.mouseClick(full.save, Qt.MouseButton.LeftButton)
+    assert (tmp_path / name).read_bytes().startswith(start)
+
+
+def test_another_kind_of_file_is_refused_and_nothing_written(full, tmp_path):
+    with pytest.raises(dialogs.SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
+        plot_canvas.write_plot(tmp_path / "h.xls", full.draw_on)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_small_panel_still_shows_its_plot(full, qtbot):
+    full.resize(290, 240)
+    qtbot.wait(30)
+    axes = full.canvas.figure.axes[0].get_window_extent()
+    assert axes.width > 0.5 * full.canvas.width() * full.canvas.devicePixelRatioF()
+    box = full.canvas.figure.axes[0].get_tightbbox()
+    assert box.x0 >= -1
+    assert np.isfinite(box.x1)
+    assert box.x1 <= full.canvas.width() * full.canvas.devicePixelRatioF() + 1

@@ -1,0 +1,337 @@
+"""The list of the worst cells, by itself and with the view beside it."""
+
+import csv
+
+import numpy as np
+import pytest
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QGuiApplication
+from qtpy.QtTest import QTest
+
+from slideviz.case.samples import sample
+from slideviz.gui import plot_canvas, worst
+from slideviz.gui.worst import WorstPanel, info_text
+from slideviz.gui.worst_table import CELL, QUALITY, SINCE
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.inspect import worst_cells
+from slideviz.view.state import Frame
+from slideviz.view.store import Store
+
+
+def shaken(mesh, size, seed):
+    rng = np.random.default_rng(seed)
+    points = mesh.points + size * mesh.extent * rng.uniform(-1, 1, mesh.points.shape)
+    moved = mesh.with_points(points)
+    return Frame(moved, quality(moved, mesh))
+
+
+def with_runs(session):
+    """Return a session with two runs of two steps; the last step of each has inverted cells."""
+    for seed in (1, 2):
+        frames = [shaken(session.mesh, size, seed) for size in (0.004, 0.08)]
+        session = changes.add_frames(changes.start_run(session), frames)
+        session = changes.end_run(session, "done")
+    return changes.set_view(session, colour_by="size_skew")
+
+
+def session_with_runs():
+    mesh = sample("square", size=12).mesh
+    return with_runs(changes.open_mesh(Frame(mesh, quality(mesh)), None))
+
+
+@pytest.fixture
+def flown():
+    return []
+
+
+@pytest.fixture
+def panel(qtbot, monkeypatch, flown):
+    for module in (worst, plot_canvas):
+        monkeypatch.setattr(module, "REST_MS", 0)
+    made = WorstPanel(Store(), flown.append, lambda: flown.append("back"))
+    made.resize(300, 420)
+    qtbot.addWidget(made)
+    with qtbot.waitExposed(made):
+        made.show()
+    made.activateWindow()
+    return made
+
+
+@pytest.fixture
+def full(panel):
+    panel.store.put(session_with_runs())
+    return panel
+
+
+def cells(panel):
+    return [panel.model.cell(row) for row in range(panel.model.rowCount())]
+
+
+def column(panel, which):
+    return [panel.model.index(row, which).data() for row in range(panel.model.rowCount())]
+
+
+def click(panel, row, modifier=Qt.KeyboardModifier.NoModifier):
+    where = panel.table.visualRect(panel.model.index(row, QUALITY)).center()
+    button = Qt.MouseButton.LeftButton
+    QTest.mouseClick(panel.table.viewport(), button, modifier, where)
+
+
+def test_without_a_mesh_it_says_what_to_do(panel):
+    assert panel.stack.currentWidget() is panel.words
+    assert "Open a mesh first" in panel.words.text()
+    assert not panel.export.isVisible()
+
+
+def test_it_lists_the_worst_hundred_of_the_step(full):
+    session = full.store.session
+    wanted = worst_cells(session.frames, 2, "size_skew")
+    assert cells(full) == wanted.cells.tolist()
+    assert len(cells(full)) == 100
+    assert column(full, SINCE) == [str(step) for step in wanted.steps]
+    assert column(full, QUALITY)[0] == "inverted"
+    assert column(full, QUALITY)[-1] == f"{wanted.values[-1]:.4f}"
+
+
+def test_it_follows_the_step_and_the_colours(full):
+    full.store.change(changes.show_frame, 1)
+    session = full.store.session
+    assert cells(full) == worst_cells(session.frames, 1, "size_skew").cells.tolist()
+    full.store.change(changes.set_view, colour_by="size")
+    assert cells(full) == worst_cells(session.frames, 1, "size").cells.tolist()
+
+
+def test_hidden_it_lists_nothing_and_catches_up(full, qtbot, monkeypatch):
+    full.hide()
+    with monkeypatch.context() as patch:
+        patch.setattr(worst, "worst_cells", None)
+        full.store.change(changes.show_frame, 1)
+    full.show()
+    wanted = worst_cells(full.store.session.frames, 1, "size_skew").cells.tolist()
+    qtbot.waitUntil(lambda: cells(full) == wanted)
+
+
+def test_while_steps_are_played_the_list_comes_when_there_is_time(full, qtbot, monkeypatch):
+    before = cells(full)
+    monkeypatch.setattr(worst, "REST_MS", 40)
+    full._last = worst.time.monotonic()
+    full.store.change(changes.show_frame, 1)
+    assert cells(full) == before
+    wanted = worst_cells(full.store.session.frames, 1, "size_skew").cells.tolist()
+    qtbot.waitUntil(lambda: cells(full) == wanted)
+
+
+@pytest.mark.parametrize("by", [CELL, SINCE])
+def test_it_can_be_sorted_both_ways(full, by):
+    for order, down in ((Qt.SortOrder.AscendingOrder, False), (Qt.SortOrder.DescendingOrder, True)):
+        full.table.sortByColumn(by, order)
+        numbers = [int(text) for text in column(full, by)]
+        assert numbers == sorted(numbers, reverse=down)
+    assert sorted(cells(full)) == sorted(full.model.worst.cells)
+
+
+def test_sorting_keeps_the_marked_cell_the_current_row(full):
+    full.store.change(changes.mark, cells(full)[5])
+    full.table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)
+    assert full.model.cell(full.table.currentIndex().row()) == full.store.session.view.marked
+
+
+def test_a_click_marks_and_flies_and_a_second_one_takes_the_mark_away(full, flown):
+    cell = cells(full)[3]
+    click(full, 3)
+    assert full.store.session.view.marked == cell
+    assert flown == [cell]
+    assert full.info.isVisible()
+    assert f"Cell {cell}" in full.info.text()
+    click(full, 3)
+    assert full.store.session.view.marked is None
+    assert not full.info.isVisible()
+    assert not full.table.currentIndex().isValid()
+    click(full, 3)
+    assert full.store.session.view.marked == cell
+    assert flown == [cell, cell]
+
+
+def test_keys_go_from_cell_to_cell_and_escape_takes_the_mark_away(full, flown):
+    click(full, 0)
+    for _ in range(2):
+        QTest.keyClick(full.table, Qt.Key.Key_Down)
+    assert full.store.session.view.marked == cells(full)[2]
+    assert flown == cells(full)[:3]
+    QTest.keyClick(full.table, Qt.Key.Key_Escape)
+    assert full.store.session.view.marked is None
+
+
+def test_a_mark_made_elsewhere_is_shown_without_flying(full, flown):
+    full.store.change(changes.mark, cells(full)[7])
+    assert full.table.currentIndex().row() == 7
+    full.store.change(changes.show_frame, 0)
+    inside = full.model.row_of(full.store.session.view.marked)
+    assert full.table.currentIndex().row() == inside
+    full.store.change(changes.mark, None)
+    assert not full.table.currentIndex().isValid()
+    assert flown == []
+
+
+def test_back_takes_the_mark_away_and_returns(full, flown):
+    click(full, 1)
+    QTest.mouseClick(full.back, Qt.MouseButton.LeftButton)
+    assert full.store.session.view.marked is None
+    assert flown[-1] == "back"
+
+
+def test_rows_are_copied_with_every_digit(full):
+    click(full, 1)
+    click(full, 3, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(full.table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    lines = [line.split("\t") for line in QGuiApplication.clipboard().text().splitlines()]
+    assert lines[0][:2] == ["cell", "type"]
+    assert [int(line[0]) for line in lines[1:]] == cells(full)[1:4]
+    assert float(lines[3][2]) == full.model.worst.values[3]
+
+
+def test_the_list_is_exported(full, tmp_path, answers):
+    asked = answers("ask_save", tmp_path / "worst.csv")
+    QTest.mouseClick(full.export, Qt.MouseButton.LeftButton)
+    assert asked[0][1].name == "worst_cells.csv"
+    with (tmp_path / "worst.csv").open() as file:
+        assert [int(row["cell"]) for row in csv.DictReader(file)] == cells(full)
+
+
+def test_what_is_told_of_a_cell(full):
+    session = full.store.session
+    cell = cells(full)[0]
+    text = info_text(session, cell)
+    assert f"<b>Cell {cell}</b>, quadrilateral" in text
+    assert "inverted" in text
+    assert text.split("corner Jacobians: ")[1].count(",") == 3
+    assert "x, y: " in text
+
+
+# With the window -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def opened(driver, passage_file):
+    driver.open(passage_file)
+    driver.window.store.put(with_runs(driver.session))
+    return driver
+
+
+def middle(driver, cell):
+    mesh = driver.session.frame.mesh
+    begin, end = mesh.cells.offsets[cell : cell + 2]
+    return mesh.points[mesh.cells.connectivity[begin:end]].mean(axis=0)
+
+
+def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
+    window = opened.window
+    window.docks_.lead_to("worst")
+    panel = window.docks_.panels["worst"]
+    opened.qtbot.waitUntil(lambda: panel.model.rowCount() > 0 and panel.isVisible())
+    before = window.scene.eye.place
+    click(panel, 2)
+    cell = opened.session.view.marked
+    assert cell == panel.model.cell(2)
+    assert np.allclose(window.scene.plotter.camera.focal_point[:2], middle(opened, cell))
+    QTest.mouseClick(panel.back, Qt.MouseButton.LeftButton)
+    assert np.allclose(window.scene.eye.place, before)
+
+
+def test_an_export_that_fails_is_told_in_the_window(opened, tmp_path, answers):
+    window = opened.window
+    window.docks_.lead_to("worst")
+    panel = window.docks_.panels["worst"]
+    answers("ask_save", tmp_path / "none" / "worst.csv")
+    opened.click(panel.export)
+    assert "the folder does not exist" in window.banner.text.text()
+
+
+def double_click(driver, point):
+    view = driver.window.view
+    driver.click_view(point)
+    from qtpy.QtCore import QPoint
+
+    from slideviz.view.pick import to_display
+
+    x, y = to_display(view, [[*point, 0.0][:3]])[0] / view.devicePixelRatioF()
+    QTest.mouseDClick(
+        view, Qt.MouseButton.LeftButton, pos=QPoint(round(x), round(view.height() - 1 - y))
+    )
+
+
+def test_a_double_click_marks_a_cell_and_escape_takes_that_away(opened):
+    cell = 40
+    double_click(opened, middle(opened, cell))
+    marked = opened.session.view.marked
+    assert marked is not None
+    # Cells overlap where some are inverted; the worst of those that are there is meant.
+    values = opened.session.frame.quality.values
+    assert marked == cell or values[marked] <= values[cell]
+    QTest.keyClick(opened.window.view, Qt.Key.Key_Escape)
+    assert opened.session.view.marked is None
+    opened.window.store.change(changes.set_view, threshold=(0.0, 0.5))
+    QTest.keyClick(opened.window.view, Qt.Key.Key_Escape)
+    assert opened.session.view.threshold is None
+
+
+def test_a_click_with_alt_marks_a_cell_and_selects_no_boundary(opened):
+    opened.window.store.change(changes.show_frame, 0)
+    opened.window.store.change(changes.select, (opened.session.mesh.marker_names[0],))
+    selected = opened.session.view.selected
+    opened.click_view(middle(opened, 40), modifier=Qt.KeyboardModifier.AltModifier)
+    assert opened.session.view.marked == 40
+    assert opened.session.view.selected == selected
+
+
+def test_the_mouse_at_rest_tells_of_the_cell(opened, monkeypatch):
+    from qtpy.QtCore import QPoint
+    from qtpy.QtGui import QHelpEvent
+    from qtpy.QtWidgets import QApplication, QToolTip
+
+    from slideviz.view.pick import to_display
+
+    view = opened.window.view
+    opened.window.store.change(changes.show_frame, 0)
+    view.snapshot()
+    told = []
+    monkeypatch.setattr(QToolTip, "showText", lambda *v: told.append(v[1]))
+    x, y = to_display(view, [[*middle(opened, 40), 0.0]])[0] / view.devicePixelRatioF()
+    where = QPoint(round(x), round(view.height() - 1 - y))
+    QApplication.sendEvent(
+        view, QHelpEvent(QHelpEvent.Type.ToolTip, where, view.mapToGlobal(where))
+    )
+    assert len(told) == 1
+    assert "Cell 40" in told[0]
+
+
+def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, monkeypatch):
+    from slideviz.gui import histogram
+
+    window, asked = opened.window, []
+    for module, name in ((worst, "worst_cells"), (histogram, "distribution")):
+        real = getattr(module, name)
+
+        def told(*values, real=real, name=name):
+            asked.append(name)
+            return real(*values)
+
+        monkeypatch.setattr(module, name, told)
+    panel = window.docks_.panels["worst"]
+    window.docks_.lead_to("curves")
+    opened.qtbot.wait(50)
+    asked.clear()
+    for frame in (0, 1):
+        window.store.change(changes.show_frame, frame)
+    opened.qtbot.wait(50)
+    assert asked == []
+    window.docks_.lead_to("worst")
+    opened.qtbot.waitUntil(lambda: "worst_cells" in asked)
+    wanted = worst_cells(opened.session.frames, 1, "size_skew").cells.tolist()
+    assert cells(panel) == wanted
+    window.docks_.lead_to("histogram")
+    opened.qtbot.waitUntil(lambda: "distribution" in asked)
+    words = window.docks_.panels["histogram"].numbers
+    low = f"{opened.session.frame.quality.min:.4g}"
+    opened.qtbot.waitUntil(lambda: low in words.text())

@@ -1,0 +1,121 @@
+"""What the curves of a session are made of."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from slideviz.case.model import Reduction
+from slideviz.errors import SlidevizError
+from slideviz.mesh.quality import quality
+from slideviz.view import changes, curves
+from slideviz.view.spanwise import along, along_radius
+from slideviz.view.state import Frame
+
+
+def run_of(session, sizes, history=()):
+    rng = np.random.default_rng(len(sizes))
+    frames = []
+    for index, size in enumerate(sizes):
+        points = session.mesh.points + size * rng.uniform(-1, 1, session.mesh.points.shape)
+        mesh = session.mesh.with_points(points)
+        step = SimpleNamespace(index=index + 1, history=history, seconds={})
+        frames.append(Frame(mesh, quality(mesh, session.mesh), step))
+    session = changes.add_frames(changes.start_run(session), frames)
+    return changes.end_run(session, "done")
+
+
+@pytest.fixture
+def two_runs(session):
+    return run_of(run_of(session, (0.1, 0.2)), (0.05, 0.1, 0.15))
+
+
+def test_quality_by_step_begins_with_the_undeformed_mesh(two_runs):
+    shown, other = curves.step_runs(two_runs)
+    assert (shown.label, other.label) == ("run 2", "run 1")
+    assert shown.steps.tolist() == [0, 1, 2, 3]
+    assert shown.minimum.tolist() == [frame.quality.min for frame in two_runs.frames]
+    assert other.mean[2] == two_runs.runs[0].last.quality.mean
+    assert other.minimum[0] == two_runs.first.quality.min
+
+
+def test_a_run_has_one_look_in_every_plot_and_never_that_of_the_undeformed_mesh(two_runs):
+    looks = [curves.look_of(replace(two_runs.runs[0], number=number)) for number in range(1, 9)]
+    assert len(set(looks)) == 8
+    assert curves.UNDEFORMED not in looks
+    steps = {run.label: run.series for run in curves.step_runs(two_runs)}
+    span = {p.label: p.series for p in curves.Profiles().of(two_runs, "x")}
+    assert span == {**steps, "undeformed": curves.UNDEFORMED}
+
+
+def test_a_run_without_steps_has_no_curve(session):
+    assert curves.step_runs(changes.start_run(session)) == []
+
+
+def test_convergence_is_that_of_the_step_that_is_shown(session):
+    cycles = tuple(
+        SimpleNamespace(control_nodes=2 * k, error=0.1 / k, level=1 + k // 3) for k in range(1, 5)
+    )
+    case = session.case.change(reduction=Reduction(tolerance=0.02))
+    session = run_of(replace(session, case=case), (0.1, 0.2), cycles)
+    found = curves.greedy_run(changes.show_frame(session, 1))
+    assert found.label == "run 1, step 1"
+    assert found.control_nodes.tolist() == [2, 4, 6, 8]
+    assert found.error[0] == 0.1
+    assert found.level.tolist() == [1, 1, 2, 2]
+    assert found.tolerance == 0.02
+    assert curves.greedy_run(changes.show_frame(session, 0)) is None
+
+
+def test_a_relative_tolerance_is_told_as_a_length(session):
+    cycle = SimpleNamespace(control_nodes=2, error=0.1, level=1)
+    case = session.case.change(reduction=Reduction(relative=1e-3))
+    session = run_of(replace(session, case=case), (0.1,), (cycle,))
+    assert curves.greedy_run(session).tolerance == pytest.approx(4e-3)
+
+
+def test_without_data_reduction_there_is_no_convergence(two_runs):
+    assert curves.greedy_run(two_runs) is None
+
+
+def test_the_span_has_the_shown_step_the_others_last_and_the_undeformed_mesh(two_runs):
+    session = changes.show_frame(two_runs, 2)
+    found = curves.Profiles().of(session, "y")
+    assert [profile.label for profile in found] == ["run 2", "run 1", "undeformed"]
+    frames = (session.frame, session.runs[0].last, session.first)
+    for profile, frame in zip(found, frames, strict=True):
+        wanted = along(session.mesh, frame.quality.values, "y")
+        assert profile.minimum.tolist() == wanted.minimum.tolist()
+        assert profile.coordinate == "y"
+
+
+def test_the_radius_is_that_about_the_axis_of_the_case(session):
+    profiles = curves.Profiles()
+    for origin in ((0.0, 0.0, 0.0), (4.0, 4.0, 0.0)):
+        moved = changes.set_case(session, origin=origin)
+        (found,) = profiles.of(moved, "r")
+        wanted = along_radius(session.mesh, session.first.quality.values, origin=origin)
+        assert found.edges.tolist() == wanted.edges.tolist()
+        assert found.count.tolist() == wanted.count.tolist()
+
+
+def test_a_profile_is_made_once_as_long_as_its_frame_is_there(two_runs):
+    profiles = curves.Profiles()
+    first, again = (profiles.of(two_runs, "x") for _ in range(2))
+    assert all(a is b for a, b in zip(first, again, strict=True))
+
+
+def test_a_mesh_without_extent_that_way_is_refused(two_runs):
+    with pytest.raises(SlidevizError, match="no length"):
+        curves.Profiles().of(two_runs, "z")
+
+
+def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube):
+    assert curves.natural(session) == "y"
+    assert "z" not in curves.coordinates(session)
+    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    assert curves.natural(solid) in ("x", "y", "z")
+    assert list(curves.coordinates(solid)) == ["r", "z", "y", "x"]
+    turned = replace(solid, pairs=(SimpleNamespace(kind="rotational"),))
+    assert curves.natural(turned) == "r"
