@@ -6,11 +6,12 @@ from functools import partial
 
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
-from qtpy.QtWidgets import QLabel, QMainWindow, QSizePolicy, QToolBar, QWidget
+from qtpy.QtWidgets import QLabel, QMainWindow, QMenu, QSizePolicy, QToolBar, QWidget
 
 from slideviz.gui.fields import Choice
 from slideviz.gui.icons import icon
 from slideviz.gui.theme import THEMES
+from slideviz.gui.tips import tip_of
 from slideviz.view import changes
 from slideviz.view.state import COLOUR_BY, Session
 
@@ -23,6 +24,7 @@ TOGGLES = (
     ("perspective", "Perspective", "P", "Perspective instead of parallel projection (3D meshes)."),
 )
 SIDE_KEYS = {"+x": "1", "-x": "Shift+1", "+y": "2", "-y": "Shift+2", "+z": "3", "-z": "Shift+3"}
+STEPS = ("step_first", "step_previous", "step_play", "step_next", "step_last")
 _ICONS = {"motion_ghost": "ghost"}
 
 
@@ -35,6 +37,7 @@ class Actions:
         self._icons: dict[str, str] = {}
         self._make_file()
         self._make_view()
+        self._make_help()
         self._make_tool_bar()
 
     def _add(self, name: str, text: str, function=None, keys="", image: str = "") -> QAction:
@@ -46,7 +49,8 @@ class Actions:
             act.triggered.connect(lambda _=False: function())
         if image:
             self._icons[name] = image
-        tip = text.replace("…", "").replace("&", "")
+        tip = tip_of(name, text)
+        act.setStatusTip(tip)
         act.setToolTip(f"{tip} ({act.shortcut().toString()})" if keys else tip)
         self.by_name[name] = act
         return act
@@ -56,26 +60,56 @@ class Actions:
         menu = window.menuBar().addMenu("&File")
         standard = QKeySequence.StandardKey
         menu.addAction(self._add("open", "&Open…", files.ask_and_open, standard.Open, "open"))
-        self.recent = menu.addMenu("Open &recent")
+        self.recent = self._menu(menu, "open_recent", "Open &recent")
         self.recent.aboutToShow.connect(self._fill_recent)
-        self.samples = menu.addMenu("Open sa&mple")
+        self.samples = self._menu(menu, "open_sample", "Open sa&mple")
         for name, text in files.samples.items():
             act = self.samples.addAction(f"{name}: {text}")
+            act.setStatusTip(tip_of("open_sample", name))
             act.triggered.connect(partial(lambda name, _=False: files.open_sample(name), name))
         self.samples.setEnabled(bool(files.samples))
         menu.addSeparator()
         for name, text, function, keys, image in (
             ("save_mesh", "&Save mesh as…", files.save_mesh, standard.Save, "save"),
             ("save_case", "Save &case as…", files.save_case, "Ctrl+Shift+S", "case"),
-            ("save_picture", "Save &picture…", files.save_picture, "Ctrl+P", "picture"),
         ):
             menu.addAction(self._add(name, text, function, keys, image))
+        self._make_export(menu)
         menu.addSeparator()
         menu.addAction(self._add("quit", "&Quit", window.close, standard.Quit))
         self._make_edit()
         run = window.menuBar().addMenu("&Run")
         run.addAction(self._add("run", "&Run", window.start_run, "F5", "run"))
         run.addAction(self._add("cancel", "&Cancel", window.cancel, "", "cancel"))
+
+    def _make_export(self, menu: QMenu) -> None:
+        exports = self.window.exports
+        self.export = self._menu(menu, "export", "&Export")
+        for name, text, function, keys, image in (
+            ("save_picture", "&Picture…", exports.picture, "Ctrl+P", "picture"),
+            ("copy_picture", "&Copy picture", exports.copy_picture, "Ctrl+Shift+C", ""),
+            ("export_film", "&Film of the steps…", exports.make_film, "", ""),
+            ("export_quality", "&Quality as CSV…", exports.quality, "", ""),
+            ("export_steps", "&Meshes of all steps…", exports.steps, "", ""),
+        ):
+            self.export.addAction(self._add(name, text, function, keys, image))
+
+    def _menu(self, menu: QMenu, name: str, text: str) -> QMenu:
+        """Return a new menu in a menu, with what it is for in the status bar."""
+        made = menu.addMenu(text)
+        made.menuAction().setStatusTip(tip_of(name, text))
+        return made
+
+    def _make_help(self) -> None:
+        window = self.window
+        menu = window.menuBar().addMenu("&Help")
+        for name, text, function, keys in (
+            ("shortcuts", "&Keyboard and mouse", window.help.shortcuts, "F1"),
+            ("case_keys", "Case &keys", window.help.case_keys, ""),
+            ("copy_details", "&Copy details for a bug report", window.help.copy_details, ""),
+            ("about", "&About slideviz", window.help.about, ""),
+        ):
+            menu.addAction(self._add(name, text, function, keys))
 
     def _fill_recent(self) -> None:
         self.recent.clear()
@@ -99,17 +133,18 @@ class Actions:
             act = self._add(name, text, None, keys, _ICONS.get(name, name))
             act.setCheckable(True)
             act.setToolTip(f"{tip} ({keys})")
+            act.setStatusTip(tip)
             act.toggled.connect(partial(self._toggle, name))
             menu.addAction(act)
         menu.addSeparator()
         menu.addAction(self._add("fit", "&Fit all", window.fit, "F", "fit"))
-        sides = menu.addMenu("Look &from")
+        sides = self._menu(menu, "look_from", "Look &from")
         for side, keys in {**SIDE_KEYS, "iso": "0"}.items():
             text = "isometric" if side == "iso" else side
             sides.addAction(self._add(f"side{side}", text, partial(window.look_from, side), keys))
         menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
         menu.addSeparator()
-        steps = menu.addMenu("&Steps")
+        steps = self._menu(menu, "steps", "&Steps")
         player = window.player
         for name, text, function, keys in (
             ("step_first", "Undeformed", lambda: player.go(0), "Home"),
@@ -120,7 +155,7 @@ class Actions:
         ):
             steps.addAction(self._add(name, text, function, keys))
         menu.addSeparator()
-        themes = menu.addMenu("&Theme")
+        themes = self._menu(menu, "theme", "&Theme")
         group = QActionGroup(window)
         for theme in THEMES:
             act = self._add(f"theme_{theme}", theme.capitalize())
@@ -128,12 +163,14 @@ class Actions:
             group.addAction(act)
             act.triggered.connect(lambda _=False, theme=theme: window.set_theme(theme))
             themes.addAction(act)
-        self.panels = menu.addMenu("&Panels")
+        self.panels = self._menu(menu, "panels", "&Panels")
 
     def add_panels(self, docks) -> None:
         """Offer to show and hide the docks, and to put them back."""
         for dock in docks:
-            self.panels.addAction(dock.toggleViewAction())
+            act = dock.toggleViewAction()
+            act.setStatusTip(f"Show or hide the panel {dock.windowTitle()}.")
+            self.panels.addAction(act)
         self.panels.addSeparator()
         restore = self._add("restore_layout", "&Restore layout", self.window.restore_layout)
         self.panels.addAction(restore)
@@ -186,6 +223,24 @@ class Actions:
         self.zone_shown = bar.addWidget(self.zone)
         bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
 
+    def _sync_export(self, session: Session, busy: bool) -> None:
+        """Show which exports there can be, and say why not."""
+        stepped, opened = len(session.frames) > 1, session.mesh is not None
+        for name, able, why in (
+            ("export_film", stepped, "There are no steps yet: run the case first."),
+            ("export_steps", stepped and not busy, "There are no steps yet: run the case first."),
+            ("export_quality", opened and not busy, "There is no mesh yet: open one first."),
+        ):
+            act = self.by_name[name]
+            act.setEnabled(able)
+            waits = "Wait for the end of what runs, or cancel it." if opened and busy else why
+            tip = tip_of(name, act.text()) if able else waits
+            act.setStatusTip(tip)
+            act.setToolTip(tip)
+        # Where there is nothing to play, Space belongs to the button that has the focus.
+        for name in STEPS:
+            self.by_name[name].setEnabled(stepped)
+
     def set_icon_colour(self, colour: str) -> None:
         """Redraw the icons in another colour."""
         for name, image in self._icons.items():
@@ -209,9 +264,11 @@ class Actions:
             act = self.by_name[name]
             act.setEnabled(bool(what))
             act.setText(f"{name.capitalize()} {what}".rstrip())
-            act.setToolTip(f"{act.text()} ({act.shortcut().toString()})")
-        for name in ("save_case", "save_picture", "fit", "show_all"):
+            said = act.text() if what else tip_of(name, "")
+            act.setToolTip(f"{said} ({act.shortcut().toString()})")
+        for name in ("save_case", "save_picture", "copy_picture", "fit", "show_all"):
             self.by_name[name].setEnabled(opened)
+        self._sync_export(session, busy)
         self.by_name["save_mesh"].setEnabled(opened and not busy)
         self.by_name["run"].setEnabled(ready and not busy)
         self.by_name["cancel"].setEnabled(busy)

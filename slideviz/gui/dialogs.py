@@ -9,19 +9,15 @@ from pathlib import Path
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import (
     QApplication,
-    QCheckBox,
-    QComboBox,
     QDialog,
     QDialogButtonBox,
     QFileDialog,
-    QFormLayout,
     QFrame,
     QHBoxLayout,
     QLabel,
     QMessageBox,
     QPlainTextEdit,
     QPushButton,
-    QSpinBox,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -29,6 +25,8 @@ from qtpy.QtWidgets import (
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.faults import details_of
+from slideviz.mesh.model import Mesh
+from slideviz.view.formats import formats_for
 
 _WORTH = {
     "case": "The case repeats the result exactly.",
@@ -38,19 +36,9 @@ PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
 
 
-def mesh_filters() -> str:
-    """Return the formats a mesh can be saved in: SU2 first, VTU with quality, then meshio's."""
-    import meshio
-
-    others = sorted(
-        suffix
-        for suffix in meshio._helpers.extension_to_filetypes
-        if suffix not in (".su2", ".vtu") and suffix.count(".") == 1
-    )
-    return (
-        "SU2 mesh (*.su2);;VTU with quality (*.vtu);;"
-        f"Other formats ({' '.join('*' + suffix for suffix in others)})"
-    )
+def mesh_filters(mesh: Mesh) -> str:
+    """Return the formats a mesh can be saved in, for a file dialog."""
+    return ";;".join(f"{row.name} (*{end})" for end, row in formats_for(mesh).items())
 
 
 def ask_open(parent: QWidget, folder: Path) -> Path | None:
@@ -66,11 +54,23 @@ def ask_open(parent: QWidget, folder: Path) -> Path | None:
 def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
     """Return the file to write, with an ending, or None. It asks before one is replaced."""
     name, chosen = QFileDialog.getSaveFileName(parent, title, str(default), filters)
-    if not name:
-        return None
+    return _with_ending(name, chosen, default) if name else None
+
+
+def ask_numbered(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
+    """Return the name of files that each get a number, with an ending, or None."""
+    # Of that name itself there is no file.
+    option = QFileDialog.Option.DontConfirmOverwrite
+    call = QFileDialog.getSaveFileName
+    name, chosen = call(parent, title, str(default), filters, options=option)
+    return _with_ending(name, chosen, default) if name else None
+
+
+def _with_ending(name: str, chosen: str, default: Path) -> Path:
+    """Return a name with the ending of the chosen filter, where it has none."""
     path = Path(name)
     if not path.suffix:
-        suffix = chosen.split("*")[-1].split(")")[0].split()[0] if "*" in chosen else ""
+        suffix = chosen.rpartition("*")[2].partition(")")[0].strip() if "*" in chosen else ""
         path = path.with_suffix(suffix or default.suffix)
     return path
 
@@ -102,6 +102,28 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     return next((name for name, button in buttons.items() if button is clicked), "cancel")
 
 
+def ask_folder(parent: QWidget, title: str, default: Path) -> Path | None:
+    """Return a folder that exists, or None."""
+    name = QFileDialog.getExistingDirectory(parent, title, str(default))
+    return Path(name) if name else None
+
+
+def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
+    """Return whether files that exist may be replaced."""
+    names = ", ".join(path.name for path in paths[:3]) + (", …" if len(paths) > 3 else "")
+    several = len(paths) > 1
+    answer = QMessageBox.question(
+        parent,
+        "Replace files?",
+        f"{len(paths)} files exist already ({names}). Replace them?"
+        if several
+        else f"{names} exists already. Replace it?",
+        QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
+        QMessageBox.StandardButton.Cancel,
+    )
+    return answer == QMessageBox.StandardButton.Yes
+
+
 def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
     """Return whether the mesh that was opened may be replaced by the deformed one."""
     answer = QMessageBox.warning(
@@ -112,53 +134,6 @@ def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
         QMessageBox.StandardButton.Cancel,
     )
     return answer == QMessageBox.StandardButton.Yes
-
-
-class PictureDialog(QDialog):
-    """How large a picture is, and whether its background is transparent."""
-
-    SIZES = ("as the view", "1280 × 800", "1920 × 1080", "3840 × 2160", "other")
-
-    def __init__(self, parent: QWidget, view_size: tuple[int, int]) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Save picture")
-        self._view_size = view_size
-        form = QFormLayout(self)
-        self.choice = QComboBox()
-        self.choice.addItems(self.SIZES)
-        self.width_px, self.height_px = QSpinBox(), QSpinBox()
-        row = QHBoxLayout()
-        for box, value in zip((self.width_px, self.height_px), view_size, strict=True):
-            box.setRange(64, 8192)
-            box.setValue(value)
-            box.setSuffix(" px")
-            row.addWidget(box)
-        self.transparent = QCheckBox("transparent background")
-        form.addRow("Size", self.choice)
-        form.addRow("Width, height", row)
-        form.addRow("", self.transparent)
-        buttons = QDialogButtonBox(
-            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
-        )
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
-        form.addRow(buttons)
-        self.choice.currentTextChanged.connect(self._size_chosen)
-
-    def _size_chosen(self, text: str) -> None:
-        if text == self.SIZES[0]:
-            size = self._view_size
-        elif "×" in text:
-            size = tuple(int(part) for part in text.split("×"))
-        else:
-            return
-        self.width_px.setValue(size[0])
-        self.height_px.setValue(size[1])
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Return width and height in pixels."""
-        return self.width_px.value(), self.height_px.value()
 
 
 def message_of(error: BaseException) -> str:

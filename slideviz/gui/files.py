@@ -10,11 +10,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
-from qtpy.QtWidgets import QDialog
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
-from slideviz.view import changes, jobs
+from slideviz.view import changes, jobs, jobs_sample
+from slideviz.view.formats import left_out
 from slideviz.view.keep import keep_view
 
 log = logging.getLogger("slideviz")
@@ -76,16 +76,25 @@ class Files(QObject):
         self.open_path(session.path, zone)
         self.window.sync_actions()
 
-    def open_sample(self, name: str) -> None:
-        """Write a sample case into a folder of this program and open it."""
-        from slideviz.case.samples import write_sample
+    def open_sample(self, name: str, run: bool = False) -> None:
+        """Write a sample case into a folder of this program and open it; ``run`` deforms it."""
+        if not self.may_go_on(lambda: self.open_sample(name, run)):
+            return
+        self.window.start_job(
+            f"Opening the sample {name}",
+            self._opened_to_run if run else self._opened,
+            jobs_sample.open_sample,
+            name,
+            sample_folder(),
+        )
 
-        try:
-            folder = sample_folder() / name
-            written = write_sample(name, folder, overwrite=True)
-            self.open_path(next(path for path in written if path.suffix == ".cfg"))
-        except (OSError, SlidevizError) as error:
-            self.window.banner.tell_error(error)
+    def try_sample(self, name: str) -> None:
+        """Open a sample case and deform it at once."""
+        self.open_sample(name, run=True)
+
+    def _opened_to_run(self, opened: jobs.Opened) -> None:
+        self._opened(opened)
+        self.window.start_run()
 
     def _opened(self, opened: jobs.Opened) -> None:
         session = opened.session
@@ -133,9 +142,10 @@ class Files(QObject):
 
     # Save ------------------------------------------------------------------------------
 
-    def _stem(self) -> str:
+    def stem(self) -> str:
+        """Return what the files that are offered begin with."""
         session = self.window.store.session
-        path = session.path or session.case.source
+        path = session.case.source or session.path
         return path.stem if path is not None else "mesh"
 
     def save_mesh(self, last: bool = False, then: Callable[[], object] | None = None) -> None:
@@ -148,8 +158,8 @@ class Files(QObject):
         if frame is None or self.window.runner.busy:
             return
         step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
-        default = self.folder() / f"{self._stem()}{step}.su2"
-        filters = dialogs.mesh_filters()
+        default = self.folder() / f"{self.stem()}{step}.su2"
+        filters = dialogs.mesh_filters(session.mesh)
         path = dialogs.ask_save(self.window, "Save mesh", default, filters)
         if path is None:
             return
@@ -173,6 +183,9 @@ class Files(QObject):
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
         self.window.say(f"Saved {path}")
+        lost = left_out(path, self.window.store.session.mesh)
+        if lost:
+            self.window.banner.tell(f"Saved. {lost}")
         if self.after_save is not None:
             QTimer.singleShot(0, self.after_save)
 
@@ -182,7 +195,7 @@ class Files(QObject):
         if session.mesh is None:
             return False
         source = session.case.source
-        default = source or self.folder() / f"{self._stem()}.cfg"
+        default = source or self.folder() / f"{self.stem()}.cfg"
         path = dialogs.ask_save(self.window, "Save case", default, dialogs.CASE_FILTERS)
         if path is None:
             return False
@@ -198,24 +211,6 @@ class Files(QObject):
         self.remember(path)
         self.window.say(f"Saved {path}")
         return True
-
-    def save_picture(self) -> None:
-        """Ask for size and name and write a picture of the view."""
-        view = self.window.view
-        dialog = dialogs.PictureDialog(self.window, (view.width(), view.height()))
-        if dialog.exec() != QDialog.DialogCode.Accepted:
-            return
-        default = self.folder() / f"{self._stem()}.png"
-        path = dialogs.ask_save(self.window, "Save picture", default, dialogs.PICTURE_FILTERS)
-        if path is None:
-            return
-        try:
-            self.window.viewing.write_picture(path, dialog.size_px, dialog.transparent.isChecked())
-        except (OSError, SlidevizError) as error:
-            self.window.banner.tell_error(error)
-            return
-        self.settings.setValue("folder", str(path.parent))
-        self.window.say(f"Saved {path}")
 
 
 def _same(path: Path, other: Path | None) -> bool:

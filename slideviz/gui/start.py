@@ -1,99 +1,242 @@
 """The start page: what to do when nothing is open."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 
-from qtpy.QtCore import QSize, Qt, Signal
+from qtpy.QtCore import QDateTime, QEvent, QLocale, QSize, Qt, Signal
 from qtpy.QtWidgets import (
+    QFrame,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QScrollArea,
     QSizePolicy,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
+from slideviz.gui.cards import SIZE, card
 from slideviz.gui.icons import icon, logo
 
+WIDEST = 860
+"""Pixels: longer lines would be hard to read."""
+RECENT = 5
+COLUMNS = 4
+TRIED = "passage"
+"""The sample that is deformed by one click."""
 
-class StartPage(QWidget):
-    """Open, the files used last, and the sample cases."""
+
+class StartPage(QScrollArea):
+    """Try it, open, the files used last, and the sample cases."""
 
     open_wanted = Signal()
+    try_wanted = Signal(str)
     file_wanted = Signal(object)
     sample_wanted = Signal(str)
 
     def __init__(self, samples: dict[str, str], parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        outer = QHBoxLayout(self)
+        self.setObjectName("start")
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.page = QWidget()
+        self.page.setMaximumWidth(WIDEST)
+        middle, outer = QWidget(), QHBoxLayout()
+        outer.setContentsMargins(24, 12, 24, 12)
         outer.addStretch(1)
-        column = QVBoxLayout()
-        column.setSpacing(8)
-        outer.addLayout(column)
+        outer.addWidget(self.page, 100)
         outer.addStretch(1)
+        middle.setLayout(outer)
+        self.setWidget(middle)
+        column = QVBoxLayout(self.page)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(6)
         column.addStretch(2)
-        head = QHBoxLayout()
-        picture = QLabel()
+        column.addLayout(self._make_head())
+        column.addSpacing(10)
+        column.addLayout(self._make_buttons(TRIED in samples))
+        self.hint = QLabel("Files can also be dropped anywhere on this window.")
+        self.hint.setProperty("hint", True)
+        column.addWidget(self.hint)
+        self._recent = QVBoxLayout()
+        self._recent.setSpacing(0)
+        column.addLayout(self._recent)
+        self.recent_buttons: list[QPushButton] = []
+        self.sample_buttons: dict[str, QToolButton] = {}
+        if samples:
+            column.addSpacing(8)
+            column.addWidget(_heading("Sample cases"))
+            column.addLayout(self._make_cards(samples))
+        column.addStretch(3)
+
+    # Parts -----------------------------------------------------------------------------
+
+    def _make_head(self) -> QHBoxLayout:
+        head, picture = QHBoxLayout(), QLabel()
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
         title = QLabel(
             "<span style='font-size:22pt; font-weight:600'>slideviz</span><br>"
             "Deform CFD meshes, and see at once where and why they suffer"
         )
+        title.setWordWrap(True)
         head.addWidget(picture)
         head.addSpacing(10)
         head.addWidget(title, 1)
-        column.addLayout(head)
-        column.addSpacing(14)
-        self.open = QPushButton(icon("open", "#ffffff"), "Open a mesh or case…")
-        self.open.setObjectName("run")
-        self.open.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.open.clicked.connect(self.open_wanted)
-        row = QHBoxLayout()
-        row.addWidget(self.open)
-        hint = QLabel("or drop a file here")
-        hint.setProperty("hint", True)
-        row.addWidget(hint)
-        row.addStretch(1)
-        column.addLayout(row)
-        column.addSpacing(12)
-        self._recent = QVBoxLayout()
-        self._recent.setSpacing(2)
-        column.addLayout(self._recent)
-        column.addSpacing(8)
-        if samples:
-            column.addWidget(QLabel("<b>Sample cases</b>"))
-            column.addLayout(self._sample_grid(samples))
-        column.addStretch(3)
+        return head
 
-    def _sample_grid(self, samples: dict[str, str]) -> QGridLayout:
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(14)
-        grid.setVerticalSpacing(3)
-        self.sample_buttons: dict[str, QPushButton] = {}
-        for row, (name, text) in enumerate(samples.items()):
-            button = QPushButton(name)
+    def _make_buttons(self, can_try: bool) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(10)
+        self.attempt = QPushButton(icon("run", "#ffffff"), "Try it: deform a blade passage")
+        self.attempt.setObjectName("run")
+        self.attempt.setToolTip("Open the sample “passage” and deform it at once.")
+        self.attempt.clicked.connect(lambda: self.try_wanted.emit(TRIED))
+        self.attempt.setVisible(can_try)
+        self.open = QPushButton("Open a mesh or case…")
+        self.open.setObjectName("open_page")
+        self.open.setToolTip("Open a mesh, or a case with its mesh.")
+        self.open.clicked.connect(self.open_wanted)
+        for button in (self.attempt, self.open):
+            button.setAutoDefault(True)  # the Enter key, too
+            button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+            row.addWidget(button)
+        row.addStretch(1)
+        return row
+
+    def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
+        self._cards = QGridLayout()
+        self._cards.setSpacing(8)
+        for name, text in samples.items():
+            button = Card()
             button.setObjectName(f"sample_{name}")
+            button.setProperty("card", True)
+            button.setText(f"{name} · {text[:2]}")
+            button.setToolTip(text)
+            button.setAccessibleDescription(text)
+            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            button.setCursor(Qt.CursorShape.PointingHandCursor)
+            button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.clicked.connect(lambda _=False, name=name: self.sample_wanted.emit(name))
             self.sample_buttons[name] = button
-            label = QLabel(text)
-            label.setProperty("hint", True)
-            grid.addWidget(button, row, 0)
-            grid.addWidget(label, row, 1, Qt.AlignmentFlag.AlignLeft)
-        grid.setColumnStretch(1, 1)
-        return grid
+        self._place_cards()
+        self._draw_cards()
+        return self._cards
+
+    def _place_cards(self) -> None:
+        """Make the cards as large as there is room for: all are seen without scrolling."""
+        room = min(self.viewport().width() - 48, WIDEST) // COLUMNS - 20
+        width = min(max(room, SIZE[0] // 2), SIZE[0])
+        for k, button in enumerate(self.sample_buttons.values()):
+            button.setIconSize(QSize(width, width * SIZE[1] // SIZE[0]))
+            self._cards.addWidget(button, k // COLUMNS, k % COLUMNS)
+        for column in range(COLUMNS):
+            self._cards.setColumnStretch(column, 1)
+
+    def _draw_cards(self) -> None:
+        line = self.palette().color(self.palette().ColorRole.WindowText)
+        line = "#aab4c0" if line.lightness() > 128 else "#76828f"
+        for name, button in self.sample_buttons.items():
+            button.setIcon(card(name, line))
+
+    # Recent files ----------------------------------------------------------------------
 
     def show_recent(self, paths: list[Path]) -> None:
-        """List the files used last."""
+        """List the files used last, with folder and time; those that are gone are grey."""
         while self._recent.count():
             widget = self._recent.takeAt(0).widget()
             if widget is not None:
                 widget.deleteLater()
+        self.recent_buttons = []
         if not paths:
             return
-        self._recent.addWidget(QLabel("<b>Recent</b>"))
-        for path in paths[:4]:
-            label = QLabel(f"<a href='{path}'>{path.name}</a> &nbsp;<small>{path.parent}</small>")
-            label.linkActivated.connect(lambda text: self.file_wanted.emit(Path(text)))
-            self._recent.addWidget(label)
+        self._recent.addSpacing(8)
+        self._recent.addWidget(_heading("Recent files"))
+        for path in paths[:RECENT]:
+            button = RecentButton(path)
+            button.clicked.connect(lambda _=False, path=path: self.file_wanted.emit(path))
+            self._recent.addWidget(button)
+            self.recent_buttons.append(button)
+
+    # Qt --------------------------------------------------------------------------------
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        if self.sample_buttons:
+            self._place_cards()
+
+    def changeEvent(self, event) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and getattr(self, "sample_buttons", None):
+            self._draw_cards()
+
+
+class Card(QToolButton):
+    """The button of a sample; the Enter key presses it, too."""
+
+    def keyPressEvent(self, event) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.click()
+        else:
+            super().keyPressEvent(event)
+
+
+class RecentButton(QPushButton):
+    """A file in the list: its name, its folder, and when it was changed."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
+        self.setProperty("recent", True)
+        self.setAutoDefault(True)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 4, 8, 4)
+        when = changed_words(path)
+        self.setEnabled(bool(when))
+        self.setToolTip(str(path) if when else f"{path} is not there any more.")
+        self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
+        name, self.folder = QLabel(f"<b>{path.name}</b>"), QLabel()
+        time = QLabel(when or "missing")
+        for label in (name, self.folder, time):
+            label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+            row.addWidget(label, 1 if label is self.folder else 0)
+        for label in (self.folder, time):
+            label.setProperty("hint", True)
+        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.setFixedHeight(self.fontMetrics().height() + 12)
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        folder = str(self.path.parent).replace(str(Path.home()), "~", 1)
+        room = self.folder.width()
+        middle = Qt.TextElideMode.ElideMiddle
+        self.folder.setText(self.folder.fontMetrics().elidedText(folder, middle, room))
+
+
+def changed_words(path: Path, now: datetime | None = None) -> str:
+    """Return when a file was changed, in words; empty when it is not there."""
+    try:
+        then = datetime.fromtimestamp(path.stat().st_mtime)
+    except OSError:
+        return ""
+    days = ((now or datetime.now()).date() - then.date()).days
+    clock = f"{then:%H:%M}"
+    if days in (0, 1):
+        return f"{'today' if days == 0 else 'yesterday'} {clock}"
+    locale = QLocale()
+    return locale.toString(QDateTime(then).date(), locale.FormatType.ShortFormat)
+
+
+def _heading(text: str) -> QLabel:
+    label = QLabel(f"<b>{text}</b>")
+    label.setContentsMargins(0, 2, 0, 4)
+    return label

@@ -67,6 +67,19 @@ QPushButton#run {{ background: {accent}; color: white; font-weight: 600; border:
     border-radius: 4px; padding: 7px 18px; }}
 QPushButton#run:hover {{ background: {accent_hover}; }}
 QPushButton#run:disabled {{ background: {mid}; color: {soft}; }}
+QPushButton#open_page {{ padding: 6px 17px; border: 1px solid {line}; border-radius: 4px;
+    background: {base}; }}
+QPushButton#open_page:hover {{ background: {hover}; }}
+QPushButton#open_page:focus, QPushButton#run:focus {{ border: 2px solid {noted};
+    padding: 5px 16px; }}
+QToolButton[card="true"] {{ background: {base}; border: 1px solid {line}; border-radius: 6px;
+    padding: 8px 4px 6px 4px; }}
+QToolButton[card="true"]:hover {{ background: {note}; border: 1px solid {noted}; }}
+QToolButton[card="true"]:focus {{ border: 2px solid {accent}; }}
+QPushButton[recent="true"] {{ border: 1px solid transparent; border-radius: 4px;
+    background: transparent; text-align: left; }}
+QPushButton[recent="true"]:hover {{ background: {hover}; }}
+QPushButton[recent="true"]:focus {{ border: 1px solid {accent}; }}
 QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
 QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
 """
@@ -79,6 +92,7 @@ _EXTRA = {
         "line": "#ccd3da",
         "window": "#f4f6f8",
         "soft": "#5d6874",
+        "base": "#ffffff",
         "bad": "#b3261e",
         "accent": "#2f6fb5",
         "accent_hover": "#265c98",
@@ -94,6 +108,7 @@ _EXTRA = {
         "line": "#3e464f",
         "window": "#262b31",
         "soft": "#a3adb8",
+        "base": "#1d2126",
         "bad": "#ff8a80",
         "accent": "#3d7fc4",
         "accent_hover": "#4c8fd6",

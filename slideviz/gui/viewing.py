@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
@@ -238,19 +236,6 @@ class Viewing(QWidget):
         for scene in self._scenes():
             scene.set_look(look)
         self.render()
-
-    def write_picture(self, path: Path, size: tuple[int, int], transparent: bool) -> None:
-        """Write a picture of what the first view shows, drawn anew at that size."""
-        from slideviz.view.picture import picture_of
-
-        picture_of(
-            self.store.session,
-            self.surfaces,
-            path,
-            size=size,
-            transparent=transparent,
-            like=self.scene,
-        )
 
     def close_views(self) -> None:
         """Give the views' graphics back."""

@@ -16,8 +16,10 @@ from slideviz.gui.autosave import Autosave
 from slideviz.gui.clash import ClashWatch
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.docks import Docks
+from slideviz.gui.export import Exports
 from slideviz.gui.faults import Faults
 from slideviz.gui.files import Files
+from slideviz.gui.help import Help
 from slideviz.gui.player import Player
 from slideviz.gui.restore import Restore
 from slideviz.gui.running import Running
@@ -63,6 +65,8 @@ class MainWindow(QMainWindow):
         self.store.failed = self.faults.tell
         self.running = Running(self.store, self.banner, self)
         self.files = Files(self, self.settings)
+        self.exports = Exports(self)
+        self.help = Help(self)
         self._closed = False
         self.left_behind = False
         self._make_centre(multi_samples)
@@ -166,6 +170,7 @@ class MainWindow(QMainWindow):
         self.start.open_wanted.connect(self.files.ask_and_open)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
+        self.start.try_wanted.connect(self.files.try_sample)
 
     def _restore(self) -> None:
         state, geometry = self.settings.value("state"), self.settings.value("geometry")
@@ -213,6 +218,7 @@ class MainWindow(QMainWindow):
             session = changes.fresh_view(session, self.store.session.view)
         self.banner.hide()
         self.start.hide()
+        self.exports.end()
         self.player.stop()
         self.viewing.open(opened, session)
         self.store.put(session)
@@ -317,6 +323,7 @@ class MainWindow(QMainWindow):
             self.hide()
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
+            self.exports.end()
             self.warm_up.close()
             self.clash_watch.close()
             self.left_behind = not self.running.close()

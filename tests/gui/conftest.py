@@ -15,6 +15,17 @@ else:
     from slideviz.view.pick import to_display
 
 
+DIALOGS = (
+    "ask_open",
+    "ask_save",
+    "ask_numbered",
+    "ask_folder",
+    "ask_replace",
+    "ask_unsaved",
+    "ask_overwrite_input",
+)
+
+
 @pytest.fixture(autouse=True)
 def no_questions(monkeypatch):
     """A question nobody expects fails the test instead of waiting for ever."""
@@ -22,7 +33,7 @@ def no_questions(monkeypatch):
     def unexpected(*values):
         raise AssertionError(f"unexpected question: {values[1:]}")
 
-    for name in ("ask_open", "ask_save", "ask_unsaved", "ask_overwrite_input"):
+    for name in DIALOGS:
         monkeypatch.setattr(dialogs, name, unexpected)
 
 

@@ -701,14 +701,15 @@ def test_a_case_that_cannot_be_written_is_told(opened, answers, tmp_path):
 def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
     from PIL import Image
 
-    from slideviz.gui import dialogs
+    from slideviz.gui.export_picture import PictureDialog
 
     def accept(dialog):
-        dialog.choice.setCurrentText("1280 × 800")
-        dialog.transparent.setChecked(True)
+        dialog.width_px.setValue(1280)
+        dialog.height_px.setValue(800)
+        dialog.background.show_value("transparent")
         return dialog.DialogCode.Accepted
 
-    monkeypatch.setattr(dialogs.PictureDialog, "exec", accept)
+    monkeypatch.setattr(PictureDialog, "exec", accept)
     answers("ask_save", tmp_path / "a.png")
     opened.window.actions_.by_name["save_picture"].trigger()
     with Image.open(tmp_path / "a.png") as image:

@@ -1,0 +1,50 @@
+"""What each action does, in a sentence: for the status bar, tooltips and the list of shortcuts."""
+
+from __future__ import annotations
+
+TIPS: dict[str, str] = {
+    "open": "Open a mesh, or a case with its mesh.",
+    "open_recent": "Open one of the files used last.",
+    "open_sample": "Open a case that comes with the program.",
+    "save_mesh": "Save the mesh of the step that is shown.",
+    "save_case": "Save roles, motions, method and view as a case that gives the same result again.",
+    "export": "Take away pictures, films, tables and meshes.",
+    "save_picture": "Make a picture of the view for a paper or a slide.",
+    "copy_picture": "Copy a picture of the view, with a white background, to the clipboard.",
+    "export_film": "Make a film of the steps.",
+    "export_quality": "Save the quality of every cell of the step that is shown as a CSV table.",
+    "export_steps": "Save the mesh of every step, each in a file of its own.",
+    "quit": "Close the window; unsaved changes are asked about.",
+    "undo": "Take back the last change.",
+    "redo": "Make the change again that was taken back.",
+    "run": "Deform the mesh with these settings.",
+    "cancel": "Stop what runs; the steps that are done are kept.",
+    "fit": "Make the whole mesh fill the view.",
+    "look_from": "Look at the mesh from a side.",
+    "sideiso": "Look at the mesh from a corner.",
+    "show_all": "Show the boundaries that were hidden.",
+    "steps": "Show another step of the deformation.",
+    "step_first": "Show the mesh before it is deformed.",
+    "step_previous": "Show the step before this one.",
+    "step_play": "Show the steps one after the other, or stop that.",
+    "step_next": "Show the step after this one.",
+    "step_last": "Show the deformed mesh.",
+    "theme": "Light or dark colours.",
+    "theme_system": "Take light or dark colours as the desktop does.",
+    "theme_light": "Take light colours.",
+    "theme_dark": "Take dark colours.",
+    "panels": "Show and hide the panels around the view.",
+    "restore_layout": "Put every panel back to where it was at first.",
+    "shortcuts": "Show all keys and what the mouse does.",
+    "case_keys": "Show and search the keys of a case file.",
+    "copy_details": "Copy versions, graphics, mesh and the last messages, for a bug report.",
+    "about": "Show version and licence.",
+}
+"""By the name of the action or menu."""
+
+
+def tip_of(name: str, text: str) -> str:
+    """Return what an action or menu does, in a sentence."""
+    if name.startswith("side") and name not in TIPS:
+        return f"Look at the mesh from {name.removeprefix('side')}."
+    return TIPS.get(name, f"{text.replace('…', '').replace('&', '')}.")

@@ -1,0 +1,68 @@
+"""The formats that a mesh is offered to be saved in, and what each of them leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from slideviz.mesh.model import Mesh
+
+
+@dataclass(frozen=True)
+class MeshFormat:
+    """What a format is called, and what it holds.
+
+    ``quality`` tells whether cells can have numbers; ``boundaries`` whether these keep their
+    names, or become numbers; ``dims`` the dimensions of meshes that it can hold.
+    """
+
+    name: str
+    quality: bool
+    boundaries: Literal["names", "numbers"]
+    dims: tuple[int, ...] = (2, 3)
+
+
+MESH_FORMATS: dict[str, MeshFormat] = {
+    ".su2": MeshFormat("SU2 mesh, with everything it had", False, "names"),
+    ".vtu": MeshFormat("VTU for ParaView, with quality", True, "names"),
+    ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
+    ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),
+    ".med": MeshFormat("MED for Salome, with quality", True, "names"),
+    ".msh": MeshFormat("Gmsh", False, "names"),
+    ".inp": MeshFormat("Abaqus", False, "names"),
+    ".vol": MeshFormat("Netgen", False, "names"),
+    ".mesh": MeshFormat("Medit", False, "numbers"),
+    ".bdf": MeshFormat("Nastran", False, "numbers", (3,)),
+}
+"""By ending; meshio writes more, but hardly any that holds boundaries beside cells."""
+
+
+def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
+    """Return the formats that can hold a mesh, by ending."""
+    return {end: row for end, row in MESH_FORMATS.items() if mesh.dim in row.dims}
+
+
+def holds_quality(path: Path) -> bool:
+    """Tell whether a file of that name can hold numbers of the cells."""
+    row = MESH_FORMATS.get(path.suffix.lower())
+    return row is not None and row.quality
+
+
+def left_out(path: Path, mesh: Mesh) -> str:
+    """Return in a sentence what a file of that name does not hold of a mesh; empty: nothing."""
+    end = path.suffix.lower()
+    if end == ".su2":
+        return ""
+    row = MESH_FORMATS.get(end)
+    lost = []
+    if row is None or row.boundaries == "numbers":
+        lost.append("the names of the boundaries (they are numbers now)")
+    if row is None or not row.quality:
+        lost.append("the quality of the cells")
+    if mesh.source is not None and mesh.source.suffix.lower() == ".su2":
+        lost.append("what else was in the SU2 file, such as FFD boxes and other zones")
+    if not lost:
+        return ""
+    words = lost[0] if len(lost) == 1 else f"{', '.join(lost[:-1])} and {lost[-1]}"
+    return f"{path.name} does not hold {words}."

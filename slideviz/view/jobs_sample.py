@@ -1,0 +1,27 @@
+"""The long job that makes a sample case and opens it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from slideviz.view.jobs import Doing, Opened, Report, Stopped, open_file, require_going
+
+SIZES = {"turbine-row": 20_000, "stator": 20_000}
+"""Cells of the samples that are large unless asked for: the first look should be quick."""
+
+
+def open_sample(name: str, folder: Path, report: Report, stopped: Stopped) -> Opened:
+    """Return a sample case, written into a folder of its own and ready to be shown.
+
+    Raises
+    ------
+    SlidevizError
+        There is no such sample, or it cannot be written.
+    """
+    from slideviz.case.samples import write_sample
+
+    report(Doing(f"Making the sample {name}"))
+    written = write_sample(name, folder / name, SIZES.get(name), overwrite=True)
+    require_going(stopped)
+    case = next(path for path in written if path.suffix == ".cfg")
+    return open_file(case, None, report, stopped)

@@ -1,0 +1,521 @@
+"""Pictures, films, tables and meshes leave the window; dialogs show what will be written."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from qtpy.QtCore import Qt, QTimer
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QDialog
+
+from slideviz import read
+from slideviz.errors import SlidevizError
+from slideviz.gui import dialogs, export
+from slideviz.gui.export_film import FilmDialog, length_words
+from slideviz.gui.export_picture import PictureDialog, fitted, framed, to_image
+from slideviz.mesh.quality import quality
+from slideviz.view import changes, jobs, jobs_export
+from slideviz.view.figure import Figure, Studio
+from slideviz.view.reel import Reel
+
+
+@pytest.fixture
+def opened(driver, passage_file):
+    driver.open(passage_file)
+    return driver
+
+
+@pytest.fixture
+def ran(driver, sample_folder):
+    driver.open(sample_folder / "passage" / "passage.cfg")
+    driver.window.store.change(changes.set_case, steps=2)
+    driver.window.start_run()
+    driver.settle()
+    return driver
+
+
+@pytest.fixture
+def studio(opened):
+    viewing = opened.window.viewing
+    with Studio(opened.session, viewing.surfaces, viewing.scene) as made:
+        yield made
+
+
+def in_dialog(do):
+    """Do something with the next dialog, then close it as ``do`` says: True accepts."""
+
+    def reach():
+        dialog = QApplication.activeModalWidget()
+        if not isinstance(dialog, QDialog):
+            QTimer.singleShot(20, reach)
+            return
+        (dialog.accept if do(dialog) else dialog.reject)()
+
+    QTimer.singleShot(20, reach)
+
+
+def pixels(path):
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGBA")), image.info
+
+
+# Picture -----------------------------------------------------------------------------------
+
+
+def test_the_usual_picture_is_white_without_clutter(opened, answers, tmp_path):
+    asked = answers("ask_save", tmp_path / "out.png")
+    opened.window.set_theme("dark")
+    in_dialog(lambda _: True)
+    opened.window.actions_.by_name["save_picture"].trigger()
+    found, _ = pixels(tmp_path / "out.png")
+    assert found.shape[:2] == (1000, 1600)
+    assert (found[[0, 0, -1, -1], [0, -1, 0, -1]] == 255).all()
+    assert len(np.unique(found.reshape(-1, 4), axis=0)) > 50
+    assert "PNG" in asked[0][2]
+    assert "SVG" in asked[0][2]
+
+
+def test_a_cancelled_picture_asks_for_no_name(opened):
+    in_dialog(lambda _: False)
+    opened.window.exports.picture()
+
+
+def test_a_picture_that_cannot_be_written_is_told(opened, answers, tmp_path):
+    answers("ask_save", tmp_path / "no" / "out.png")
+    in_dialog(lambda _: True)
+    opened.window.exports.picture()
+    assert "folder does not exist" in opened.window.banner.text.text()
+
+
+def test_the_preview_follows_the_options(studio, qtbot):
+    dialog = PictureDialog(None, studio)
+    qtbot.addWidget(dialog)
+    qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
+    white = dialog.preview.pixmap().toImage()
+    assert white.width() <= dialog.preview.width()
+    dialog.background.show_value("transparent")
+    dialog.background.chosen.emit("transparent")
+    qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != white)
+    assert dialog.figure.background == "transparent"
+
+
+def test_sizes_in_pixels_and_on_paper(studio, qtbot):
+    dialog = PictureDialog(None, studio, (900, 700))
+    qtbot.addWidget(dialog)
+    for name, size in (("1920x1080", (1920, 1080)), ("view", (900, 700))):
+        dialog.size_choice.show_value(name)
+        dialog.size_choice.chosen.emit(name)
+        assert dialog.figure.size == size
+    dialog.width_px.setValue(777)
+    assert dialog.size_choice.currentData() == "other"
+    dialog.size_choice.show_value("paper")
+    dialog.size_choice.chosen.emit("paper")
+    dialog.width_cm.setValue(8.0)
+    dialog.height_cm.setValue(5.0)
+    figure = dialog.figure
+    assert figure.size == (945, 591)
+    assert figure.dpi == 300
+    # Letters of 8.5 points.
+    assert 13.0 * figure.scale == pytest.approx(8.5 / 72 * 300)
+    assert "8.0 × 5.0 cm" in dialog.words.text()
+    dialog.width_cm.setValue(100.0)
+    assert not dialog.save.isEnabled()
+    assert "8192" in dialog.words.text()
+
+
+def test_a_picture_for_paper_knows_its_size(opened, answers, tmp_path):
+    answers("ask_save", tmp_path / "out.png")
+
+    def choose(dialog):
+        dialog.size_choice.show_value("paper")
+        dialog.size_choice.chosen.emit("paper")
+        return True
+
+    in_dialog(choose)
+    opened.window.exports.picture()
+    _, known = pixels(tmp_path / "out.png")
+    assert known["dpi"] == pytest.approx((300, 300), abs=0.1)
+
+
+def test_choices_are_offered_again_and_broken_ones_are_not(studio, qtbot):
+    dialog = PictureDialog(None, studio)
+    qtbot.addWidget(dialog)
+    dialog.options["title"].setChecked(True)
+    dialog.width_px.setValue(700)
+    again = PictureDialog(None, studio, kept=dialog.choices)
+    qtbot.addWidget(again)
+    assert again.figure.title
+    assert again.figure.size == dialog.figure.size
+    assert again.size_choice.currentData() == "other"
+    for broken in ("{", "[1]", json.dumps({"size": "x"}), json.dumps({"paper": [1]})):
+        usual = PictureDialog(None, studio, kept=broken)
+        qtbot.addWidget(usual)
+        assert usual.figure.background == "white"
+
+
+def test_copy_in_the_dialog_and_by_keys(opened, qtbot):
+    clipboard = QApplication.clipboard()
+    clipboard.clear()
+    keys = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
+    opened.window.set_theme("dark")
+    opened.activate()
+    QTest.keyClick(opened.window, Qt.Key.Key_C, keys)
+    image = clipboard.image()
+    assert image.width() >= 1600
+    assert image.pixelColor(0, 0).name() == "#ffffff"
+    clipboard.clear()
+
+    def copy(dialog):
+        dialog.copy.click()
+        return False
+
+    in_dialog(copy)
+    opened.window.exports.picture()
+    assert clipboard.image().width() == 1600
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".pdf"])
+def test_drawings_of_2d_meshes(ran, answers, tmp_path, suffix):
+    path = tmp_path / f"out{suffix}"
+    answers("ask_save", path)
+    in_dialog(lambda _: True)
+    ran.window.exports.picture()
+    data = path.read_bytes()
+    assert data.startswith(b"%PDF" if suffix == ".pdf" else b"<?xml")
+    if suffix == ".svg":
+        # A path for every cell.
+        assert data.count(b"<path") >= len(ran.session.mesh.cells)
+
+
+def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    assert export.picture_filters(driver.session) == dialogs.PICTURE_FILTERS
+    viewing = driver.window.viewing
+    with Studio(driver.session, viewing.surfaces, viewing.scene) as studio:
+        dialog = PictureDialog(None, studio)
+        qtbot.addWidget(dialog)
+        assert "3D" in dialog.kinds.text()
+        dialog.reject()
+
+
+def test_two_runs_beside_each_other_are_one_picture(ran):
+    ran.window.start_run()
+    ran.settle()
+    ran.window.store.change(changes.show_beside, 1)
+    viewing = ran.window.viewing
+    with Studio(ran.session, viewing.surfaces, viewing.scene) as studio:
+        both = studio.image(Figure((800, 400), legend=False))
+        one = studio.image(Figure((800, 400), legend=False, both=False))
+        dialog = PictureDialog(None, studio)
+        assert not dialog.options["both"].isHidden()
+        dialog.reject()
+    drawn = (both < 250).any(axis=2).any(axis=0)
+    assert drawn[:390].any()
+    assert drawn[410:].any()
+    assert not drawn[396:404].any()
+    assert (one < 250).any(axis=2).any(axis=0)[396:404].any()
+
+
+def test_pictures_become_qt_images_as_they_are():
+    image = np.zeros((3, 5, 3), np.uint8)
+    image[1, 2] = 10, 20, 30
+    assert to_image(image).pixelColor(2, 1).getRgb()[:3] == (10, 20, 30)
+    clear = to_image(np.zeros((3, 5, 4), np.uint8))
+    assert clear.pixelColor(0, 0).alpha() == 0
+    assert framed(clear).toImage().pixelColor(2, 2).alpha() == 255
+    assert fitted(to_image(image), (10, 10)).width() == 10
+
+
+# Film --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def film(ran):
+    ran.window.exports.make_film()
+    dialog = ran.window.exports.film
+    dialog.between.setValue(0)
+    dialog.width_px.setValue(320)
+    dialog.height_px.setValue(200)
+    return dialog
+
+
+def test_a_film_needs_steps_and_the_menu_says_so(opened):
+    act = opened.window.actions_.by_name["export_film"]
+    assert not act.isEnabled()
+    assert "run the case first" in act.statusTip()
+    opened.window.exports.make_film()
+    assert opened.window.exports.film is None
+
+
+def test_a_film_is_made_while_the_window_goes_on(ran, film, answers, tmp_path, qtbot):
+    answers("ask_save", tmp_path / "out.gif")
+    film.kind.show_value(".gif")
+    film._kind_chosen(".gif")
+    film.width_px.setValue(320)
+    film.height_px.setValue(200)
+    turns = []
+    timer = QTimer()
+    timer.timeout.connect(lambda: turns.append(film.bar.value()))
+    timer.start(0)
+    with qtbot.waitSignal(film.made, timeout=30_000):
+        film.make.click()
+        assert film.filming
+        ran.window.store.change(changes.show_frame, 1)
+    timer.stop()
+    with Image.open(tmp_path / "out.gif") as image:
+        assert image.size == (320, 200)
+        assert image.n_frames == 3
+    assert {1, 2} <= set(turns)
+    assert ran.window.exports.film is None
+    assert ran.session.view.frame == 1
+
+
+def test_pictures_of_a_film_get_a_new_folder(ran, film, answers, tmp_path, qtbot):
+    (tmp_path / "passage_steps").mkdir()
+    answers("ask_folder", tmp_path)
+    film.kind.show_value("")
+    film._kind_chosen("")
+    assert not film.fps.isEnabled()
+    with qtbot.waitSignal(film.made, timeout=30_000):
+        film.make.click()
+    assert len(list((tmp_path / "passage_steps_2").glob("*.png"))) == 3
+    assert not list((tmp_path / "passage_steps").iterdir())
+
+
+def test_a_stopped_film_leaves_no_file(ran, film, answers, tmp_path, qtbot):
+    answers("ask_save", tmp_path / "out.gif")
+    film.kind.show_value(".gif")
+    film.between.setValue(20)
+    film.make.click()
+    qtbot.waitUntil(lambda: film.bar.value() >= 2)
+    with qtbot.waitSignal(film.stopped):
+        film.stop.click()
+    assert not list(tmp_path.glob("*.gif"))
+    assert not list(tmp_path.glob(".*"))
+    assert film.make.isEnabled()
+    assert film.isVisible()
+
+
+@pytest.mark.parametrize("how", ["open", "close"])
+def test_opening_or_closing_stops_a_film(ran, film, answers, tmp_path, passage_file, qtbot, how):
+    answers("ask_unsaved", "discard")
+    answers("ask_save", tmp_path / "out.gif")
+    film.kind.show_value(".gif")
+    film.between.setValue(20)
+    film.make.click()
+    qtbot.waitUntil(lambda: film.bar.value() >= 1)
+    if how == "open":
+        ran.open(passage_file)
+    else:
+        ran.window.close()
+    assert ran.window.exports.film is None
+    assert not list(tmp_path.glob("*.gif"))
+
+
+def test_a_film_that_fails_is_told(ran, film, answers, tmp_path, qtbot):
+    answers("ask_save", tmp_path / "no" / "out.gif")
+    film.kind.show_value(".gif")
+    with qtbot.waitSignal(film.failed, timeout=10_000):
+        film.make.click()
+    assert "folder" in ran.window.banner.text.text()
+    assert not film.filming
+
+
+def test_what_cannot_be_filmed_is_said(film):
+    film.kind.show_value(".mp4")
+    film.width_px.setValue(321)
+    assert "even" in film.words.text()
+    assert not film.make.isEnabled()
+    film.width_px.setValue(320)
+    assert film.make.isEnabled()
+    assert film.words.text().startswith("3 images: the undeformed mesh and 2 steps")
+
+
+def test_the_length_of_a_film_in_words():
+    assert length_words(Reel(fps=10.0, hold=1.5), 3, ".gif").endswith("lasts 1.7 s.")
+    assert "4 images between two" in length_words(Reel(fps=10.0, between=4), 3, ".mp4")
+    assert length_words(Reel(), 2, "").endswith("a file of its own.")
+
+
+def test_first_and_last_image_are_previewed(film, qtbot):
+    qtbot.waitUntil(lambda: all(not one.pixmap().isNull() for one in film.previews))
+    first, last = (one.pixmap().toImage() for one in film.previews)
+    assert first != last
+
+
+def test_one_film_at_a_time(ran, film):
+    ran.window.exports.make_film()
+    assert ran.window.exports.film is film
+    assert len(ran.window.findChildren(FilmDialog)) == 1
+
+
+# Tables and meshes -------------------------------------------------------------------------
+
+
+def test_quality_of_the_step_that_is_shown_as_csv(ran, answers, tmp_path):
+    path = tmp_path / "q.csv"
+    answers("ask_save", path)
+    ran.window.store.change(changes.show_frame, 1)
+    ran.window.actions_.by_name["export_quality"].trigger()
+    ran.settle()
+    rows = list(csv.DictReader(path.open()))
+    frame = ran.session.frames[1]
+    mesh = frame.mesh
+    assert list(rows[0]) == ["cell", "type", "size", "skew", "size_skew", "status", "x", "y"]
+    assert [int(row["cell"]) for row in rows] == list(range(len(mesh.cells)))
+    assert [float(row["size_skew"]) for row in rows] == frame.quality.values.tolist()
+    assert {row["type"] for row in rows} == {"quadrilateral"}
+    assert {row["status"] for row in rows} == {"valid"}
+    cells = mesh.cells
+    first = mesh.points[cells.connectivity[: cells.offsets[1]]].mean(axis=0)
+    assert np.allclose([float(rows[0]["x"]), float(rows[0]["y"])], first)
+
+
+def test_a_cancelled_table_leaves_no_file(ran, tmp_path):
+    from slideviz.errors import Cancelled
+
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs_export.save_quality(
+            tmp_path / "q.csv", ran.session.first, lambda _: None, lambda: True
+        )
+    assert not list(tmp_path.glob("q*"))
+
+
+def test_all_steps_are_saved_with_numbers(ran, answers, tmp_path):
+    answers("ask_numbered", tmp_path / "s.su2")
+    assert ran.session.unsaved_mesh
+    ran.window.actions_.by_name["export_steps"].trigger()
+    ran.settle()
+    assert sorted(path.name for path in tmp_path.glob("s_*")) == ["s_1.su2", "s_2.su2"]
+    assert np.array_equal(read(tmp_path / "s_2.su2").points, ran.session.frames[2].mesh.points)
+    assert not ran.session.unsaved_mesh
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_steps_that_exist_are_asked_about(ran, answers, tmp_path, sure):
+    (tmp_path / "s_1.su2").write_text("mine")
+    answers("ask_numbered", tmp_path / "s.su2")
+    asked = answers("ask_replace", sure)
+    ran.window.exports.steps()
+    ran.settle()
+    assert asked == [([tmp_path / "s_1.su2"],)]
+    assert ((tmp_path / "s_1.su2").read_text() == "mine") is not sure
+
+
+def test_cancelled_steps_keep_whole_files(ran, tmp_path):
+    from slideviz.errors import Cancelled
+
+    said = []
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs_export.save_steps(
+            tmp_path / "s.su2", ran.session.frames[1:], said.append, lambda: len(said) > 0
+        )
+    assert [path.name for path in tmp_path.glob("s_*")] in ([], ["s_1.su2"])
+
+
+@pytest.mark.parametrize("name", [".su2", ".vtu", ".vtk", ".xdmf", ".med", ".msh", ".inp", ".vol"])
+def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path, name):
+    path = tmp_path / f"out{name}"
+    answers("ask_save", path)
+    ran.window.files.save_mesh()
+    ran.settle()
+    mesh = read(path)
+    assert len(mesh.cells) == len(ran.session.mesh.cells)
+    assert np.allclose(mesh.points, ran.session.deformed.mesh.points)
+    told = ran.window.banner.text.text() if ran.window.banner.isVisible() else ""
+    assert ("does not hold" in told) is (name != ".su2")
+    assert ("quality" in told) is (name in (".msh", ".inp", ".vol"))
+    assert ("names of the boundaries" in told) is (name in (".vtk", ".xdmf"))
+
+
+def test_formats_for_the_mesh_are_offered(opened, driver, sample_folder):
+    flat = dialogs.mesh_filters(opened.session.mesh)
+    assert flat.startswith("SU2 mesh")
+    assert "Nastran" not in flat
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    assert "Nastran" in dialogs.mesh_filters(driver.session.mesh)
+
+
+def test_saved_quality_is_in_the_vtu(ran, tmp_path):
+    import pyvista as pv
+
+    frame = ran.session.deformed
+    jobs.save_mesh(tmp_path / "q.vtu", frame, False, lambda _: None, lambda: False)
+    found = pv.read(tmp_path / "q.vtu").cell_data["size_skew"]
+    values = quality(frame.mesh, ran.session.mesh).values
+    assert np.allclose(found[: len(values)], values)
+
+
+def test_a_drawing_of_another_ending_is_refused(studio):
+    from slideviz.view.figure_vector import require_vector
+
+    with pytest.raises(SlidevizError, match="end the name so"):
+        require_vector(studio.session, Path("a.png"))
+
+
+# Help --------------------------------------------------------------------------------------
+
+
+def every_action(menu):
+    for act in menu.actions():
+        if act.menu() is not None:
+            yield act
+            yield from every_action(act.menu())
+        elif not act.isSeparator():
+            yield act
+
+
+def test_every_action_says_in_a_sentence_what_it_does(opened):
+    window = opened.window
+    for top in window.menuBar().actions():
+        for act in every_action(top.menu()):
+            if act.isEnabled():
+                assert act.statusTip().endswith("."), act.text()
+    for act in window.actions_.bar.actions():
+        if act.text():
+            assert len(act.toolTip().split()) >= 3, act.text()
+
+
+def test_shortcuts_are_those_of_the_actions_and_can_be_found(opened):
+    window = opened.window
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    dialog = window.help._shown["shortcuts"]
+    tops = [dialog.tree.topLevelItem(k) for k in range(dialog.tree.topLevelItemCount())]
+    rows = [top.child(k) for top in tops for k in range(top.childCount())]
+    said = {(row.text(0), row.text(1)) for row in rows}
+    assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C")} <= said
+    keys = {row.text(1) for row in rows}
+    assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
+    dialog.find.setText("whole mesh fill")
+    assert [row.text(0) for row in rows if not row.isHidden()] == ["Fit all"]
+
+
+def test_case_keys_can_be_searched(opened):
+    opened.window.actions_.by_name["case_keys"].trigger()
+    dialog = opened.window.help._shown["keys"]
+    dialog.find.setText("periodic_mode")
+    assert dialog.text.textCursor().selectedText().lower() == "periodic_mode"
+    assert dialog.count.text() != "0 found"
+    first = dialog.text.textCursor().position()
+    while dialog.text.textCursor().position() >= first:
+        before = dialog.text.textCursor().position()
+        dialog.next()
+        if dialog.text.textCursor().position() == before:
+            break  # only one
+    assert dialog.text.textCursor().hasSelection()
+
+
+def test_about_and_details_for_a_report(opened):
+    window, clipboard = opened.window, QApplication.clipboard()
+    window.actions_.by_name["about"].trigger()
+    window.help._shown["about"].copy.click()
+    assert "numpy" in clipboard.text()
+    window.actions_.by_name["copy_details"].trigger()
+    text = clipboard.text()
+    mesh = opened.session.mesh
+    assert f"2D, {len(mesh.cells)} cells" in text
+    assert "OpenGL" in text
+    assert "opened" in text

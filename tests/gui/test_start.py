@@ -1,0 +1,156 @@
+"""The start page: one click from a deformed mesh, recent files, samples, keyboard."""
+
+import os
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+from qtpy.QtCore import Qt
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
+
+from slideviz.case.samples import SAMPLES
+from slideviz.errors import Cancelled
+from slideviz.gui import files
+from slideviz.gui.cards import _DRAWINGS, SIZE, card
+from slideviz.gui.start import COLUMNS, RECENT, StartPage, changed_words
+from slideviz.view import jobs_sample
+
+
+@pytest.fixture
+def small(monkeypatch, tmp_path):
+    """Samples of few cells, in a folder of the test."""
+    monkeypatch.setattr(files, "sample_folder", lambda: tmp_path / "samples")
+    monkeypatch.setattr(jobs_sample, "SIZES", {"passage": 12, "hexahedron": 6})
+    return tmp_path
+
+
+def test_one_click_deforms_a_blade_passage(driver, small):
+    start = driver.window.start
+    assert start.attempt.isVisible()
+    driver.click(start.attempt)
+    driver.qtbot.waitUntil(
+        lambda: any(run.end == "done" for run in driver.session.runs), timeout=60_000
+    )
+    assert not start.isVisible()
+    assert driver.session.deformed.quality.inverted == 0
+    assert driver.session.view.colour_by == "size_skew"
+    # A sample is no file of the user's.
+    assert driver.window.files.recent() == []
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_Return])
+def test_a_card_opens_its_sample_and_deforms_nothing(driver, small, key):
+    button = driver.window.start.sample_buttons["hexahedron"]
+    button.setFocus()
+    QTest.keyClick(button, key)
+    driver.settle()
+    assert driver.session.mesh.dim == 3
+    assert driver.session.case.source.name == "hexahedron.cfg"
+    assert not driver.session.runs
+
+
+def test_large_samples_open_small():
+    assert max(jobs_sample.SIZES.values()) <= 50_000
+    assert {"stator", "turbine-row"} <= set(jobs_sample.SIZES)
+
+
+def test_a_sample_can_be_cancelled_while_it_is_made(small):
+    with pytest.raises(Cancelled, match="as you asked"):
+        jobs_sample.open_sample("passage", small, lambda _: None, lambda: True)
+
+
+def test_a_sample_that_cannot_be_written_is_told(driver, small):
+    (small / "samples").write_text("a file")
+    driver.click(driver.window.start.sample_buttons["passage"])
+    driver.settle()
+    assert str(small / "samples") in driver.window.banner.text.text()
+    assert driver.window.start.isVisible()
+
+
+def test_recent_files_with_folder_and_time_and_missing_ones_are_grey(qtbot, tmp_path):
+    there, gone = tmp_path / "there.su2", tmp_path / "gone.cfg"
+    there.write_text("x")
+    page = StartPage({})
+    qtbot.addWidget(page)
+    page.show_recent([there, gone])
+    page.show()
+    first, second = page.recent_buttons
+    assert first.isEnabled()
+    assert "today" in first.accessibleName()
+    assert not second.isEnabled()
+    assert "missing" in second.accessibleName()
+    with qtbot.waitSignal(page.file_wanted) as wanted:
+        QTest.mouseClick(first, Qt.MouseButton.LeftButton)
+    assert wanted.args == [there]
+    page.show_recent([tmp_path / f"{k}.su2" for k in range(20)])
+    assert len(page.recent_buttons) == RECENT
+    page.show_recent([])
+    assert page.recent_buttons == []
+
+
+def test_when_a_file_was_changed(tmp_path):
+    path, now = tmp_path / "a", datetime(2026, 5, 20, 12, 0)
+    assert changed_words(path) == ""
+    path.touch()
+    for days, word in ((0, "today 09:30"), (1, "yesterday 09:30")):
+        then = (now - timedelta(days=days)).replace(hour=9, minute=30).timestamp()
+        os.utime(path, (then, then))
+        assert changed_words(path, now) == word
+    long_ago = datetime(2020, 3, 4).timestamp()
+    os.utime(path, (long_ago, long_ago))
+    assert "20" in changed_words(path, now)
+    assert "today" not in changed_words(path, now)
+
+
+def test_everything_can_be_reached_with_tab(window):
+    start = window.start
+    start.attempt.setFocus()
+    seen = set()
+    for _ in range(40):
+        seen.add(QApplication.focusWidget().objectName())
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+    assert {"run", "open_page", "sample_square", "sample_stator"} <= seen
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (1920, 1080)])
+def test_all_cards_are_seen_without_scrolling(driver, passage_file, size):
+    window = driver.window
+    window.resize(*size)
+    window.start.show_recent([Path(passage_file)] * RECENT)
+    driver.qtbot.waitUntil(lambda: window.width() == size[0])
+    assert window.start.verticalScrollBar().maximum() == 0
+    cards = list(window.start.sample_buttons.values())
+    assert len({card.y() for card in cards}) == -(-len(cards) // COLUMNS)
+    for one in cards:
+        assert one.iconSize().width() + 8 <= one.width()
+
+
+def test_each_sample_has_a_picture_of_its_own(window):
+    assert set(_DRAWINGS) == set(SAMPLES)
+    drawn = {name: card(name, "#888888").toImage() for name in SAMPLES}
+    assert all(image.width() == 2 * SIZE[0] for image in drawn.values())
+    names = list(drawn)
+    for k, name in enumerate(names):
+        assert all(drawn[name] != drawn[other] for other in names[k + 1 :])
+    orange = "#d55e00"
+    for image in drawn.values():
+        colours = {
+            image.pixelColor(x, y).name()
+            for x in range(0, image.width(), 2)
+            for y in range(0, image.height(), 2)
+            if image.pixelColor(x, y).alpha() == 255
+        }
+        assert orange in colours
+
+
+def test_cards_follow_the_theme(window):
+    def shown():
+        return window.start.sample_buttons["square"].icon().pixmap(SIZE[0], SIZE[1]).toImage()
+
+    window.set_theme("light")
+    QApplication.processEvents()
+    light = shown()
+    window.set_theme("dark")
+    QApplication.processEvents()
+    assert shown() != light

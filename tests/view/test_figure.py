@@ -1,0 +1,226 @@
+"""Pictures of a view: what is in them, and where."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slideviz.errors import SlidevizError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.quality import quality
+from slideviz.view import changes, figure_vector, jobs_export
+from slideviz.view.figure import Figure, Studio, panes, sees_all, title_of, words_of_size
+from slideviz.view.figure_vector import draw_vector, require_vector, write_vector
+from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
+from slideviz.view.look import ROLE_COLOURS
+from slideviz.view.state import Frame
+from slideviz.view.surfaces import find_surfaces
+
+PLAIN = Figure((400, 300), legend=False)
+
+
+def session_of(mesh):
+    return changes.open_mesh(Frame(mesh, quality(mesh)), None)
+
+
+@pytest.fixture
+def session(square):
+    found = changes.start_run(session_of(square))
+    for scale in (1.02, 1.05):
+        moved = square.with_points(square.points * [scale, 1.0])
+        found = changes.add_frames(found, [Frame(moved, quality(moved, square))])
+    return changes.set_view(changes.end_run(found, "done"), colour_by="size_skew")
+
+
+@pytest.fixture
+def studio(session, square):
+    with Studio(session, find_surfaces(square)) as made:
+        yield made
+
+
+def drawn(image):
+    """Return the rows and columns from where to where something is drawn."""
+    ink = (image[..., :3] < 250).any(axis=2)
+    rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
+    return rows[0], rows[-1], columns[0], columns[-1]
+
+
+def test_the_mesh_stands_in_the_middle_of_a_white_picture(studio):
+    top, bottom, left, right = drawn(studio.image(PLAIN))
+    assert abs((top + bottom) / 2 - 150) < 4
+    assert abs((left + right) / 2 - 200) < 4
+    assert bottom - top > 0.85 * 300
+
+
+def test_the_legend_has_its_strip_and_the_title_its_line(studio):
+    _, _, _, right = drawn(studio.image(replace(PLAIN, legend=True)))
+    assert right > 350
+    bare, titled = studio.image(PLAIN), studio.image(replace(PLAIN, title=True))
+    assert drawn(titled)[0] < drawn(bare)[0]
+    mesh_top = drawn(titled[60:])[0] + 60
+    assert mesh_top > 20, "the title does not lie on the mesh"
+    assert drawn(studio.image(PLAIN)) == drawn(bare), "the title is gone again"
+
+
+def test_edges_and_axes_are_drawn_when_wanted(studio):
+    def colours(figure):
+        return len(np.unique(studio.image(figure).reshape(-1, 3), axis=0))
+
+    assert colours(PLAIN) > 1.5 * colours(replace(PLAIN, edges=False))
+    with_axes = studio.image(replace(PLAIN, triad=True))
+    assert (with_axes != studio.image(PLAIN)).any()
+
+
+def test_backgrounds(studio):
+    clear = studio.image(replace(PLAIN, background="transparent"))
+    assert clear.shape == (300, 400, 4)
+    assert clear[2, 2, 3] == 0
+    assert clear[150, 200, 3] == 255
+    assert (studio.image(PLAIN)[2, 2] == 255).all()
+
+
+def test_a_preview_is_the_picture_made_small(studio):
+    figure = Figure((1200, 900), letters=1.5, legend=False, title=True)
+    small = figure.within((400, 400))
+    assert small.size == (400, 300)
+    assert small.scale == pytest.approx(figure.scale / 3)
+    places = np.array(drawn(studio.image(figure))) / 3
+    assert np.abs(places - drawn(studio.image(small))).max() < 6
+    assert figure.within((5000, 5000)).size == figure.size
+
+
+def test_two_runs_have_the_same_room_and_the_same_scale(studio, session, square):
+    more = changes.start_run(session)
+    moved = square.with_points(square.points * [1.0, 0.5])
+    more = changes.add_frames(more, [Frame(moved, quality(moved, square))])
+    studio.session = changes.show_beside(changes.show_run(more, 1), 2)
+    left, right = panes(Figure((801, 300)), 9)
+    assert left.size[0] + 9 + right.size[0] == 801
+    assert not left.legend
+    both = studio.image(replace(PLAIN, size=(800, 300)))
+    first, second = drawn(both[:, :395]), drawn(both[:, 405:])
+    assert first[3] - first[2] == pytest.approx(1.05 * (second[3] - second[2]), rel=0.03)
+    assert first[1] - first[0] == pytest.approx(2 * (second[1] - second[0]), rel=0.05)
+    studio.session = changes.show_beside(studio.session, changes.UNDEFORMED)
+    assert studio.beside.frame is session.first
+
+
+def test_what_is_selected_is_not_marked_in_a_picture(studio, square):
+    plain = studio.image(PLAIN)
+    studio.session = changes.select(studio.session, square.marker_names[:1])
+    assert (studio.image(PLAIN) == plain).all()
+
+
+def test_titles_say_run_step_and_quality(session):
+    wide, narrow = Figure((3000, 300)), Figure((200, 300))
+    assert title_of(session, wide).startswith("Deformed: min ")
+    assert "mean" in title_of(session, wide)
+    assert "mean" not in title_of(session, narrow)
+    assert "step 1 of 2" in title_of(changes.show_frame(session, 1), wide)
+    assert title_of(changes.show_frame(session, 0), wide).startswith("Undeformed")
+
+
+def test_sizes_in_words():
+    assert words_of_size(Figure((600, 300))) == "600 × 300 pixels"
+    assert words_of_size(Figure((600, 300), dpi=300.0)).startswith("5.1 × 2.5 cm on paper")
+
+
+def test_what_cannot_be_drawn_or_written_is_told(studio, tmp_path, cube, monkeypatch):
+    with pytest.raises(SlidevizError, match="cannot be drawn"):
+        studio.image(Figure((10, 300)))
+    with pytest.raises(SlidevizError, match=r"end the name with \.png"):
+        studio.write(PLAIN, tmp_path / "a.jpg")
+    with pytest.raises(SlidevizError, match="folder does not exist"):
+        studio.write(PLAIN, tmp_path / "no" / "a.png")
+    with pytest.raises(SlidevizError, match="end the name so"):
+        require_vector(studio.session, Path("a.png"))
+    with pytest.raises(SlidevizError, match="only pictures of 2D meshes"):
+        require_vector(session_of(cube), Path("a.svg"))
+    monkeypatch.setattr(figure_vector, "MOST_CELLS", 3)
+    with pytest.raises(SlidevizError, match="too many to be drawn one by one"):
+        require_vector(studio.session, Path("a.pdf"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_same_camera_for_pixels_and_lines(studio):
+    (x0, x1), (y0, y1) = studio.window(PLAIN)
+    points = studio.session.frame.mesh.points
+    _, bottom, left, right = drawn(studio.image(PLAIN))
+    unit = (x1 - x0) / 400
+    assert unit == pytest.approx((y1 - y0) / 300)
+    assert points[:, 0].min() == pytest.approx(x0 + left * unit, abs=3 * unit)
+    assert points[:, 0].max() == pytest.approx(x0 + right * unit, abs=3 * unit)
+    assert points[:, 1].min() == pytest.approx(y1 - bottom * unit, abs=3 * unit)
+    sheet = draw_vector(studio, PLAIN)
+    assert sheet.axes[0].get_xlim() == pytest.approx((x0, x1))
+    assert sheet.axes[0].get_ylim() == pytest.approx((y0, y1))
+
+
+def test_drawings_are_whole_and_always_the_same(studio, tmp_path):
+    figure = replace(PLAIN, title=True, legend=True)
+    for name in ("a.svg", "b.svg"):
+        write_vector(studio, figure, tmp_path / name)
+    first = (tmp_path / "a.svg").read_bytes()
+    assert first == (tmp_path / "b.svg").read_bytes()
+    cells = len(studio.session.mesh.cells)
+    assert first.count(b"<path") >= cells
+    studio.session = changes.set_view(studio.session, colour_by="role", undeformed=True)
+    write_vector(studio, figure, tmp_path / "c.svg")
+    roles = {studio.session.role(name) for name in studio.session.mesh.marker_names}
+    text = (tmp_path / "c.svg").read_text()
+    assert all(ROLE_COLOURS[role] in text for role in roles)
+    write_vector(studio, replace(figure, background="transparent"), tmp_path / "d.pdf")
+    assert (tmp_path / "d.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_only_chosen_cells_are_drawn(studio):
+    studio.session = changes.set_view(studio.session, threshold=(2.0, 3.0))
+    sheet = draw_vector(studio, PLAIN)
+    assert sum(len(one.get_paths()) for one in sheet.axes[0].collections[:1]) == 0
+
+
+def test_whether_a_view_sees_all(studio):
+    scene = studio.pose(PLAIN)
+    assert sees_all(scene)
+    scene.plotter.camera.parallel_scale *= 0.3
+    assert not sees_all(scene)
+
+
+def test_formats_and_what_they_leave_out(square, cube):
+    assert ".bdf" not in formats_for(square)
+    assert set(formats_for(cube)) == set(MESH_FORMATS)
+    assert holds_quality(Path("a.VTU"))
+    assert not holds_quality(Path("a.su2"))
+    assert left_out(Path("a.su2"), square) == ""
+    plain = replace(square, source=None)
+    assert left_out(Path("a.vtu"), plain) == ""
+    from_su2 = replace(square, source=Path("x.su2"))
+    assert "FFD boxes" in left_out(Path("a.vtu"), from_su2)
+    assert left_out(Path("a.msh"), plain) == "a.msh does not hold the quality of the cells."
+    assert "numbers now" in left_out(Path("a.off"), plain)
+
+
+def test_centroids_and_names_of_steps(square):
+    middles = jobs_export.centroids(square)
+    cell = square.cells.connectivity[: square.cells.offsets[1]]
+    assert np.allclose(middles[0], square.points[cell].mean(axis=0))
+    names = [path.name for path in jobs_export.step_paths(Path("/x/a.su2"), 10)]
+    assert names[0] == "a_01.su2"
+    assert names[-1] == "a_10.su2"
+
+
+def test_the_table_tells_inverted_cells_and_every_type(square, tmp_path):
+    points = square.points.copy()
+    inner = np.setdiff1d(np.arange(len(points)), square.marker(square.marker_names[0]).nodes)
+    points[inner[len(inner) // 2]] += 10.0
+    bad = square.with_points(points)
+    said = []
+    frame = Frame(bad, quality(bad, square))
+    path = jobs_export.save_quality(tmp_path / "q.csv", frame, said.append, lambda: False)
+    lines = path.read_text().splitlines()
+    assert len(lines) == 1 + len(bad.cells)
+    assert sum(",inverted," in line for line in lines) == frame.quality.inverted > 0
+    kind = ELEMENTS[int(bad.cells.types[0])].name
+    assert lines[1].startswith(f"0,{kind},")
+    assert said[0].fraction == 0.0
