@@ -23,7 +23,7 @@ def _cells_of(actor: vtkProp) -> int:
 
 
 class ViewSignals(QObject):
-    """What the view tells: a click on a place, a click with the right button.
+    """What the view tells: a click on a place, a click with the right button, all is shown.
 
     Positions are pixels of the widget. They sit in an object of their own because the view
     inherits several hundred names, which new ones must not hide.
@@ -33,6 +33,7 @@ class ViewSignals(QObject):
     menu_wanted = Signal(QPoint)
     zoomed = Signal(QPoint, float)
     resized = Signal()
+    unveiled = Signal()
 
 
 class View3D(QtInteractor):
@@ -72,9 +73,13 @@ class View3D(QtInteractor):
         To hand a large mesh to the graphics takes longer than to draw it, and the window must
         answer meanwhile.
         """
+        while self._veiled:
+            self._unveil_next()
         parts: list[list[vtkProp]] = [[]]
         cells = 0
-        for actor in list(self.renderer.actors.values()):
+        for actor in self.renderer.actors.values():
+            if not actor.GetVisibility():
+                continue
             size = _cells_of(actor)
             if cells and cells + size > PART_CELLS:
                 parts.append([])
@@ -83,17 +88,18 @@ class View3D(QtInteractor):
             parts[-1].append(actor)
         self._veiled = parts[1:]
         for actor in chain(*self._veiled):
-            self.renderer.RemoveViewProp(actor)
+            actor.SetVisibility(False)
         self.render_soon()
 
     def _unveil_next(self) -> None:
-        if self._veiled:
-            # Some may have left the scene since.
-            here = set(self.renderer.actors.values())
-            for actor in self._veiled.pop(0):
-                if actor in here and not self.renderer.HasViewProp(actor):
-                    self.renderer.AddViewProp(actor)
-            self.render()
+        if not self._veiled:
+            return
+        for actor in self._veiled.pop(0):
+            actor.SetVisibility(True)
+        if not self._veiled:
+            # Perhaps something was hidden meanwhile.
+            self.told.unveiled.emit()
+        self.render()
 
     def paintGL(self) -> None:
         super().paintGL()

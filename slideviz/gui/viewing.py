@@ -70,6 +70,7 @@ class Viewing(QWidget):
         view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
         view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
         view.told.resized.connect(scene.resized)
+        view.told.unveiled.connect(scene.resized)
         CellHover(view, scene, self.store)
         view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
@@ -121,14 +122,14 @@ class Viewing(QWidget):
         self._drop_second()
         self._before = None
         self.surfaces = opened.surfaces
-        self._ghosts = Ghosts(session.mesh)
+        self._ghosts = opened.ghosts
         self.view.spare_software()
         self.view.set_flat(session.mesh.dim == 2)
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
             self.scene.eye.go(opened.camera)
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
-        self.view.render_soon()
+        self.view.unveil()
 
     def sync(self, old: Session, new: Session) -> None:
         """Show what changed."""
