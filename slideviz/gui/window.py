@@ -27,7 +27,6 @@ from slideviz.gui.start import StartPage
 from slideviz.gui.viewing import Viewing
 from slideviz.gui.warm import WarmUp
 from slideviz.view import changes, jobs
-from slideviz.view.state import Session
 from slideviz.view.store import Store
 
 log = logging.getLogger("slideviz")
@@ -77,7 +76,8 @@ class MainWindow(QMainWindow):
         self._connect()
         self.set_theme(str(self.settings.value("theme", "system")))
         self._restore()
-        self.store.listen(self._session_changed)
+        self.store.listen(self.viewing.sync)
+        self.store.listen(lambda *_: self.sync_actions())
         self.clash_watch = ClashWatch(self.store, self)
         self.warm_up = WarmUp(self)
         self.warm_up.compiling.connect(self.preparing.setVisible)
@@ -192,10 +192,6 @@ class MainWindow(QMainWindow):
         self.docks_.share_room()
 
     # The session -----------------------------------------------------------------------
-
-    def _session_changed(self, old: Session, new: Session) -> None:
-        self.viewing.sync(old, new)
-        self.sync_actions()
 
     def sync_actions(self) -> None:
         """Show in menus, tool bar and title what is and what can be done."""
