@@ -32,7 +32,6 @@ TRIANGLE = 512
 RANK = 1e-10
 """Relative size below which a polynomial term adds nothing at the control nodes."""
 
-
 SMALL_FLOPS = 50_000_000
 """Work below which the threads of the linear algebra library wait longer than they work."""
 
@@ -100,10 +99,7 @@ def solve_lower(lower: FloatArray, right: FloatArray, transposed: bool = False) 
 
 
 def condition(*factors: FloatArray) -> float:
-    """Return an estimate of the condition number (1-norm), by Higham and Tisseur.
-
-    Of a matrix with the blocks L L^T of one or more factors L.
-    """
+    """Return an estimate of the condition number (1-norm, Higham and Tisseur) of blocks L L^T."""
     sizes = np.array([_norms(lower) for lower in factors if len(lower)])
     return float(np.prod(sizes.max(axis=0))) if len(sizes) else 1.0
 
@@ -156,7 +152,8 @@ def extend(before: Factor, rows: FloatArray, tick: Tick = no_tick) -> Factor:
         The matrix has numbers that are not finite.
     """
     _require_finite(rows)
-    done, old, more = len(before.lower), rows.shape[1] - len(rows), len(rows)
+    done, more = len(before.lower), len(rows)
+    old = rows.shape[1] - more
     corner, dropped = rows[:, old:], np.zeros(more, bool)
     lower = np.zeros((done + more, done + more), order="F")
     lower[:done, :done] = before.lower
