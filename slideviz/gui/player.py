@@ -132,8 +132,8 @@ def result_text(session: Session) -> str:
     parts += [f"min <b>{quality.min:.4f}</b>", f"mean <b>{quality.mean:.4f}</b>"]
     bad = quality.inverted
     colour = " style='color:#e8112d'" if bad else ""
-    parts.append(f"<span{colour}>inverted <b>{bad}</b> of {len(quality):,}</span>")
+    parts.append(f"<span{colour}><b>{bad:,}</b> inverted</span>")
     if frame.step is not None:
         seconds = sum(sum(f.step.seconds.values()) for f in session.frames if f.step is not None)
         parts.append(f"<b>{seconds:.2f}</b> s")
-    return "&nbsp;&nbsp;·&nbsp;&nbsp;".join(parts)
+    return "&nbsp;· ".join(parts)
