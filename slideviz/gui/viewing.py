@@ -70,7 +70,7 @@ class Viewing(QWidget):
         view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
         view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
         view.told.resized.connect(scene.resized)
-        view.told.unveiled.connect(scene.resized)
+        view.told.unveiled.connect(lambda: scene.update(scene.session))
         CellHover(view, scene, self.store)
         view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
