@@ -143,6 +143,11 @@ class Actions:
             text = "isometric" if side == "iso" else side
             sides.addAction(self._add(f"side{side}", text, partial(window.look_from, side), keys))
         menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
+        for name, text, keys in (
+            ("add_plane", "&Cut by a plane", "C"),
+            ("add_cylinder", "Cut by a c&ylinder", "Shift+C"),
+        ):
+            menu.addAction(self._add(name, text, partial(self._add_section, name), keys))
         menu.addSeparator()
         steps = self._menu(menu, "steps", "&Steps")
         player = window.player
@@ -164,6 +169,10 @@ class Actions:
             act.triggered.connect(lambda _=False, theme=theme: window.set_theme(theme))
             themes.addAction(act)
         self.panels = self._menu(menu, "panels", "&Panels")
+
+    def _add_section(self, name: str) -> None:
+        self.window.docks_.lead_to("sections")
+        getattr(self.window.docks_.panels["sections"], name).click()
 
     def add_panels(self, docks) -> None:
         """Offer to show and hide the docks, and to put them back."""
@@ -259,6 +268,8 @@ class Actions:
         self.by_name["perspective"].setEnabled(opened and not flat)
         for side in (*SIDE_KEYS, "iso"):
             self.by_name[f"side{side}"].setEnabled(opened and not flat)
+        self.by_name["add_plane"].setEnabled(opened)
+        self.by_name["add_cylinder"].setEnabled(opened and not flat)
         store = self.window.store
         for name, what in (("undo", store.can_undo), ("redo", store.can_redo)):
             act = self.by_name[name]

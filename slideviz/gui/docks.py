@@ -18,6 +18,7 @@ from slideviz.gui.method import MethodPanel
 from slideviz.gui.motions import MotionPanel
 from slideviz.gui.run import RunPanel
 from slideviz.gui.runs import RunsPanel
+from slideviz.gui.sections import sections_panel
 from slideviz.gui.worst import WorstPanel
 
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
@@ -65,6 +66,7 @@ DOCKS: tuple[DockRow, ...] = (
         lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error, w.say),
         bare=True,
     ),
+    DockRow("sections", "Sections", RIGHT, sections_panel, "runs", bare=True),
     DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs", bare=True),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )

@@ -23,6 +23,8 @@ TIPS: dict[str, str] = {
     "look_from": "Look at the mesh from a side.",
     "sideiso": "Look at the mesh from a corner.",
     "show_all": "Show the boundaries that were hidden.",
+    "add_plane": "Show the cells that a plane cuts, and put it where you want.",
+    "add_cylinder": "Show the cells that a cylinder about the axis cuts, and unroll it.",
     "steps": "Show another step of the deformation.",
     "step_first": "Show the mesh before it is deformed.",
     "step_previous": "Show the step before this one.",

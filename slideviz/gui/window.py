@@ -14,6 +14,7 @@ from slideviz.gui import theme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
 from slideviz.gui.clash import ClashWatch
+from slideviz.gui.cutting import Cutting
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.docks import Docks
 from slideviz.gui.export import Exports
@@ -98,9 +99,10 @@ class MainWindow(QMainWindow):
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page lies over the view: a view that is never shown has no size.
         self.viewing = Viewing(self.store, multi_samples, stack)
+        self.cutting = Cutting(self.viewing, multi_samples, stack)
         self.start = StartPage(self.files.samples, stack)
         self.start.setAutoFillBackground(True)
-        grid.addWidget(self.viewing, 0, 0)
+        grid.addWidget(self.cutting, 0, 0)
         grid.addWidget(self.start, 0, 0)
         self.start.raise_()
         self.start.show_recent(self.files.recent())
@@ -326,5 +328,6 @@ class MainWindow(QMainWindow):
             if self.autosave is not None:
                 self.autosave.close()
             self.docks_.panels["log"].detach()
+            self.cutting.close_views()
             self.viewing.close_views()
         super().closeEvent(event)

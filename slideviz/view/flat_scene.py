@@ -15,7 +15,7 @@ from slideviz.view.cuts import Cuts
 from slideviz.view.layer_copies import Period, matrices
 from slideviz.view.layer_mark import IN_FRONT
 from slideviz.view.look import LIGHT, SELECTED_COLOUR, Look
-from slideviz.view.polygon_actor import PolygonActor
+from slideviz.view.polygon_actor import PolygonActor, plain_colour
 from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
 from slideviz.view.section_paint import Paint
@@ -45,6 +45,8 @@ class FlatScene:
         What is shown.
     polygons : Polygons or None
         Its cells, flat.
+    session : Session
+        The state that is shown.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, look: Look = LIGHT) -> None:
@@ -58,7 +60,7 @@ class FlatScene:
         self._style_mark()
         self._period = Period()
         self._made_of: tuple[object, ...] = ()
-        self._session = Session()
+        self.session = Session()
         self.set_look(look)
 
     @property
@@ -70,7 +72,7 @@ class FlatScene:
     def update(self, session: Session, section: Section) -> None:
         """Show another state, or another section."""
         assert session.frame is not None
-        self._session, self.section = session, section
+        self.session, self.section = session, section
         self.stage.set_colours(session)
         by_value = session.view.colour_by != "role"
         cut = self.cuts.of(session.frame.mesh, section)
@@ -96,17 +98,17 @@ class FlatScene:
 
     def _style(self, section: Section) -> None:
         prop = self._shown.actor.prop
-        prop.color = self.stage.look.cell
+        prop.color = plain_colour(self.stage.look)
         prop.lighting = section.whole
         prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
         prop.line_width = 1.0
-        self.stage.edges(prop, self._session.view.edges)
+        self.stage.edges(prop, self.session.view.edges)
 
     def _draw_neighbours(self, section: Section) -> None:
         found: dict[int, FloatArray] = {}
-        if self._session.view.copies:
-            pair = self._period.of(self._session)
-            for number, matrix in matrices(self._session, pair).items():
+        if self.session.view.copies:
+            pair = self._period.of(self.session)
+            for number, matrix in matrices(self.session, pair).items():
                 if pair is not None and keeps(section, matrix):
                     found[number] = flat_matrix(section, pair, number, matrix)
         self._twins.show(found)
@@ -120,7 +122,7 @@ class FlatScene:
     def _draw_mark(self) -> None:
         """Draw the edges of the marked cell, if the section shows it."""
         assert self.polygons is not None
-        mine = np.flatnonzero(self.polygons.cells == self._session.view.marked)
+        mine = np.flatnonzero(self.polygons.cells == self.session.view.marked)
         self._mark.show(self.polygons.take(mine))
 
     # What is told ----------------------------------------------------------------------
@@ -130,19 +132,19 @@ class FlatScene:
         """Return in words how many cells are cut, and their min, mean and inverted ones."""
         if self.section is None or self.polygons is None or not len(self.polygons):
             return "it cuts no cell"
-        frame, mesh = self._session.frame, self._session.mesh
+        frame, mesh = self.session.frame, self.session.mesh
         assert frame is not None
-        what = self._session.view.colour_by
+        what = self.session.view.colour_by
         what = "size_skew" if what == "role" else what
         paint = Paint(
             COLOUR_BY[what],  # type: ignore[arg-type]
             frame.values(what, mesh),
             frame.quality.status == INVERTED,
-            self._session.colour_range,
+            self.session.colour_range,
         )
         return paint.sentence(self.polygons.cell_ids)
 
-    def cell_at(self, x: float, y: float) -> int | None:
+    def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None."""
         if self.polygons is None or not len(self.polygons):
             return None
@@ -156,8 +158,8 @@ class FlatScene:
         """Take other colours for background and edges."""
         self.stage.look = look
         self.stage.set_background()
-        if self.section is not None and self._session.frame is not None:
-            self.update(self._session, self.section)
+        if self.section is not None and self.session.frame is not None:
+            self.update(self.session, self.section)
 
     def bounds(self) -> tuple[FloatArray, FloatArray] | None:
         """Return the lowest and highest corner (2,) of all that is drawn, or None."""
@@ -188,6 +190,18 @@ class FlatScene:
         camera.parallel_projection = True
         camera.parallel_scale = half
         self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def zoom_at(self, x: float, y: float, factor: float) -> None:
+        """Enlarge by ``factor``; the pixel (x, y) from the lower left keeps what it shows."""
+        (left, right), (below, above) = self.ranges()
+        width, height = self.stage.plotter.window_size
+        camera = self.stage.plotter.camera
+        at = np.array([left + (right - left) * x / width, below + (above - below) * y / height])
+        way = (at - np.asarray(camera.focal_point)[:2]) * (1.0 - 1.0 / factor)
+        shift = np.array([*way, 0.0])
+        camera.focal_point = np.asarray(camera.focal_point) + shift
+        camera.position = np.asarray(camera.position) + shift
+        camera.parallel_scale = camera.parallel_scale / factor
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return what the view reaches from left to right, and from bottom to top."""

@@ -11,7 +11,7 @@ from slideviz.view.copies import keeps
 from slideviz.view.cuts import Cuts, can_cut
 from slideviz.view.layer_copies import Period, matrices
 from slideviz.view.layer_mesh import recoloured
-from slideviz.view.polygon_actor import PolygonActor
+from slideviz.view.polygon_actor import PolygonActor, plain_colour
 from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
 from slideviz.view.stage import Stage
@@ -141,7 +141,7 @@ class SectionLayer:
         prop, look = shown.actor.prop, self.stage.look
         assert session.mesh is not None
         if session.mesh.dim == 3:
-            prop.color = look.cell
+            prop.color = plain_colour(look)
             # A cut has the very colours of the bar; whole cells need shades to be told apart.
             prop.lighting = section.whole
             prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)

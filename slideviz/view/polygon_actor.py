@@ -9,6 +9,7 @@ import pyvista as pv
 
 from slideviz.mesh.model import FloatArray
 from slideviz.view.actors import VALUES
+from slideviz.view.look import Look
 from slideviz.view.polygons import Polygons
 from slideviz.view.stage import Stage
 
@@ -54,6 +55,13 @@ class PolygonActor:
         if values is not None:
             self.shape.cell_data[VALUES] = values[self.polygons.cells]
         self.mapper.scalar_visibility = values is not None
+
+
+def plain_colour(look: Look) -> tuple[float, float, float]:
+    """Return the colour of polygons without numbers: it stands off from any background."""
+    cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (look.cell, look.ghost))
+    red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
+    return red, green, blue
 
 
 def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:

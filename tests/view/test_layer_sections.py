@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from slideviz.case.samples import sample
-from slideviz.errors import CaseError
+from slideviz.errors import Cancelled, CaseError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.view import changes, section_start
@@ -16,9 +16,11 @@ from slideviz.view.flat_scene import FlatScene
 from slideviz.view.layer_mesh import looks_inside
 from slideviz.view.look import INVERTED_COLOUR, LIGHT
 from slideviz.view.pick import to_display
+from slideviz.view.polygon_actor import plain_colour
 from slideviz.view.scene import Scene
 from slideviz.view.section import Section
-from slideviz.view.state import Frame
+from slideviz.view.section_job import save_section
+from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import find_surfaces
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
@@ -111,7 +113,7 @@ def test_a_section_has_the_values_of_its_cells(scene, cube):
     assert np.array_equal(one.shown.shape.cell_data[VALUES], wanted)
     scene.update(changes.set_view(frame, colour_by="role"))
     assert not one.shown.mapper.scalar_visibility
-    assert one.actor.prop.color == pv.Color(LIGHT.cell)
+    assert one.actor.prop.color == pv.Color(plain_colour(LIGHT))
 
 
 def test_a_section_follows_the_step(scene, cube):
@@ -316,13 +318,13 @@ def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, fla
         f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; {len(cells)} cells cut"
     )
     x, y = to_display(flat_plotter, np.array([[0.2, 0.2, 0.0]]))[0]
-    assert flat.cell_at(x, y) in cells
-    assert flat.cell_at(2, 2) is None
+    assert flat.pick_cell(x, y) in cells
+    assert flat.pick_cell(2, 2) is None
     away = Section("plane", (0.0, 0.0, 9.0), (0.0, 0.0, 1.0))
     flat.update(session, away)
     flat.fit()
     assert flat.summary == "it cuts no cell"
-    assert flat.cell_at(x, y) is None
+    assert flat.pick_cell(x, y) is None
 
 
 def test_flat_neighbours_lie_one_period_on(scene, flat_plotter, stator):
@@ -374,3 +376,25 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
     flat.update(later, MIDDLE)
     assert count(flat_plotter, INVERTED_COLOUR, 30) > 50
     assert "inverted" in flat.summary
+
+
+# As a file --------------------------------------------------------------------------------
+
+
+def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
+    session = changes.open_mesh(Frame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
+    session = changes.set_view(session, copies=1, colour_by="skew", colour_range=(0.2, 0.9))
+    section = Section("cylinder", radius=0.27)
+    told = []
+    one, three = tmp_path / "one.svg", tmp_path / "three.svg"
+    going = (told.append, lambda: False)
+    assert save_section(three, session, section, *going) == three
+    save_section(one, changes.set_view(session, copies=0), section, *going)
+    assert three.stat().st_size > 2 * one.stat().st_size
+    assert [type(each).__name__ for each in told] == ["Doing"] * 4
+    with pytest.raises(CaseError, match="no mesh is open"):
+        save_section(one, Session(), section, *going)
+    with pytest.raises(CaseError, match="a section is drawn as"):
+        save_section(tmp_path / "one.bmp", session, section, *going)
+    with pytest.raises(Cancelled):
+        save_section(one, session, section, told.append, lambda: True)

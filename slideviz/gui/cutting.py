@@ -1,0 +1,204 @@
+"""What belongs to the section that is chosen: its handle in the view, and its flat picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QSplitter
+
+from slideviz.gui.handle import PlaneHandle
+from slideviz.gui.unrolled import FlatView
+from slideviz.gui.viewing import Viewing
+from slideviz.view import changes
+from slideviz.view.cuts import can_cut
+from slideviz.view.section import Section, Triple
+from slideviz.view.state import Session
+from slideviz.view.unroll import plane_axes
+
+BESIDE_PX = 1000
+"""Width from which on the flat view is put beside the 3D view; below it otherwise."""
+
+
+class Cutting(QSplitter):
+    """The 3D view, and beside or below it the flat view of the section that is chosen.
+
+    Attributes
+    ----------
+    chosen : int or None
+        The place of the section in the list of the view.
+    wants_handle, wants_flat : bool
+        Whether the chosen section gets a handle, if it is a plane; whether it is laid flat.
+    handle, flat
+        Both, None while nobody wants them.
+    look : Look
+        Their colours.
+    """
+
+    changed = Signal()
+
+    def __init__(self, viewing: Viewing, multi_samples: int, parent=None) -> None:
+        super().__init__(Qt.Orientation.Vertical, parent)
+        self.setChildrenCollapsible(False)
+        self.viewing, self.store = viewing, viewing.store
+        self.addWidget(viewing)
+        self._multi_samples = multi_samples
+        self.chosen: int | None = None
+        self.wants_handle = self.wants_flat = False
+        self.handle: PlaneHandle | None = None
+        self.flat: FlatView | None = None
+        self.look = viewing.scene.look
+        self.store.listen(self._session_changed)
+
+    # What is wanted --------------------------------------------------------------------
+
+    @property
+    def section(self) -> Section | None:
+        """Return the section that is chosen."""
+        sections = self.store.session.view.sections
+        if self.chosen is None or self.chosen >= len(sections):
+            return None
+        return sections[self.chosen]
+
+    def choose(self, index: int | None) -> None:
+        """Choose a section."""
+        if index != self.chosen:
+            self.chosen = index
+            self._sync()
+
+    def want_handle(self, wanted: bool) -> None:
+        """Show the handle of a plane that is chosen, or do not."""
+        self.wants_handle = wanted
+        self._sync()
+
+    def want_flat(self, wanted: bool) -> None:
+        """Lay the chosen section flat beside the 3D view, or do not."""
+        self.wants_flat = wanted
+        self._sync()
+
+    def look_along(self) -> None:
+        """Look at the chosen section along its normal, or along its axis."""
+        section, mesh = self.section, self.store.session.mesh
+        if section is None or mesh is None or mesh.dim == 2:
+            return
+        plane = Section("plane", section.origin, section.direction)
+        rows = plane_axes(plane).rows
+        camera = self.viewing.scene.plotter.camera
+        camera.position = np.asarray(camera.focal_point) + rows[2] * camera.distance
+        camera.up = rows[1]
+        self.viewing.fit()
+
+    # What is shown ---------------------------------------------------------------------
+
+    def _session_changed(self, old: Session, new: Session) -> None:
+        if old.mesh is not new.mesh:
+            self.chosen = 0 if new.view.sections else None
+            self.wants_handle = self.wants_flat = False
+        elif old.view.sections != new.view.sections:
+            self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
+        elif self.flat is None and self.handle is None:
+            return
+        self._sync()
+
+    def _sync(self) -> None:
+        session, section = self.store.session, self.section
+        self._sync_handle(session, section)
+        self._sync_flat(session, section)
+        self.changed.emit()
+
+    def _sync_handle(self, session: Session, section: Section | None) -> None:
+        mesh = session.mesh
+        usable = section is not None and section.kind == "plane" and section.shown
+        if not (self.wants_handle and usable) or mesh is None or mesh.dim == 2:
+            if self.handle is not None:
+                self.handle.close()
+                self.handle = None
+                self.viewing.view.render_soon()
+            return
+        if self.handle is None:
+            self.handle = PlaneHandle(self.viewing.view, self._dragged)
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        room = 0.03 * (high - low).max()
+        box = np.stack([low - room, high + room], axis=1).ravel()
+        self.handle.show(section, tuple(box.tolist()), self.look)
+        self.viewing.view.render_soon()
+
+    def _dragged(self, origin: Triple, normal: Triple) -> None:
+        section = self.section
+        if section is None or section.kind != "plane":
+            return
+        moved = replace(section, origin=origin, direction=normal)
+        if not np.allclose(moved.origin, section.origin) or not np.allclose(
+            moved.basis[2], section.basis[2]
+        ):
+            self.store.change(changes.replace_section, self.chosen, moved)
+
+    def _sync_flat(self, session: Session, section: Section | None) -> None:
+        if not self.wants_flat or section is None or not can_cut(session.mesh, section):
+            self._drop_flat()
+            return
+        if self.flat is None:
+            self._make_flat()
+        self.flat.show_section(session, section)
+
+    def _make_flat(self) -> None:
+        scene = self.viewing.scene
+        wide = self.width() >= BESIDE_PX
+        self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
+        whole = scene.sees_all()
+        self.flat = FlatView(self.store, scene.sections.cuts, self.look, self._multi_samples)
+        self.flat.closed.connect(lambda: self.want_flat(False))
+        self.addWidget(self.flat)
+        size = self.width() if wide else self.height()
+        self.setSizes([size * 11 // 20, size * 9 // 20])
+        self.flat.view.spare_software()
+        if whole:
+            self.viewing.fit()
+
+    def _drop_flat(self) -> None:
+        flat, self.flat = self.flat, None
+        if flat is None:
+            return
+        whole = self.viewing.scene.sees_all()
+        flat.close_view()
+        flat.setParent(None)
+        flat.deleteLater()
+        if whole:
+            self.viewing.fit()
+
+    def set_look(self, look) -> None:
+        """Take other colours."""
+        self.look = look
+        if self.flat is not None:
+            self.flat.set_look(look)
+        self._sync()
+
+    def close_views(self) -> None:
+        """Give the graphics back, before those of the 3D view."""
+        if self.handle is not None:
+            self.handle.close()
+            self.handle = None
+        if self.flat is not None:
+            self.flat.close_view()
+            self.flat = None
+        self.wants_handle = self.wants_flat = False
+
+
+def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
+    """Return where the chosen section is after one was added, taken away or changed.
+
+    One that was added is chosen; after the chosen one is gone, its neighbour is.
+    """
+    if not new:
+        return None
+    if len(new) == len(old) and index is not None:
+        return index
+    first = next(
+        (i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b),
+        min(len(old), len(new)),
+    )
+    if len(new) > len(old) or index is None:
+        return min(first, len(new) - 1)
+    return min(index - (index > first), len(new) - 1)

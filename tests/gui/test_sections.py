@@ -1,0 +1,355 @@
+"""The sections panel, the handle in the view, and the flat view, by mouse and keyboard."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QEvent, QPoint, Qt
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
+
+from slideviz.case.samples import write_sample
+from slideviz.gui import dialogs
+from slideviz.gui.cutting import followed
+from slideviz.gui.ruler import Ruler, nice_ticks, tick_text
+from slideviz.view import changes
+from slideviz.view.section import Section
+
+
+@pytest.fixture
+def panel(window, driver, sample_folder):
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    window.docks_.lead_to("sections")
+    QApplication.processEvents()
+    return window.docks_.panels["sections"]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stator")
+    write_sample("stator", folder, size=5000)
+    return folder / "stator.cfg"
+
+
+def sections(window):
+    return window.store.session.view.sections
+
+
+def drag(slider, to):
+    """Drag a slider to a share of its way, through all between."""
+    style_room = 10
+    width = slider.width() - 2 * style_room
+    at = style_room + slider.value() / slider.maximum() * width
+    y = slider.height() // 2
+    QTest.mousePress(slider, Qt.MouseButton.LeftButton, pos=QPoint(round(at), y))
+    for x in np.linspace(at, style_room + to * width, 5)[1:]:
+        QTest.mouseMove(slider, QPoint(round(x), y))
+        QApplication.processEvents()
+    assert slider.isSliderDown()
+    QTest.mouseRelease(slider, Qt.MouseButton.LeftButton, pos=QPoint(round(x), y))
+    QApplication.processEvents()
+
+
+def test_a_plane_is_added_moved_shown_whole_and_removed(window, driver, panel):
+    driver.click(panel.add_plane)
+    (plane,) = sections(window)
+    assert plane.kind == "plane"
+    assert panel.list.item(0).text() == plane.describe()
+    before = window.scene.sections.drawn["section:0"].polygons.cell_ids
+    drag(panel.editor.slider, 0.9)
+    (moved,) = sections(window)
+    low, high = panel.editor._span
+    share = (np.dot(moved.origin, moved.direction) - low) / (high - low)
+    assert share == pytest.approx(0.9, abs=0.05)
+    assert panel.editor.number.value == pytest.approx(np.dot(moved.origin, moved.direction))
+    assert set(window.scene.sections.drawn["section:0"].polygons.cell_ids) != set(before)
+    QTest.mouseClick(
+        panel.editor.whole,
+        Qt.MouseButton.LeftButton,
+        pos=QPoint(8, panel.editor.whole.height() // 2),
+    )
+    assert sections(window)[0].whole
+    driver.click(panel.remove)
+    assert sections(window) == ()
+    assert "section:0" not in window.scene.plotter.actors
+    assert panel.hint.isVisible()
+
+
+def test_a_drag_of_the_slider_is_undone_at_once(window, driver, panel):
+    driver.click(panel.add_plane)
+    first = sections(window)
+    drag(panel.editor.slider, 0.2)
+    drag(panel.editor.slider, 0.3)
+    assert sections(window) != first
+    assert window.store.can_undo == "section"
+    window.store.undo()
+    assert sections(window) == first
+    window.store.undo()
+    assert sections(window) == ()
+    assert window.cutting.section is None
+    window.store.redo()
+    assert sections(window) == first
+    assert window.cutting.section == first[0]
+
+
+def test_numbers_are_typed(window, driver, panel):
+    driver.click(panel.add_cylinder)
+    (cylinder,) = sections(window)
+    assert cylinder.kind == "cylinder"
+    driver.type(panel.editor.number, "0.4")
+    assert sections(window)[0].radius == 0.4
+    driver.type(panel.editor.number, "-1")
+    assert sections(window)[0].radius == 0.4
+    driver.type(panel.editor.centre.fields[0], "0.5")
+    assert sections(window)[0].origin == (0.5, 0.0, 0.0)
+    driver.choose(panel.editor.axis, "x")
+    assert sections(window)[0].direction == (1.0, 0.0, 0.0)
+
+
+def test_sections_are_added_by_keys_and_removed_by_delete(window, driver, panel):
+    window.docks_.lead_to("boundaries")
+    QTest.keyClick(window, Qt.Key.Key_C)
+    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
+    assert [section.kind for section in sections(window)] == ["plane", "cylinder"]
+    assert panel.isVisible()
+    panel.list.setFocus()
+    QTest.keyClick(panel.list, Qt.Key.Key_Delete)
+    assert [section.kind for section in sections(window)] == ["plane"]
+
+
+def test_a_free_normal(window, driver, panel):
+    driver.click(panel.add_plane)
+    assert not panel.editor.direction.isVisible()
+    driver.choose(panel.editor.axis, "free")
+    assert panel.editor.direction.isVisible()
+    driver.type(panel.editor.direction.fields[1], "1")
+    (plane,) = sections(window)
+    assert plane.direction[1] == 1.0
+    low, high = panel.editor._span
+    assert low < panel.editor.number.value < high
+    driver.choose(panel.editor.axis, "y")
+    assert sections(window)[0].direction == (0.0, 1.0, 0.0)
+    assert not panel.editor.direction.isVisible()
+
+
+def test_several_are_listed_hidden_and_chosen(window, driver, panel):
+    driver.click(panel.add_plane)
+    driver.click(panel.add_cylinder)
+    assert [panel.list.item(row).text() for row in (0, 1)] == [
+        section.describe() for section in sections(window)
+    ]
+    assert window.cutting.chosen == 1
+    panel.list.item(1).setCheckState(Qt.CheckState.Unchecked)
+    assert [section.shown for section in sections(window)] == [True, False]
+    assert set(window.scene.sections.drawn) == {"section:0"}
+    panel.list.setCurrentRow(0)
+    assert window.cutting.section.kind == "plane"
+    assert panel.handle.isVisible()
+    panel.list.setCurrentRow(1)
+    assert not panel.handle.isVisible()
+    driver.click(panel.remove)
+    assert [section.kind for section in sections(window)] == ["plane"]
+    assert window.cutting.chosen == 0
+
+
+def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, wheel):
+    driver.open(wheel)
+    window.docks_.lead_to("sections")
+    panel = window.docks_.panels["sections"]
+    driver.click(panel.add_cylinder)
+    assert panel.flat.text() == "Unrolled"
+    panel.flat.click()
+    flat = window.cutting.flat
+    driver.qtbot.waitUntil(lambda: flat.view.isVisible() and flat.across.high > 0.01)
+    QApplication.processEvents()
+    before = flat.scene.polygons
+    low, high = flat.scene.bounds()
+    assert flat.across.low < low[0] < high[0] < flat.across.high
+    assert flat.upright.low < low[1] < high[1] < flat.upright.high
+    assert flat.across.name == "z"
+    assert "cells cut" in flat.facts.text()
+    drag(panel.editor.slider, 0.95)
+    assert flat.scene.polygons is not before
+    low, high = flat.scene.bounds()
+    assert flat.across.low < low[0] < high[0] < flat.across.high
+    assert flat.upright.low < low[1] < high[1] < flat.upright.high
+    flat.view.told.zoomed.emit(flat.view.rect().center(), 2.0)
+    zoomed = flat.scene.ranges()
+    assert np.ptp(zoomed[0]) == pytest.approx(flat.across.high - flat.across.low)
+    drag(panel.editor.slider, 0.5)
+    assert flat.scene.ranges() == zoomed
+    assert f"{sections(window)[0].radius:.6g}" in flat.title.text
+    driver.click(flat.title.close_button)
+    assert window.cutting.flat is None
+    assert not panel.flat.isChecked()
+
+
+def test_the_flat_view_shows_the_step(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.flat.click()
+    flat = window.cutting.flat
+    window.start_run()
+    driver.settle()
+    assert len(window.store.session.frames) > 1
+    assert flat.scene.session.frame is window.store.session.frame
+    after = flat.facts.text()
+    window.store.change(changes.show_frame, 0)
+    assert flat.scene.session.frame is window.store.session.first
+    assert flat.facts.text() != after
+
+
+def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.flat.click()
+    flat = window.cutting.flat
+    driver.qtbot.waitUntil(flat.view.isVisible)
+    QApplication.processEvents()
+    flat.fit()
+    flat.view.snapshot()
+    polygons = flat.scene.polygons
+    corner = polygons.points[polygons.take(np.array([3])).connectivity].mean(axis=0)
+    (left, right), (below, above) = flat.scene.ranges()
+    x = (corner[0] - left) / (right - left) * flat.view.width()
+    y = (above - corner[1]) / (above - below) * flat.view.height()
+    QTest.mouseDClick(flat.view, Qt.MouseButton.LeftButton, pos=QPoint(round(x), round(y)))
+    assert window.store.session.view.marked == polygons.cells[3]
+
+
+def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
+    driver.click(panel.add_plane)
+    (plane,) = sections(window)
+    panel.handle.click()
+    handle = window.cutting.handle
+    assert handle.widget.GetEnabled()
+    assert handle.shape.GetOrigin() == pytest.approx(plane.origin)
+    interactor = window.view.iren.interactor
+    # As when it is dragged: VTK moves the shape and tells.
+    handle.widget.InvokeEvent("StartInteractionEvent")
+    at = np.array(plane.origin) + 0.1 * np.array(plane.direction)
+    handle.shape.SetOrigin(*at)
+    handle.widget.InvokeEvent("InteractionEvent")
+    driver.qtbot.waitUntil(lambda: sections(window)[0].origin == pytest.approx(tuple(at)))
+    handle.widget.InvokeEvent("EndInteractionEvent")
+    assert not handle.dragging
+    # And the other way round.
+    driver.type(panel.editor.number, "0.3")
+    assert np.dot(handle.shape.GetOrigin(), plane.direction) == pytest.approx(0.3)
+    panel.handle.click()
+    assert window.cutting.handle is None
+    assert handle.widget.GetInteractor() is None
+    assert interactor is window.view.iren.interactor
+
+
+def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, passage_file):
+    driver.click(panel.add_plane)
+    panel.handle.click()
+    panel.flat.click()
+    driver.open(passage_file)
+    assert window.cutting.handle is None
+    assert window.cutting.flat is None
+    assert sections(window) == ()
+    assert not panel.add_cylinder.isEnabled()
+    driver.click(panel.add_plane)
+    assert sections(window)[0].whole
+    assert not panel.handle.isVisible()
+    assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
+
+
+def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel, monkeypatch):
+    driver.click(panel.add_plane)
+    panel.handle.click()
+    panel.flat.click()
+    QApplication.processEvents()
+    cutting, handle = window.cutting, window.cutting.handle
+    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    window.close()
+    assert handle.widget.GetInteractor() is None
+    assert cutting.flat is None
+    QApplication.processEvents()
+
+
+def test_a_closed_flat_view_is_freed(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.flat.click()
+    QApplication.processEvents()
+    view, scene = weakref.ref(window.cutting.flat), weakref.ref(window.cutting.flat.scene)
+    panel.flat.click()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    QApplication.processEvents()
+    gc.collect()
+    assert view() is None
+    assert scene() is None
+
+
+def test_look_along_the_normal(window, driver, panel):
+    driver.click(panel.add_plane)
+    driver.choose(panel.editor.axis, "x")
+    driver.click(panel.look)
+    assert abs(np.array(window.view.camera.direction)[0]) == pytest.approx(1.0)
+
+
+def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_path):
+    driver.click(panel.add_plane)
+    asked = answers("ask_save", tmp_path / "cut.svg")
+    driver.click(panel.picture)
+    driver.settle()
+    assert asked
+    assert b"<svg" in (tmp_path / "cut.svg").read_bytes()
+
+
+def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers, tmp_path):
+    driver.click(panel.add_plane)
+    answers("ask_save", tmp_path / "cut.bmp")
+    driver.click(panel.picture)
+    driver.settle()
+    assert window.banner.isVisible()
+    assert not (tmp_path / "cut.bmp").exists()
+
+
+def test_the_panel_fits_its_dock(window, panel, driver):
+    driver.click(panel.add_cylinder)
+    driver.choose(panel.editor.axis, "free")
+    QApplication.processEvents()
+    assert panel.minimumSizeHint().width() <= 300
+    assert panel.minimumSizeHint().height() <= 270
+
+
+A, B, C = (Section("plane", (x, 0.0, 0.0), (1.0, 0.0, 0.0)) for x in (0.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("index", "old", "new", "wanted"),
+    [
+        (None, (), (A,), 0),
+        (0, (A,), (A, B), 1),
+        (1, (A, B), (C, B), 1),
+        (2, (A, B, C), (A, C), 1),
+        (1, (A, B, C), (A, C), 1),
+        (0, (A, B), (A,), 0),
+        (1, (A, B), (A,), 0),
+        (0, (A,), (), None),
+    ],
+)
+def test_the_chosen_section_stays_chosen(index, old, new, wanted):
+    assert followed(index, old, new) == wanted
+
+
+def test_rulers_have_round_numbers():
+    assert nice_ticks(-0.012, 0.031, 4) == pytest.approx([0.0, 0.02])
+    assert nice_ticks(0.0, 1.0, 4) == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+    assert nice_ticks(1.0, 1.0, 4) == []
+    assert [tick_text(value, 0.25) for value in (0.25, 0.5)] == ["0.25", "0.50"]
+    assert tick_text(1e-17, 0.1) == "0"
+    assert tick_text(30.0, 10.0) == "30"
+    assert tick_text(3e-6, 1e-6) == "3e-06"
+
+
+def test_a_ruler_writes_its_numbers(qtbot):
+    ruler = Ruler(upright=False)
+    qtbot.addWidget(ruler)
+    ruler.resize(400, 34)
+    ruler.show_range(0.0, 1.0, "z")
+    empty = ruler.grab().toImage()
+    ruler.show_range(0.1, 1.1, "z")
+    assert ruler.grab().toImage() != empty
