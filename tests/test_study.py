@@ -100,12 +100,34 @@ def test_the_summary_puts_numbers_beside_each_other(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_small_study_runs_from_sample_to_summary(tmp_path, capsys):
-    argv = ["--quick", "--only", "square-robust", "-o", str(tmp_path)]
-    assert study.main(argv) == 0
+def test_a_study_runs_from_sample_to_summary(tmp_path, capsys):
+    assert study.main(["--only", "square-robust", "-o", str(tmp_path)]) == 0
     assert (tmp_path / "square-robust" / "compare.csv").exists()
-    assert (tmp_path / "summary.md").exists()
+    with (tmp_path / "summary.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["rbf_slide"]]
+    assert len(rows) == 5
+    for row in rows:  # to all the digits that the thesis's program prints
+        if row["rbf_slide"] == "inverted":
+            assert row["slideviz"] == "inverted"
+        else:
+            assert float(row["slideviz"]) == pytest.approx(float(row["rbf_slide"]), rel=1e-5)
     assert "summary.md" in capsys.readouterr().out
+
+
+def test_a_quick_study_has_no_summary(tmp_path, monkeypatch):
+    made = []
+    monkeypatch.setattr(study, "run", lambda argv: made.append(argv) or 0)
+    monkeypatch.setattr(study, "dense", lambda *_: made.append(["dense"]))
+    assert study.main(["--quick", "-o", str(tmp_path)]) == 0
+    assert not (tmp_path / "summary.md").exists()
+    assert [argv[0] for argv in made].count("compare") == len([c for c in CALLS if c.quick_steps])
+    assert made[-1] == ["dense"]
+
+
+def test_a_call_that_fails_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(study, "run", lambda argv: int(argv[0] == "compare"))
+    assert study.main(["--quick", "--only", "polar", "-o", str(tmp_path)]) == 1
+    assert "failed: polar" in capsys.readouterr().out
 
 
 def test_an_unknown_case_is_told(capsys):

@@ -19,7 +19,7 @@ def main(argv: Sequence[str]) -> int:
     """Run the study; 1 when a call failed."""
     parser = argparse.ArgumentParser(prog="make study", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="DIR")
-    parser.add_argument("--quick", action="store_true", help="small meshes and few steps")
+    parser.add_argument("--quick", action="store_true", help="small meshes, few steps, no summary")
     parser.add_argument("--only", metavar="LIST", help="names of cases, with commas")
     arguments = parser.parse_args(argv)
     names = [call.name for call in CALLS] + ["dense"]
@@ -40,8 +40,9 @@ def main(argv: Sequence[str]) -> int:
     if "dense" in wanted:
         _say("\n== dense: Figures 5.19 to 5.23")
         dense(arguments.output / "dense", 60 if arguments.quick else 200)
-    for path in write_summary(arguments.output):
-        _say(str(path))
+    if not arguments.quick:  # what is published is of the full cases
+        for path in write_summary(arguments.output):
+            _say(str(path))
     _say(f"{time.perf_counter() - begin:.0f} s")
     if failed:
         _say(f"failed: {', '.join(failed)}")
