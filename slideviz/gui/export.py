@@ -5,15 +5,18 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from qtpy.QtCore import QObject
+from qtpy.QtCore import QObject, Qt
+from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
 from slideviz.gui.export_film import FilmDialog
-from slideviz.gui.export_picture import LETTERS, PictureDialog, copy_image, to_image
+from slideviz.gui.export_picture import LETTERS, PictureDialog
+from slideviz.gui.pixmaps import copy_image, to_image
 from slideviz.view import changes, jobs_export
-from slideviz.view.figure import Figure, Studio, sees_all
+from slideviz.view.figure import Figure
 from slideviz.view.figure_vector import MOST_CELLS, SUFFIXES, write_vector
+from slideviz.view.studio import Studio, sees_all
 
 log = logging.getLogger("slideviz")
 COPIED_WIDTH = 1600
@@ -34,7 +37,12 @@ class Exports(QObject):
 
     def _studio(self) -> Studio:
         viewing = self.window.viewing
-        return Studio(self._session, viewing.surfaces, viewing.scene)
+        # A large mesh takes a second or two.
+        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+        try:
+            return Studio(self._session, viewing.surfaces, viewing.scene)
+        finally:
+            QApplication.restoreOverrideCursor()
 
     # Pictures --------------------------------------------------------------------------
 

@@ -8,40 +8,23 @@ from typing import Any
 
 from qtpy.QtCore import QSize, Qt, QTimer, Signal
 from qtpy.QtWidgets import (
-    QCheckBox,
     QDialog,
     QDialogButtonBox,
-    QDoubleSpinBox,
-    QFormLayout,
     QHBoxLayout,
     QLabel,
     QProgressBar,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
-from slideviz.errors import SlidevizError
-from slideviz.gui.export_picture import doubled, fitted, framed, to_image
-from slideviz.gui.fields import Choice
+from slideviz.gui.film_form import FilmForm
+from slideviz.gui.pixmaps import drawn_for, fitted, framed, to_image
 from slideviz.view import changes
-from slideviz.view.figure import Figure, Studio, sees_all
+from slideviz.view.figure import Figure
 from slideviz.view.film import Drawn, film_of
-from slideviz.view.offscreen import LARGEST, SMALLEST
-from slideviz.view.reel import FPS, SIZES, Reel, check_film
+from slideviz.view.studio import Studio
 
 PREVIEW = (360, 225)
-KINDS = {
-    ".mp4": "MP4, small and plays everywhere",
-    ".gif": "GIF, for slides and web pages",
-    "": "one PNG picture for each image",
-}
-SIZE_WORDS = {
-    "800x500": "800 × 500",
-    "1280x800": "1280 × 800",
-    "1920x1080": "1920 × 1080",
-    "other": "other",
-}
 
 
 class FilmDialog(QDialog):
@@ -53,7 +36,7 @@ class FilmDialog(QDialog):
     studio : Studio
         Knows the session, whose steps are filmed whatever the window shows meanwhile.
     ask : callable
-        Returns the file for a kind of `KINDS`, or None.
+        Returns the file for a kind of `slideviz.gui.film_form.KINDS`, or None.
 
     Signals
     -------
@@ -72,10 +55,11 @@ class FilmDialog(QDialog):
         self._ask = ask
         self._film: Generator[Drawn, None, None] | None = None
         self._file: Path | None = None
-        self.frames = len(studio.session.frames)
+        self.form = FilmForm(studio)
+        self.form.changed.connect(self._changed)
         outer = QVBoxLayout(self)
         outer.addLayout(self._make_previews())
-        outer.addWidget(self._make_form())
+        outer.addWidget(self.form)
         self.words = QLabel()
         self.words.setWordWrap(True)
         outer.addWidget(self.words)
@@ -87,7 +71,7 @@ class FilmDialog(QDialog):
         self._soon.setSingleShot(True)
         self._soon.setInterval(120)
         self._soon.timeout.connect(self._draw)
-        self._kind_chosen(self.kind.currentData())
+        self._changed()
         self._show_filming(False)
 
     # Parts -----------------------------------------------------------------------------
@@ -107,58 +91,6 @@ class FilmDialog(QDialog):
             row.addLayout(column)
         return row
 
-    def _make_form(self) -> QWidget:
-        self.form = QWidget()
-        form = QFormLayout(self.form)
-        form.setContentsMargins(0, 0, 0, 0)
-        self.kind, self.size_choice = Choice(KINDS), Choice(SIZE_WORDS)
-        self.kind.chosen.connect(self._kind_chosen)
-        self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = QSpinBox(), QSpinBox()
-        pixels = QHBoxLayout()
-        for box in (self.width_px, self.height_px):
-            box.setRange(SMALLEST, LARGEST)
-            box.setSuffix(" px")
-            box.valueChanged.connect(self._pixels_typed)
-            pixels.addWidget(box)
-        self.fps, self.hold = QDoubleSpinBox(), QDoubleSpinBox()
-        self.between = QSpinBox()
-        for box, low, high, value, unit in (
-            (self.fps, 0.5, 50.0, FPS, " a second"),
-            (self.hold, 0.0, 60.0, Reel().hold, " s"),
-        ):
-            box.setRange(low, high)
-            box.setDecimals(1)
-            box.setSuffix(unit)
-            box.setValue(value)
-            box.valueChanged.connect(self._changed)
-        self.between.setRange(0, 100)
-        # Few steps jump; images in between make about three seconds of them.
-        self.between.setValue(0 if self.frames > 15 else round(3 * FPS / self.frames) - 1)
-        self.between.valueChanged.connect(self._changed)
-        self.fps.setToolTip("Images shown in a second.")
-        self.hold.setToolTip("How long the last image stays before the film ends or begins again.")
-        self.between.setToolTip(
-            "Images between two steps, with the nodes on straight lines from one to the next."
-        )
-        self.white = QCheckBox("White background")
-        self.white.setToolTip("Else the background of the view.")
-        self.white.setChecked(True)
-        self.fill = QCheckBox("Fill the images with the mesh")
-        self.fill.setToolTip("Else they show what the view shows of the mesh.")
-        like = self.studio.like
-        self.fill.setChecked(like is None or sees_all(like))
-        form.addRow("Kind", self.kind)
-        form.addRow("Size", self.size_choice)
-        form.addRow("", pixels)
-        form.addRow("Images", self.fps)
-        form.addRow("Between two steps", self.between)
-        form.addRow("Last image stays", self.hold)
-        for option in (self.white, self.fill):
-            option.toggled.connect(self._changed)
-            form.addRow("", option)
-        return self.form
-
     def _make_buttons(self) -> QDialogButtonBox:
         buttons = QDialogButtonBox()
         self.make = buttons.addButton("Make film…", QDialogButtonBox.ButtonRole.AcceptRole)
@@ -170,64 +102,9 @@ class FilmDialog(QDialog):
         buttons.rejected.connect(self.reject)
         return buttons
 
-    # What was chosen -------------------------------------------------------------------
-
-    @property
-    def reel(self) -> Reel:
-        """Return how the film is made."""
-        size = self.width_px.value(), self.height_px.value()
-        return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
-
-    @property
-    def figure(self) -> Figure:
-        """Return what its images have."""
-        size = self.width_px.value(), self.height_px.value()
-        view = self.studio.session.view
-        return Figure(
-            size,
-            "white" if self.white.isChecked() else "shown",
-            legend=view.legend,
-            edges=view.edges,
-            triad=view.triad,
-            title=True,
-            fill=self.fill.isChecked(),
-            both=False,
-            letters=1.0,
-        )
-
-    def _kind_chosen(self, kind: str) -> None:
-        width, height = SIZES[kind or ".png"]
-        name = f"{width}x{height}"
-        self.size_choice.show_value(name if name in SIZE_WORDS else "1280x800")
-        self.fps.setEnabled(bool(kind))
-        self.hold.setEnabled(bool(kind))
-        self._size_chosen(self.size_choice.currentData())
-
-    def _size_chosen(self, name: str) -> None:
-        if "x" in name:
-            for box, length in zip((self.width_px, self.height_px), name.split("x"), strict=True):
-                box.blockSignals(True)
-                box.setValue(int(length))
-                box.blockSignals(False)
-        self._changed()
-
-    def _pixels_typed(self) -> None:
-        self.size_choice.show_value("other")
-        self._changed()
-
-    def problem(self) -> str:
-        """Return why no film can be made like that; empty when it can."""
-        kind = self.kind.currentData()
-        try:
-            # Any name in a folder that is there; the real one is asked for later.
-            check_film(Path(f"film{kind}").absolute(), self.reel, overwrite=True)
-        except SlidevizError as error:
-            return str(error)
-        return ""
-
-    def _changed(self, _: object = None) -> None:
-        problem = self.problem()
-        self.words.setText(problem or length_words(self.reel, self.frames, self.kind.currentData()))
+    def _changed(self) -> None:
+        problem = self.form.problem()
+        self.words.setText(problem or self.form.words)
         self.words.setProperty("bad", bool(problem))
         self.words.style().polish(self.words)
         self.make.setEnabled(not problem)
@@ -237,9 +114,10 @@ class FilmDialog(QDialog):
         """Draw the first and the last image, from one place."""
         if self._film is not None:
             return
-        figure, whole = self.figure.within(doubled(PREVIEW)), self.studio.session
+        whole = self.studio.session
+        figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
         self._pose(figure)
-        for label, frame in zip(self.previews, (0, self.frames - 1), strict=True):
+        for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
             self.studio.session = changes.show_frame(whole, frame)
             image = to_image(self.studio.image(figure, aim=False))
             label.setPixmap(framed(fitted(image, PREVIEW)))
@@ -248,7 +126,7 @@ class FilmDialog(QDialog):
     def _pose(self, figure: Figure) -> Any:
         """Return the scene as the film sees it: the step that needs most room is seen whole."""
         whole = self.studio.session
-        widest = max(range(self.frames), key=lambda k: whole.frames[k].mesh.extent)
+        widest = max(range(self.form.frames), key=lambda k: whole.frames[k].mesh.extent)
         self.studio.session = changes.show_frame(whole, widest)
         scene = self.studio.pose(figure)
         self.studio.session = whole
@@ -262,17 +140,17 @@ class FilmDialog(QDialog):
         return self._film is not None
 
     def _start(self) -> None:
-        file = self._ask(self.kind.currentData())
+        file = self._ask(self.form.kind.currentData())
         if file is None:
             return
-        figure, whole = self.figure, self.studio.session
+        figure, whole = self.form.figure, self.studio.session
         scene = self._pose(figure)
         self._file = file
         self._film = film_of(
             figure.showing(whole),
             self.studio.surfaces,
             file,
-            self.reel,
+            self.form.reel,
             like=scene,
             overwrite=True,
         )
@@ -288,7 +166,8 @@ class FilmDialog(QDialog):
             self._end()
             self.made.emit(self._file)
             self.accept()
-        except (SlidevizError, OSError) as error:
+        except Exception as error:
+            # Whatever it is: a generator that raised would look like one that is done.
             self._end()
             self.failed.emit(error)
         else:
@@ -323,16 +202,3 @@ class FilmDialog(QDialog):
         self._soon.stop()
         super().done(result)
         self.studio.close()
-
-
-def length_words(reel: Reel, frames: int, kind: str) -> str:
-    """Return in words how many images a film has, and how long it is."""
-    count = reel.count(frames)
-    steps = f"{frames - 1} step{'s' if frames > 2 else ''}"
-    between = f", {reel.between} image{'s' if reel.between > 1 else ''} between two"
-    text = f"{count} images: the undeformed mesh and {steps}{between if reel.between else ''}"
-    if not kind:
-        return f"{text}; each in a file of its own."
-    pace = reel.pace(frames)
-    seconds = (count - 1) / pace + max(reel.hold, 1.0 / pace)
-    return f"{text}. The film lasts {seconds:.1f} s."

@@ -6,7 +6,6 @@ import json
 from dataclasses import asdict, replace
 
 from qtpy.QtCore import QSize, Qt, QTimer
-from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
 from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -21,9 +20,11 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.fields import Choice
-from slideviz.view.figure import BACKGROUNDS, Figure, Studio, words_of_size
+from slideviz.gui.pixmaps import copy_image, drawn_for, fitted, framed, to_image
+from slideviz.view.figure import BACKGROUNDS, Figure, words_of_size
 from slideviz.view.figure_vector import MOST_CELLS
 from slideviz.view.offscreen import LARGEST, SMALLEST, font_scale
+from slideviz.view.studio import Studio, sees_all
 
 PREVIEW = (470, 330)
 PREVIEW_MS = 120
@@ -199,8 +200,6 @@ class PictureDialog(QDialog):
 
     def _take(self, kept: str) -> None:
         """Show what was chosen the last time, or what makes a good figure."""
-        from slideviz.view.figure import sees_all
-
         like = self.studio.like
         usual = replace(Figure(), fill=like is None or sees_all(like))
         known = asdict(usual)
@@ -257,7 +256,7 @@ class PictureDialog(QDialog):
     # Picture ---------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        image = to_image(self.studio.image(self.figure.within(doubled(PREVIEW))))
+        image = to_image(self.studio.image(self.figure.within(drawn_for(self.studio, PREVIEW))))
         self.preview.setPixmap(framed(fitted(image, PREVIEW)))
 
     def _copy(self) -> None:
@@ -292,44 +291,3 @@ def _kinds(studio: Studio) -> str:
         "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
         "boundaries, without points, sections, neighbouring passages and axes."
     )
-
-
-def to_image(pixels) -> QImage:
-    """Return an image (height, width, 3 or 4) as Qt's, with memory of its own."""
-    height, width, depth = pixels.shape
-    kind = QImage.Format.Format_RGBA8888 if depth == 4 else QImage.Format.Format_RGB888
-    return QImage(pixels.tobytes(), width, height, depth * width, kind).copy()
-
-
-def doubled(box: tuple[int, int]) -> tuple[int, int]:
-    """Return twice a size: lines are a pixel wide at least, and a preview would be all lines."""
-    return 2 * box[0], 2 * box[1]
-
-
-def fitted(image: QImage, box: tuple[int, int]) -> QImage:
-    """Return an image as large as it can be in a box."""
-    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-    return image.scaled(QSize(*box), keep, smooth)
-
-
-def framed(image: QImage) -> QPixmap:
-    """Return an image with a thin frame; what is transparent is seen as a chequerboard."""
-    out = QPixmap(image.width() + 2, image.height() + 2)
-    out.fill(QColor("#ffffff"))
-    painter = QPainter(out)
-    if image.hasAlphaChannel():
-        for x in range(0, out.width(), 10):
-            for y in range((x // 10) % 2 * 10, out.height(), 20):
-                painter.fillRect(x, y, 10, 10, QColor("#d5d9de"))
-    painter.drawImage(1, 1, image)
-    painter.setPen(QColor("#9aa3ad"))
-    painter.drawRect(0, 0, out.width() - 1, out.height() - 1)
-    painter.end()
-    return out
-
-
-def copy_image(image: QImage) -> None:
-    """Put an image on the clipboard."""
-    from qtpy.QtWidgets import QApplication
-
-    QApplication.clipboard().setImage(image)

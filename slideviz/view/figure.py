@@ -1,38 +1,14 @@
-"""Pictures for papers and slides of what a view shows: what is in them, and who draws them."""
+"""What a picture of a view has: size, background, legend, title; for papers and slides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from io import BytesIO
-from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-import numpy as np
-
-from slideviz.mesh.atomic import atomic_write
-from slideviz.view.changes import seen_beside
 from slideviz.view.legend import STRIP
-from slideviz.view.look import PAPER, Look
-from slideviz.view.offscreen import (
-    SMALLEST,
-    TITLE,
-    check_png,
-    check_size,
-    font_scale,
-    image_of,
-    offscreen,
-    write_title,
-)
+from slideviz.view.offscreen import SMALLEST, font_scale
 from slideviz.view.portrait import caption
 from slideviz.view.state import Frame, Session
-from slideviz.view.surfaces import Surface
-
-if TYPE_CHECKING:
-    from slideviz.view.encode import Pixels
-    from slideviz.view.scene import Scene
 
 Background = Literal["white", "shown", "transparent"]
 BACKGROUNDS: dict[Background, str] = {
@@ -110,167 +86,6 @@ class Figure:
         return replace(session, view=view)
 
 
-class Studio:
-    """Draws pictures of a session off-screen, one after the other, into memory or a file.
-
-    Parameters
-    ----------
-    session : Session
-        What is shown and how.
-    surfaces : sequence of Surface
-        The boundaries of its mesh.
-    like : Scene, optional
-        The view whose camera, colours and ghosts are taken.
-    """
-
-    def __init__(
-        self, session: Session, surfaces: Sequence[Surface], like: Scene | None = None
-    ) -> None:
-        from slideviz.view.scene import Scene
-
-        self.session = session
-        self.surfaces = surfaces
-        self.like = like
-        self._stack = ExitStack()
-        self._plotter = self._stack.enter_context(offscreen((640, 400)))
-        self._scene = Scene(self._plotter, PAPER)
-        self._scene.open(Figure().showing(session), surfaces)
-        if like is not None:
-            self._scene.set_motion_ghosts(like.motion_ghosts)
-
-    def __enter__(self) -> Studio:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give the graphics back."""
-        self._stack.close()
-
-    @property
-    def beside(self) -> Session | None:
-        """Return the session that the second view shows, if there is one."""
-        other = self.session.view.beside
-        if other is None or (other and self.session.run(other) is None):
-            return None
-        return seen_beside(self.session)
-
-    def image(self, figure: Figure, aim: bool = True) -> Pixels:
-        """Return the picture, (height, width, 3), or 4 when it is transparent.
-
-        Without ``aim`` the camera stays where it was for the last picture.
-
-        Raises
-        ------
-        SlidevizError
-            The size cannot be drawn.
-        """
-        check_size(figure.size)
-        other = self.beside if figure.both else None
-        if other is None:
-            return self._pane(self.session, figure, aim)
-        gap = max(round(GAP * figure.scale), 1)
-        first, second = panes(figure, gap)
-        left = self._pane(self.session, first, aim)
-        # The same camera, so that a length is as long in both.
-        right = self._pane(other, second, aim=False)
-        between = np.repeat(left[:, -1:], gap, axis=1)
-        return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
-
-    def pose(self, figure: Figure) -> Scene:
-        """Return the scene, its camera and colours as for a picture; for a film like it."""
-        self._prepare(self.session, figure)
-        return self._scene
-
-    def window(self, figure: Figure) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return from where to where a picture of a 2D mesh reaches in x and in y."""
-        self._prepare(self.session, figure)
-        camera, (width, height) = self._plotter.camera, figure.size
-        unit = 2.0 * camera.parallel_scale / height
-        found = []
-        for centre, length, shift in zip(
-            camera.focal_point[:2], (width, height), camera.GetWindowCenter(), strict=True
-        ):
-            low = centre - 0.5 * length * (1.0 - shift) * unit
-            found.append((float(low), float(low + length * unit)))
-        return found[0], found[1]
-
-    def write(self, figure: Figure, file: Path) -> None:
-        """Write the picture as a PNG file, whole or not at all.
-
-        Raises
-        ------
-        SlidevizError
-            The size cannot be drawn, the name does not end with .png, or the file cannot be
-            written.
-        """
-        from PIL import Image
-
-        check_png(file)
-        data = BytesIO()
-        known = {} if figure.dpi is None else {"dpi": (figure.dpi, figure.dpi)}
-        Image.fromarray(self.image(figure)).save(data, format="PNG", **known)
-        with atomic_write(file) as out:
-            out.write(data.getvalue())
-
-    def _pane(self, session: Session, figure: Figure, aim: bool = True) -> Pixels:
-        self._prepare(session, figure, aim)
-        plotter = self._plotter
-        plotter.remove_actor("title", reset_camera=False, render=False)
-        if figure.title and session.frame is not None:
-            write_title(plotter, title_of(session, figure), self._scene.look)
-            # Of the same size as the other letters, whatever a film has.
-            title = plotter.actors["title"]
-            title.prop.SetFontSize(round(TITLE * figure.scale))
-            high = 1.0 - 0.5 * TITLE_ROOM * figure.scale / figure.size[1]
-            title.GetPositionCoordinate().SetValue(0.5, high)
-        return image_of(plotter, figure.background == "transparent")
-
-    def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
-        plotter, scene = self._plotter, self._scene
-        plotter.window_size = list(figure.size)
-        scene.stage.font_scale = figure.scale
-        scene.stage.has_legend = figure.legend
-        scene.update(figure.showing(session))
-        scene.set_look(self._look(figure))
-        if figure.background == "transparent":
-            plotter.set_background("white")  # a gradient would stay opaque
-        if aim:
-            self._aim(figure)
-        self._keep_room(figure)
-
-    def _look(self, figure: Figure) -> Look:
-        return self.like.look if figure.background == "shown" and self.like is not None else PAPER
-
-    def _aim(self, figure: Figure) -> None:
-        """Look from where the view looks."""
-        scene, camera = self._scene, self._plotter.camera
-        if self.like is not None:
-            scene.take_camera(self.like)
-        if figure.fill:
-            scene.fit()
-        elif self.like is not None:
-            _keep_width(scene, self.like)
-        if camera.parallel_projection:
-            camera.parallel_scale = camera.parallel_scale / (1.0 - self._top(figure))
-
-    def _top(self, figure: Figure) -> float:
-        """Return which part of the height is the title's."""
-        return min(TITLE_ROOM * figure.scale / figure.size[1], 0.3) if figure.title else 0.0
-
-    def _keep_room(self, figure: Figure) -> None:
-        """Keep the rooms of legend and title free of the mesh."""
-        right = self._scene.stage.strip() / figure.size[0]
-        self._plotter.camera.SetWindowCenter(right, self._top(figure))
-        self._plotter.renderer.ResetCameraClippingRange()
-
-
 def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     """Return the two pictures beside each other that a picture of two runs is made of.
 
@@ -283,36 +98,6 @@ def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     # Letters go by the height, which is that of the whole.
     left, right = (replace(figure, size=size) for size in sizes)
     return replace(left, legend=False), right
-
-
-def _keep_width(scene: Scene, like: Scene) -> None:
-    """See as much of the width as another view does, in a picture that is less wide."""
-    free = []
-    for one in (scene, like):
-        width, height = one.plotter.window_size
-        free.append(max(width - one.stage.strip(), 1.0) / max(height, 1))
-    if scene.plotter.camera.parallel_projection and free[0] < free[1]:
-        scene.plotter.camera.parallel_scale *= free[1] / free[0]
-
-
-def sees_all(scene: Scene) -> bool:
-    """Tell whether the whole mesh is in a view, so that a picture of it may show it larger."""
-    mesh, plotter = scene.session.mesh, scene.plotter
-    if mesh is None:
-        return True
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    box = np.zeros((2, 3))
-    box[0, : mesh.dim], box[1, : mesh.dim] = low, high
-    renderer = plotter.renderer
-    for corner in np.ndindex(2, 2, 2):
-        place = [*box[corner, range(3)], 1.0]
-        renderer.SetWorldPoint(*place)
-        renderer.WorldToDisplay()
-        x, y, _ = renderer.GetDisplayPoint()
-        width, height = plotter.window_size
-        if not (-0.02 * width <= x <= 1.02 * width and -0.02 * height <= y <= 1.02 * height):
-            return False
-    return True
 
 
 def title_of(session: Session, figure: Figure) -> str:

@@ -13,12 +13,13 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED
-from slideviz.view.figure import GAP, Figure, Studio, panes, title_of
+from slideviz.view.figure import GAP, Figure, panes, title_of
 from slideviz.view.inspect import chosen_cells
 from slideviz.view.legend import STRIP
 from slideviz.view.look import INVERTED_COLOUR, PAPER, ROLE_COLOURS
 from slideviz.view.offscreen import TITLE
 from slideviz.view.state import COLOUR_BY, Session
+from slideviz.view.studio import Studio
 
 SUFFIXES = (".svg", ".pdf")
 MOST_CELLS = 100_000

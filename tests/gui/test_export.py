@@ -14,12 +14,15 @@ from qtpy.QtWidgets import QApplication, QDialog
 from slideviz import read
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs, export
-from slideviz.gui.export_film import FilmDialog, length_words
-from slideviz.gui.export_picture import PictureDialog, fitted, framed, to_image
+from slideviz.gui.export_film import FilmDialog
+from slideviz.gui.export_picture import PictureDialog
+from slideviz.gui.film_form import length_words
+from slideviz.gui.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
 from slideviz.view import changes, jobs, jobs_export
-from slideviz.view.figure import Figure, Studio
+from slideviz.view.figure import Figure
 from slideviz.view.reel import Reel
+from slideviz.view.studio import Studio
 
 
 @pytest.fixture
@@ -236,9 +239,9 @@ def test_pictures_become_qt_images_as_they_are():
 def film(ran):
     ran.window.exports.make_film()
     dialog = ran.window.exports.film
-    dialog.between.setValue(0)
-    dialog.width_px.setValue(320)
-    dialog.height_px.setValue(200)
+    dialog.form.between.setValue(0)
+    dialog.form.width_px.setValue(320)
+    dialog.form.height_px.setValue(200)
     return dialog
 
 
@@ -252,10 +255,10 @@ def test_a_film_needs_steps_and_the_menu_says_so(opened):
 
 def test_a_film_is_made_while_the_window_goes_on(ran, film, answers, tmp_path, qtbot):
     answers("ask_save", tmp_path / "out.gif")
-    film.kind.show_value(".gif")
-    film._kind_chosen(".gif")
-    film.width_px.setValue(320)
-    film.height_px.setValue(200)
+    film.form.kind.show_value(".gif")
+    film.form._kind_chosen(".gif")
+    film.form.width_px.setValue(320)
+    film.form.height_px.setValue(200)
     turns = []
     timer = QTimer()
     timer.timeout.connect(lambda: turns.append(film.bar.value()))
@@ -276,9 +279,9 @@ def test_a_film_is_made_while_the_window_goes_on(ran, film, answers, tmp_path, q
 def test_pictures_of_a_film_get_a_new_folder(ran, film, answers, tmp_path, qtbot):
     (tmp_path / "passage_steps").mkdir()
     answers("ask_folder", tmp_path)
-    film.kind.show_value("")
-    film._kind_chosen("")
-    assert not film.fps.isEnabled()
+    film.form.kind.show_value("")
+    film.form._kind_chosen("")
+    assert not film.form.fps.isEnabled()
     with qtbot.waitSignal(film.made, timeout=30_000):
         film.make.click()
     assert len(list((tmp_path / "passage_steps_2").glob("*.png"))) == 3
@@ -287,8 +290,8 @@ def test_pictures_of_a_film_get_a_new_folder(ran, film, answers, tmp_path, qtbot
 
 def test_a_stopped_film_leaves_no_file(ran, film, answers, tmp_path, qtbot):
     answers("ask_save", tmp_path / "out.gif")
-    film.kind.show_value(".gif")
-    film.between.setValue(20)
+    film.form.kind.show_value(".gif")
+    film.form.between.setValue(20)
     film.make.click()
     qtbot.waitUntil(lambda: film.bar.value() >= 2)
     with qtbot.waitSignal(film.stopped):
@@ -303,8 +306,8 @@ def test_a_stopped_film_leaves_no_file(ran, film, answers, tmp_path, qtbot):
 def test_opening_or_closing_stops_a_film(ran, film, answers, tmp_path, passage_file, qtbot, how):
     answers("ask_unsaved", "discard")
     answers("ask_save", tmp_path / "out.gif")
-    film.kind.show_value(".gif")
-    film.between.setValue(20)
+    film.form.kind.show_value(".gif")
+    film.form.between.setValue(20)
     film.make.click()
     qtbot.waitUntil(lambda: film.bar.value() >= 1)
     if how == "open":
@@ -317,19 +320,33 @@ def test_opening_or_closing_stops_a_film(ran, film, answers, tmp_path, passage_f
 
 def test_a_film_that_fails_is_told(ran, film, answers, tmp_path, qtbot):
     answers("ask_save", tmp_path / "no" / "out.gif")
-    film.kind.show_value(".gif")
+    film.form.kind.show_value(".gif")
     with qtbot.waitSignal(film.failed, timeout=10_000):
         film.make.click()
     assert "folder" in ran.window.banner.text.text()
     assert not film.filming
 
 
+def test_an_error_nobody_expected_is_no_finished_film(ran, film, answers, tmp_path, qtbot):
+    answers("ask_save", tmp_path / "out.gif")
+    film.form.kind.show_value(".gif")
+    made = []
+    film.made.connect(made.append)
+    film.studio.surfaces = None
+    with qtbot.waitSignal(film.failed, timeout=10_000):
+        film.make.click()
+    qtbot.wait(50)
+    assert not made
+    assert not film.filming
+    assert ran.window.banner.isVisible()
+
+
 def test_what_cannot_be_filmed_is_said(film):
-    film.kind.show_value(".mp4")
-    film.width_px.setValue(321)
+    film.form.kind.show_value(".mp4")
+    film.form.width_px.setValue(321)
     assert "even" in film.words.text()
     assert not film.make.isEnabled()
-    film.width_px.setValue(320)
+    film.form.width_px.setValue(320)
     assert film.make.isEnabled()
     assert film.words.text().startswith("3 images: the undeformed mesh and 2 steps")
 

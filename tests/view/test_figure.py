@@ -10,11 +10,12 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
 from slideviz.view import changes, figure_vector, jobs_export
-from slideviz.view.figure import Figure, Studio, panes, sees_all, title_of, words_of_size
+from slideviz.view.figure import Figure, panes, title_of, words_of_size
 from slideviz.view.figure_vector import draw_vector, require_vector, write_vector
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.view.look import ROLE_COLOURS
 from slideviz.view.state import Frame
+from slideviz.view.studio import Studio, sees_all
 from slideviz.view.surfaces import find_surfaces
 
 PLAIN = Figure((400, 300), legend=False)
