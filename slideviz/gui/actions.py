@@ -85,6 +85,7 @@ class Actions:
     def _make_export(self, menu: QMenu) -> None:
         exports = self.window.exports
         self.export = self._menu(menu, "export", "&Export")
+        self.export.setToolTipsVisible(True)  # they say why something cannot be done
         for name, text, function, keys, image in (
             ("save_picture", "&Picture…", exports.picture, "Ctrl+P", "picture"),
             ("copy_picture", "&Copy picture", exports.copy_picture, "Ctrl+Shift+C", ""),

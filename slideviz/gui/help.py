@@ -209,13 +209,20 @@ def shortcut_rows(window) -> list[tuple[str, list[tuple[str, str, str]]]]:
     found = []
     for top in window.menuBar().actions():
         rows = [
-            (action.text().replace("&", "").rstrip("…"), _keys(action), action.statusTip())
+            (_name(action), _keys(action), action.statusTip())
             for action in _leaves(top.menu())
             if _keys(action)
         ]
         if rows:
             found.append((top.text().replace("&", ""), rows))
     return found
+
+
+def _name(action: QAction) -> str:
+    # That of undo and redo says what would be undone just now.
+    changing = action.objectName() in ("undo", "redo")
+    text = action.objectName().capitalize() if changing else action.text()
+    return text.replace("&", "").rstrip("…")
 
 
 def _keys(action: QAction) -> str:

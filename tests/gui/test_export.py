@@ -498,12 +498,15 @@ def test_every_action_says_in_a_sentence_what_it_does(opened):
 
 def test_shortcuts_are_those_of_the_actions_and_can_be_found(opened):
     window = opened.window
+    window.store.change(changes.set_case, steps=3)
+    assert window.actions_.by_name["undo"].text() != "Undo"
+    opened.activate()
     QTest.keyClick(window, Qt.Key.Key_F1)
     dialog = window.help._shown["shortcuts"]
     tops = [dialog.tree.topLevelItem(k) for k in range(dialog.tree.topLevelItemCount())]
     rows = [top.child(k) for top in tops for k in range(top.childCount())]
     said = {(row.text(0), row.text(1)) for row in rows}
-    assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C")} <= said
+    assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C"), ("Undo", "Ctrl+Z")} <= said
     keys = {row.text(1) for row in rows}
     assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
     dialog.find.setText("whole mesh fill")
