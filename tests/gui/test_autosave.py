@@ -242,24 +242,29 @@ def test_a_folder_that_cannot_be_written_is_logged_and_the_window_goes_on(
 
 
 KILLED = """
-import os, sys
+import os, sys, time
 from pathlib import Path
 from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QApplication
 from slideviz.gui.window import MainWindow
 from slideviz.view import changes
 
+import slideviz.staircase  # as `launch` does, before any thread
+
 app = QApplication([])
 folder = Path(sys.argv[1])
 settings = QSettings(str(folder.parent / "s.ini"), QSettings.Format.IniFormat)
 window = MainWindow(settings, 0, kept=folder)
+window.show()
 window.files.open_path(Path(sys.argv[2]))
 while window.store.session.mesh is None:
     app.processEvents()
+    time.sleep(0.002)
 window.store.change(changes.set_case, steps=11)
 window.autosave.save()
 while not window.autosave.path.exists():
     app.processEvents()
+    time.sleep(0.002)
 os.kill(os.getpid(), 9)
 """
 
