@@ -1,5 +1,7 @@
 """The dialog for pictures: what is in them, how large they are, and a preview of it."""
 
+# ruff: noqa: N802  (Qt's names)
+
 from __future__ import annotations
 
 import json
@@ -250,7 +252,7 @@ class PictureDialog(QDialog):
         self.words.style().polish(self.words)
         for button in (self.save, self.copy):
             button.setEnabled(not too_large)
-        if not too_large and hasattr(self, "_timer"):
+        if not too_large and self.isVisible():
             self._timer.start()
 
     # Picture ---------------------------------------------------------------------------
@@ -262,6 +264,11 @@ class PictureDialog(QDialog):
     def _copy(self) -> None:
         copy_image(to_image(self.studio.image(self.figure)))
         self.words.setText("Copied to the clipboard.")
+
+    def showEvent(self, event) -> None:
+        """Draw the first preview; nothing is drawn that nobody sees."""
+        super().showEvent(event)
+        self._changed()
 
     def done(self, result: int) -> None:
         """Close; nothing is drawn any more."""

@@ -96,6 +96,7 @@ def test_a_picture_that_cannot_be_written_is_told(opened, answers, tmp_path):
 def test_the_preview_follows_the_options(studio, qtbot):
     dialog = PictureDialog(None, studio)
     qtbot.addWidget(dialog)
+    dialog.show()
     qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
     white = dialog.preview.pixmap().toImage()
     assert white.width() <= dialog.preview.width()
@@ -103,6 +104,7 @@ def test_the_preview_follows_the_options(studio, qtbot):
     dialog.background.chosen.emit("transparent")
     qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != white)
     assert dialog.figure.background == "transparent"
+    dialog.reject()
 
 
 def test_sizes_in_pixels_and_on_paper(studio, qtbot):

@@ -522,7 +522,7 @@ def test_a_run_shows_its_steps_and_the_quality(ready):
     text = window.player.result.text()
     assert f"{quality.min:.4f}" in text
     assert f"{quality.mean:.4f}" in text
-    assert "inverted <b>0</b>" in text
+    assert "<b>0</b> inverted" in text
     assert window.windowTitle().startswith("*")
     assert list(window.scene.plotter.scalar_bars.keys()) == ["size-skew"]
 
@@ -644,7 +644,7 @@ def test_the_mesh_is_saved(ready, answers, tmp_path):
     asked = answers("ask_save", tmp_path / "out.su2")
     ready.window.actions_.by_name["save_mesh"].trigger()
     ready.settle()
-    assert asked[0][1].name == "mesh_deformed.su2"
+    assert asked[0][1].name == "passage_deformed.su2"
     saved = read(tmp_path / "out.su2")
     assert np.array_equal(saved.points, ready.session.deformed.mesh.points)
     assert not ready.session.unsaved_mesh
@@ -656,7 +656,7 @@ def test_the_step_that_is_shown_is_the_one_saved(ready, answers, tmp_path):
     asked = answers("ask_save", tmp_path / "out.vtu")
     ready.window.actions_.by_name["save_mesh"].trigger()
     ready.settle()
-    assert asked[0][1].name == "mesh_step1.su2"
+    assert asked[0][1].name == "passage_step1.su2"
     assert (tmp_path / "out.vtu").stat().st_size > 1000
     assert ready.session.unsaved_mesh, "the last step is not on disk"
 
