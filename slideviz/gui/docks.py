@@ -100,6 +100,10 @@ class Docks:
             dock.setMinimumWidth(LEFT_WIDTH if row.area == LEFT else RIGHT_WIDTH)
         if row.bare:
             dock.setTitleBarWidget(QWidget())
+            # Taken out of its place it needs a title to be held by.
+            dock.topLevelChanged.connect(
+                lambda floats: dock.setTitleBarWidget(None if floats else QWidget())
+            )
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 

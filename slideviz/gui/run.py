@@ -5,7 +5,15 @@ from __future__ import annotations
 import html
 
 from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from slideviz.gui.icons import icon
 from slideviz.view.changes import is_missing
@@ -45,6 +53,8 @@ class RunPanel(QWidget):
         self.text = QLabel()
         self.text.setWordWrap(True)
         self.text.setMinimumHeight(34)
+        # A long sentence wraps; it must not make all panels on this side wider.
+        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.setTextFormat(Qt.TextFormat.RichText)
         self.text.linkActivated.connect(self.place_wanted)
         row.addWidget(self.run)
