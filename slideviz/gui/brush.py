@@ -28,8 +28,8 @@ class BrushCanvas(PlotCanvas):
 
     brushed = Signal(object)
 
-    def __init__(self, draw_on) -> None:
-        super().__init__(draw_on)
+    def __init__(self, drawing) -> None:
+        super().__init__(drawing)
         self.band: Range | None = None
         self._held: float | None = None
         self._moved = False
@@ -38,16 +38,11 @@ class BrushCanvas(PlotCanvas):
 
     def value_at(self, x_px: float) -> float:
         """Return the value under a position of the mouse, within the axis."""
-        axes = self.figure.axes[0]
-        ratio = self.devicePixelRatioF()
-        value = axes.transData.inverted().transform((x_px * ratio, 0.0))[0]
-        return float(np.clip(value, *axes.get_xlim()))
+        return float(np.clip(self.to_value(x_px), *self.figure.axes[0].get_xlim()))
 
     def pixel_of(self, value: float) -> float:
         """Return where a value is, in pixels of the widget."""
-        axes = self.figure.axes[0]
-        value = float(np.clip(value, *axes.get_xlim()))
-        return float(axes.transData.transform((value, 1.0))[0] / self.devicePixelRatioF())
+        return self.to_pixel(float(np.clip(value, *self.figure.axes[0].get_xlim())))
 
     def show_band(self, band: Range | None) -> None:
         """Show a range."""
@@ -96,9 +91,7 @@ class BrushCanvas(PlotCanvas):
         if self.band is None or not self.figure.axes:
             return
         left, right = (self.pixel_of(value) for value in self.band)
-        box = self.figure.axes[0].get_window_extent()
-        ratio = self.devicePixelRatioF()
-        top, height = self.height() - box.y1 / ratio, box.height / ratio
+        top, height = self.axes_rows()
         painter = QPainter(self)
         colour = QColor(SELECTED_COLOUR)
         painter.setPen(QPen(colour, 2))

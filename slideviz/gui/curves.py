@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
@@ -17,6 +19,7 @@ from slideviz.gui.plot_canvas import (
     folder_of,
     write_plot,
 )
+from slideviz.gui.plot_image import Draw
 from slideviz.view import changes, curves
 from slideviz.view.look import SELECTED_COLOUR
 from slideviz.view.plots import convergence, quality_by_step
@@ -41,16 +44,14 @@ WHAT = {"minimum": "minimum", "mean": "mean"}
 class CurveCanvas(PlotCanvas):
     """A plot that tells the value of the horizontal axis where it is clicked."""
 
-    def __init__(self, draw_on) -> None:
-        super().__init__(draw_on)
+    def __init__(self, drawing) -> None:
+        super().__init__(drawing)
         self.picked = lambda _value: None
 
     def mouseReleaseEvent(self, event) -> None:
         if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
             return
-        axes = self.figure.axes[0]
-        x = event.position().x() * self.devicePixelRatioF()
-        self.picked(float(axes.transData.inverted().transform((x, 0.0))[0]))
+        self.picked(self.to_value(event.position().x()))
 
 
 class CurvesPanel(QWidget):
@@ -61,7 +62,7 @@ class CurvesPanel(QWidget):
         self.store = store
         self._profiles = curves.Profiles()
         self._mesh: object = None
-        self.area = PlotArea(self.draw_on, CurveCanvas)
+        self.area = PlotArea(self.drawing, CurveCanvas)
         self.canvas: CurveCanvas = self.area.canvas
         self.canvas.picked = self._picked
         column = QVBoxLayout(self)
@@ -154,41 +155,15 @@ class CurvesPanel(QWidget):
 
     # Drawing ---------------------------------------------------------------------------
 
-    def draw_on(self, figure, style) -> None:
-        """Draw the plot that is chosen."""
+    def drawing(self) -> Draw:
+        """Return what draws the plot that is chosen."""
         session, kind = self.store.session, self.kind.currentData()
-        if not self._missing(session, kind):
-            {"steps": self._draw_steps, "greedy": self._draw_greedy, "span": self._draw_span}[kind](
-                figure.add_subplot(), session, style
-            )
-
-    @staticmethod
-    def _draw_steps(axes, session: Session, style) -> None:
-        quality_by_step(axes, curves.step_runs(session), style)
-        at = session.view.frame
-        axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
-        last = max(len(run.frames) for run in session.runs)
-        axes.set_xlim(-0.03 * last, 1.03 * last)
-
-    @staticmethod
-    def _draw_greedy(axes, session: Session, style) -> None:
-        run = curves.greedy_run(session)
-        convergence(axes, [run], style=style)
-        axes.set_title(run.label, fontsize=style.size, color=style.look.text)
-
-    def _draw_span(self, axes, session: Session, style) -> None:
-        try:
-            profiles = self._profiles.of(session, self.coordinate.currentData())
-        except SlidevizError as error:
-            axes.set_axis_off()
-            figure = axes.get_figure()
-            figure.text(
-                0.5, 0.5, str(error), ha="center", va="center", wrap=True,
-                fontsize=style.size, color=style.look.text,
-            )  # fmt: skip
-            return
-        spanwise(axes, profiles, self.what.currentData(), style=style)
-        add_legend(axes, style, loc="best")
+        if self._missing(session, kind):
+            return lambda _figure, _style: None
+        if kind == "span":
+            along = self.coordinate.currentData(), self.what.currentData()
+            return partial(draw_span, self._profiles, session, along)
+        return partial({"steps": draw_steps, "greedy": draw_greedy}[kind], session)
 
     # What the user does ----------------------------------------------------------------
 
@@ -200,5 +175,40 @@ class CurvesPanel(QWidget):
     def _save(self) -> None:
         default = folder_of(self) / f"{self.kind.currentText().lower().replace(' ', '_')}.png"
         ask_and_write(
-            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.draw_on)
+            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
         )
+
+
+def draw_steps(session: Session, figure, style) -> None:
+    """Draw minimum and mean quality of each run against the step."""
+    axes = figure.add_subplot()
+    quality_by_step(axes, curves.step_runs(session), style)
+    at = session.view.frame
+    axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
+    last = max(len(run.frames) for run in session.runs)
+    axes.set_xlim(-0.03 * last, 1.03 * last)
+
+
+def draw_greedy(session: Session, figure, style) -> None:
+    """Draw how the error of the step that is shown fell."""
+    axes, run = figure.add_subplot(), curves.greedy_run(session)
+    convergence(axes, [run], style=style)
+    axes.set_title(run.label, fontsize=style.size, color=style.look.text)
+
+
+def draw_span(
+    profiles: curves.Profiles, session: Session, along: tuple[str, str], figure, style
+) -> None:
+    """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
+    axes, (coordinate, what) = figure.add_subplot(), along
+    try:
+        found = profiles.of(session, coordinate)
+    except SlidevizError as error:
+        axes.set_axis_off()
+        figure.text(
+            0.5, 0.5, str(error), ha="center", va="center", wrap=True,
+            fontsize=style.size, color=style.look.text,
+        )  # fmt: skip
+        return
+    spanwise(axes, found, what, style=style)
+    add_legend(axes, style, loc="best")

@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from qtpy.QtCore import Qt, QTimer
 from qtpy.QtGui import QKeySequence, QShortcut
@@ -18,6 +22,7 @@ from slideviz.gui.plot_canvas import (
     is_seen,
     write_plot,
 )
+from slideviz.gui.plot_image import Draw
 from slideviz.view import changes
 from slideviz.view.actors import shown_values
 from slideviz.view.curves import look_of
@@ -33,10 +38,10 @@ class HistogramPanel(QWidget):
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.store = store
-        self._kept: dict[tuple[int, str, Range], tuple[Frame, Distribution]] = {}
+        self._counts = Counts()
         self._wanted: Range | None = None
         self._told: Frame | None = None
-        self.area = PlotArea(self.draw_on, BrushCanvas)
+        self.area = PlotArea(self.drawing, BrushCanvas)
         self.canvas: BrushCanvas = self.area.canvas
         self.canvas.brushed.connect(self._brushed)
         self.numbers = QLabel()
@@ -104,7 +109,7 @@ class HistogramPanel(QWidget):
         if not self._soon.isActive():
             self.canvas.show_band(session.view.threshold)
         if session.frame is None:
-            self._kept.clear()
+            self._counts = Counts()
             self.range_text.hide()
             self.area.say("Open a mesh first: here is how many of its cells have which quality.")
             return
@@ -149,46 +154,10 @@ class HistogramPanel(QWidget):
 
     # Drawing ---------------------------------------------------------------------------
 
-    def draw_on(self, figure, style) -> None:
-        """Draw the histogram of what is shown now."""
-        session = self.store.session
-        if session.frame is None:
-            return
-        what = shown_measure(session)
-        limits = session.colour_range if what == "displacement" else (0.0, 1.0)
-        shown = self._distribution(session, session.frame, limits)
-        label = "undeformed" if session.view.frame == 0 else f"run {session.shown}"
-        words = label, "displacement [mesh unit]" if what == "displacement" else _words(what)
-        table = _colours(session, shown)
-        axes = figure.add_subplot()
-        outlines = self._outlines(session, limits)
-        draw_distribution(axes, shown, outlines, words, table, self.log.isChecked(), style)
-
-    def _outlines(self, session: Session, limits: Range) -> list[Outline]:
-        found = []
-        if session.view.frame > 0 and shown_measure(session) != "displacement":
-            first = self._distribution(session, session.first, limits)
-            found.append(Outline("undeformed", first, None))
-        for run in session.runs:
-            if run.last is None or run.last is session.frame:
-                continue
-            if run.number == session.shown:
-                continue  # its own last step is what is played to
-            last = self._distribution(session, run.last, limits)
-            found.append(Outline(f"run {run.number}", last, look_of(run)))
-        return found
-
-    def _distribution(self, session: Session, frame: Frame, limits: Range) -> Distribution:
-        """Return the counts of a frame, made once as long as it is there."""
-        what = shown_measure(session)
-        key = id(frame), what, limits
-        kept = self._kept.get(key)
-        if kept is None or kept[0] is not frame:
-            if len(self._kept) > 64:
-                self._kept.clear()
-            kept = frame, distribution(frame, what, limits, session.mesh)
-            self._kept[key] = kept
-        return kept[1]
+    def drawing(self) -> Draw:
+        """Return what draws the histogram of what is shown now."""
+        session, log = self.store.session, self.log.isChecked()
+        return partial(draw_histogram, self._counts, session, log)
 
     # What the user does ----------------------------------------------------------------
 
@@ -217,8 +186,51 @@ class HistogramPanel(QWidget):
     def _save(self) -> None:
         default = folder_of(self) / "histogram.png"
         ask_and_write(
-            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.draw_on)
+            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
         )
+
+
+class Counts:
+    """The counts of frames, made once as long as a frame is there."""
+
+    def __init__(self) -> None:
+        self._kept: WeakKeyDictionary[Frame, dict[object, Distribution]] = WeakKeyDictionary()
+
+    def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:
+        """Return the counts of a frame of the session between limits."""
+        what = shown_measure(session)
+        kept = self._kept.setdefault(frame, {})
+        if (what, limits) not in kept:
+            kept[what, limits] = distribution(frame, what, limits, session.mesh)
+        return kept[what, limits]
+
+
+def draw_histogram(counts: Counts, session: Session, log: bool, figure, style) -> None:
+    """Draw the histogram of what a session shows; nothing without a mesh."""
+    if session.frame is None:
+        return
+    what = shown_measure(session)
+    limits = session.colour_range if what == "displacement" else (0.0, 1.0)
+    shown = counts.of(session, session.frame, limits)
+    label = "undeformed" if session.view.frame == 0 else f"run {session.shown}"
+    words = label, "displacement [mesh unit]" if what == "displacement" else _words(what)
+    outlines = [
+        Outline(name, counts.of(session, frame, limits), series)
+        for name, frame, series in _others(session)
+    ]
+    axes, table = figure.add_subplot(), _colours(session, shown)
+    draw_distribution(axes, shown, outlines, words, table, log, style)
+
+
+def _others(session: Session) -> Iterator[tuple[str, Frame, int | None]]:
+    """Yield what is compared with: its words, the frame, and the number of its look."""
+    moved = session.first is not None and session.view.frame > 0
+    if moved and shown_measure(session) != "displacement":
+        yield "undeformed", session.first, None
+    for run in session.runs:
+        # The last step of the run that is shown is what is played to.
+        if run.last not in (None, session.frame) and run.number != session.shown:
+            yield f"run {run.number}", run.last, look_of(run)
 
 
 def shown_measure(session: Session) -> ColourBy:

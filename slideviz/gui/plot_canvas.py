@@ -7,50 +7,69 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
-from matplotlib.backends.backend_qtagg import FigureCanvasQTAgg
 from matplotlib.figure import Figure
 from qtpy.QtCore import Qt, QTimer, Signal
+from qtpy.QtGui import QColor, QImage, QPainter
 from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
+from slideviz.gui.plot_image import Draw, Paper, Picture, draw_beside
 from slideviz.mesh.atomic import atomic_write
 from slideviz.view.look import LIGHT, Look
 from slideviz.view.plots import PRINT, Style
 
 REST_MS = 200
-"""Between two drawings while steps are played: a plot takes 30 to 60 ms."""
+"""Between two drawings while steps are played, at least."""
+REST_TIMES, MOST_REST = 4.0, 4
+"""So many times as long as a drawing took, but not more than so many ``REST_MS``."""
+LOOK_MS = 8
+"""How often it is looked whether a drawing is there."""
 
 FIGURE_INCHES = (4.2, 3.1)
 PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
-Draw = Callable[[Figure, Style], None]
 
+class PlotCanvas(QWidget):
+    """A plot that is drawn beside the window; what is shown is the newest image of it.
 
-class PlotCanvas(FigureCanvasQTAgg):
-    """A figure that ``draw_on(figure, style)`` fills, drawn at most every `REST_MS`.
+    Parameters
+    ----------
+    drawing : callable
+        Returns what fills a figure with what there is now, at a call without widgets.
+
+    Attributes
+    ----------
+    figure : Figure
+        What is shown; its axes tell what is where.
 
     Signals
     -------
     drawn()
-        The figure has another content.
+        There is another image.
     """
 
     drawn = Signal()
 
-    def __init__(self, draw_on: Draw) -> None:
-        super().__init__(Figure(layout="constrained"))
-        self.draw_on = draw_on
+    def __init__(self, drawing: Callable[[], Draw]) -> None:
+        super().__init__()
+        self.drawing = drawing
         self.look = LIGHT
         self._stale = True
         self._last = 0.0
-        self._place: tuple[tuple, tuple[float, ...]] = ((), ())
+        self._picture = Picture()
+        self._coming: Future[Picture] | None = None
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self.fill)
+        # Asked for rather than told: the thread need not know of a widget that may be gone.
+        self._look_after = QTimer(self)
+        self._look_after.setInterval(LOOK_MS)
+        self._look_after.timeout.connect(self._take)
         self.setMinimumSize(120, 100)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -60,55 +79,99 @@ class PlotCanvas(FigureCanvasQTAgg):
         """Return how it is drawn in the window."""
         return Style(self.look, size=8.0, width=1.3)
 
+    @property
+    def figure(self) -> Figure:
+        """Return what is shown."""
+        return self._picture.figure
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether another image is on its way."""
+        return self._coming is not None or self._timer.isActive()
+
+    # Drawing ---------------------------------------------------------------------------
+
     def ask(self) -> None:
         """Draw what there is now, soon; hidden plots wait until they are seen."""
         self._stale = True
-        if is_seen(self) and not self._timer.isActive():
+        if is_seen(self) and not self.busy:
             since = (time.monotonic() - self._last) * 1000.0
-            self._timer.start(max(0, round(REST_MS - since)))
+            self._timer.start(max(0, round(self._rest_ms() - since)))
+
+    def _rest_ms(self) -> float:
+        """Return the time between two drawings: the view needs the processors, too."""
+        return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
     def fill(self) -> None:
-        """Draw what there is now."""
-        self._stale = False
-        figure = self.figure
-        figure.clear()
-        figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
-        figure.set_facecolor(self.look.background)
-        self.draw_on(figure, self.style_)
-        self._arrange()
-        self.draw()
-        self._last = time.monotonic()
-        self.drawn.emit()
-
-    def _arrange(self) -> None:
-        """Place the axes where they were, if nothing that takes room has another size.
-
-        To find their place anew takes as long as to draw all of it.
-        """
-        figure = self.figure
-        if not figure.axes:
+        """Have drawn what there is now; while a drawing goes on, after it."""
+        self._stale = self._coming is not None
+        if self._stale:
             return
-        axes = figure.axes[0]
-        digits = [len(f"{end:.0f}") for end in axes.get_ylim()]
-        labels = axes.get_xlabel(), axes.get_ylabel(), axes.get_title(), axes.get_yscale()
-        key = (self.width(), self.height(), figure.dpi, *labels, *digits)
-        if key != self._place[0]:
-            figure.get_layout_engine().execute(figure)
-            self._place = key, axes.get_position().bounds
-        figure.set_layout_engine("none")
-        axes.set_position(self._place[1])
+        ratio = self.devicePixelRatioF()
+        size = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
+        paper = Paper(*size, ratio, self.style_)
+        self._coming = draw_beside(self.drawing(), paper, self._picture.place)
+        self._look_after.start()
+
+    def _take(self) -> None:
+        """Show the image that was asked for, if it is there."""
+        if self._coming is None or not self._coming.done():
+            return
+        coming, self._coming = self._coming, None
+        self._look_after.stop()
+        self._last = time.monotonic()
+        self._picture = coming.result()
+        self.update()
+        self.drawn.emit()
+        if self._stale:
+            self.ask()
 
     def set_look(self, look: Look) -> None:
         """Take other colours."""
         self.look = look
         self.ask()
 
+    # Places ----------------------------------------------------------------------------
+
+    @property
+    def _scale(self) -> tuple[float, float]:
+        """Return pixels of the image for one of the widget: a new size is drawn a little later."""
+        high, wide = self._picture.pixels.shape[:2]
+        return wide / max(self.width(), 1), high / max(self.height(), 1)
+
+    def to_value(self, x_px: float) -> float:
+        """Return what the horizontal axis has at a position of the mouse."""
+        place = x_px * self._scale[0], 0.0
+        return float(self.figure.axes[0].transData.inverted().transform(place)[0])
+
+    def to_pixel(self, value: float) -> float:
+        """Return where a value of the horizontal axis is, in pixels of the widget."""
+        place = self.figure.axes[0].transData.transform((value, 1.0))
+        return float(place[0] / self._scale[0])
+
+    def axes_rows(self) -> tuple[float, float]:
+        """Return top and height of the axes in pixels of the widget."""
+        box, scale = self.figure.axes[0].get_window_extent(), self._scale[1]
+        return self.height() - box.y1 / scale, box.height / scale
+
+    # Qt --------------------------------------------------------------------------------
+
     def resizeEvent(self, event) -> None:
         super().resizeEvent(event)
+        self._last = 0.0  # what is shown meanwhile is stretched
         self.ask()
 
     def paintEvent(self, event) -> None:
         super().paintEvent(event)
+        painter = QPainter(self)
+        pixels = self._picture.pixels
+        high, wide = pixels.shape[:2]
+        if wide > 1:
+            image = QImage(pixels, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
+            painter.drawImage(self.rect(), image)
+        else:
+            painter.fillRect(self.rect(), QColor(self.look.background))
+        painter.end()
         if self._stale:
             self.ask()
 
@@ -116,10 +179,10 @@ class PlotCanvas(FigureCanvasQTAgg):
 class PlotArea(QStackedWidget):
     """A plot, or words that say why there is none."""
 
-    def __init__(self, draw_on: Draw, canvas: type[PlotCanvas] = PlotCanvas) -> None:
+    def __init__(self, drawing: Callable[[], Draw], canvas: type[PlotCanvas] = PlotCanvas) -> None:
         super().__init__()
         self.words = words_label()
-        self.canvas = canvas(draw_on)
+        self.canvas = canvas(drawing)
         self.addWidget(self.words)
         self.addWidget(self.canvas)
         self.setMinimumHeight(100)

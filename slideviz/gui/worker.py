@@ -94,7 +94,7 @@ class JobRunner(QObject):
         return not self.alive
 
     def _run(self, stop: Event, function: Callable[..., Any], *values: Any) -> None:
-        _stand_back()
+        stand_back()
         try:
             end = ("finished", function(*values, self._report, stop.is_set))
         except Cancelled:
@@ -151,7 +151,7 @@ class JobRunner(QObject):
             self.failed.emit(value)
 
 
-def _stand_back() -> None:
+def stand_back() -> None:
     """Let the window go before this thread, and before those that it starts.
 
     Without a graphics card the picture is drawn by the same processor that computes.

@@ -159,7 +159,8 @@ def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
 
 def test_playing_draws_less_often_than_it_steps(full, qtbot, monkeypatch):
     monkeypatch.setattr(plot_canvas, "REST_MS", 10_000)
-    full.canvas.fill()
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.canvas.fill()
     told = []
     full.canvas.drawn.connect(lambda: told.append(1))
     for frame in (0, 1, 2, 1, 0):
@@ -167,6 +168,38 @@ def test_playing_draws_less_often_than_it_steps(full, qtbot, monkeypatch):
         qtbot.wait(5)
     assert not told
     assert full.canvas._timer.isActive()
+
+
+def test_of_many_states_the_newest_is_drawn_last(full, qtbot):
+    for frame in (0, 1, 2, 1, 0):
+        full.store.change(changes.show_frame, frame)
+        full.canvas.fill()
+    qtbot.waitUntil(lambda: not full.canvas.busy)
+    assert sorted(labels(full)) == ["run 1", "undeformed"]
+    bars = [bar.get_height() for bar in full.canvas.figure.axes[0].patches if bar.get_gid()]
+    wanted = full.drawing().args[0].of(full.store.session, full.store.session.first, (0.0, 1.0))
+    assert bars == list(np.maximum(wanted.counts - 0.5, 0.0))
+
+
+def test_a_stretched_image_still_tells_what_is_where(full):
+    before = full.canvas.pixel_of(0.5) / full.canvas.width()
+    full.canvas.resize(2 * full.canvas.width(), full.canvas.height())
+    assert full.canvas.pixel_of(0.5) / full.canvas.width() == pytest.approx(before)
+    assert full.canvas.value_at(full.canvas.pixel_of(0.25)) == pytest.approx(0.25)
+
+
+def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeypatch):
+    def broken(_figure, _style):
+        raise ValueError("no such font")
+
+    monkeypatch.setattr(full.canvas, "drawing", lambda: broken)
+    with qtbot.captureExceptions() as caught:
+        full.canvas.fill()
+        qtbot.waitUntil(lambda: bool(caught))
+    assert [str(error) for _, error, _ in caught] == ["no such font"]
+    monkeypatch.undo()
+    with qtbot.waitSignal(full.canvas.drawn):
+        full.canvas.ask()
 
 
 def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
@@ -197,13 +230,13 @@ def test_it_is_saved_as_a_figure(full, tmp_path, answers, name, start):
 
 def test_another_kind_of_file_is_refused_and_nothing_written(full, tmp_path):
     with pytest.raises(dialogs.SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
-        plot_canvas.write_plot(tmp_path / "h.xls", full.draw_on)
+        plot_canvas.write_plot(tmp_path / "h.xls", full.drawing())
     assert not list(tmp_path.iterdir())
 
 
 def test_a_small_panel_still_shows_its_plot(full, qtbot):
     full.resize(290, 240)
-    qtbot.wait(30)
+    qtbot.waitUntil(lambda: full.canvas.figure.bbox.width == full.canvas.width())
     axes = full.canvas.figure.axes[0].get_window_extent()
     assert axes.width > 0.5 * full.canvas.width() * full.canvas.devicePixelRatioF()
     box = full.canvas.figure.axes[0].get_tightbbox()
