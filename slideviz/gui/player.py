@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import Qt, QTimer
+from qtpy.QtCore import QElapsedTimer, Qt, QTimer
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
 from slideviz.gui.icons import icon
@@ -10,7 +10,8 @@ from slideviz.view import changes
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
-INTERVAL_MS = 250
+INTERVAL_MS = 100
+"""Between two steps; where drawing takes longer, steps are left out."""
 
 
 class Player(QWidget):
@@ -39,7 +40,7 @@ class Player(QWidget):
             row.addWidget(button)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setObjectName("steps_slider")
-        self.slider.setMinimumWidth(90)
+        self.slider.setMinimumWidth(60)
         self.slider.setMaximumWidth(320)
         self.slider.setPageStep(1)
         self.slider.valueChanged.connect(self.go)
@@ -57,6 +58,8 @@ class Player(QWidget):
         self._timer = QTimer(self)
         self._timer.setInterval(INTERVAL_MS)
         self._timer.timeout.connect(self._tick)
+        self._clock = QElapsedTimer()
+        self._mesh: object = None
         self._colour = "#3b4652"
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
@@ -86,9 +89,18 @@ class Player(QWidget):
             self.step_text.setText("")
         else:
             self.step_text.setText(f"Step {at} of {last}" if at else "Undeformed")
-        self.result.setText(result_text(session))
+        self._tell(session)
         if not last:
             self.stop()
+
+    def _tell(self, session: Session) -> None:
+        """Show the numbers; what they need of room they keep, or the view would change its size."""
+        if session.mesh is not self._mesh:
+            self._mesh = session.mesh
+            self.result.setMinimumWidth(0)
+        self.result.setText(result_text(session))
+        wanted = self.result.minimumSizeHint().width()
+        self.result.setMinimumWidth(max(wanted, self.result.minimumWidth()))
 
     def go(self, index: int) -> None:
         """Show a step; 0 is the undeformed mesh."""
@@ -106,6 +118,7 @@ class Player(QWidget):
             if self.store.session.view.frame >= len(self.store.session.frames) - 1:
                 self.go(0)
             self._timer.start()
+            self._clock.start()
             self.buttons["play"].setIcon(icon("pause", self._colour))
 
     def stop(self) -> None:
@@ -114,7 +127,7 @@ class Player(QWidget):
         self.buttons["play"].setIcon(icon("play", self._colour))
 
     def _tick(self) -> None:
-        self.step(1)
+        self.step(max(1, round(self._clock.restart() / self._timer.interval())))
         if self.store.session.view.frame >= len(self.store.session.frames) - 1:
             self.stop()
 

@@ -97,7 +97,9 @@ class Cells:
     @cached_property
     def nodes(self) -> IntArray:
         """Return the indices of all nodes used, sorted, each once: (u,)."""
-        return frozen_array(np.unique(self.connectivity), np.int64)
+        used = np.zeros(self.connectivity.max(initial=-1) + 1, bool)
+        used[self.connectivity] = True
+        return frozen_array(np.flatnonzero(used), np.int64)
 
     def __repr__(self) -> str:
         found = ", ".join(

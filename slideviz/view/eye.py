@@ -68,7 +68,8 @@ class Eye:
             return
         points = np.concatenate([np.asarray(shape.points) for shape in shapes])
         axes = self._axes()
-        low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+        along = axes @ points.T
+        low, high = along.min(axis=1), along.max(axis=1)
         centre, extent = axes.T @ ((low + high) / 2.0), high - low
         free = max(width - self.stage.strip(), 1.0)
         half = max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL

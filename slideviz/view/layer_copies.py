@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,9 @@ from slideviz.view.surfaces import Surface
 
 PALER = 0.45
 """How much of the cells' plain colour is mixed into the colours of a neighbour."""
+
+DIRECTIONS = 200
+"""Evenly spread over the sphere; see `outermost`."""
 
 UNENDING = 2
 """Neighbours on each side where all are asked for and a row has no end."""
@@ -58,6 +62,18 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
     return {number: matrix for number, matrix in found.items() if number != 0}
 
 
+def outermost(points: FloatArray) -> FloatArray:
+    """Return of points (n, 3) those that are furthest in some of `DIRECTIONS` directions.
+
+    Seen from any side they fill the same room as all, to less than a hundredth.
+    """
+    rank = np.arange(DIRECTIONS) + 0.5
+    height, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * rank
+    across = np.sqrt(1.0 - height**2)
+    ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
+
+
 class CopyLayer:
     """Boundaries, or the cells of a 2D mesh, drawn again where the neighbours are.
 
@@ -90,16 +106,17 @@ class CopyLayer:
         """Forget the mesh."""
         self._period = Period()
         self._key, self._matrices = (), {}
+        for copy in chain.from_iterable(self._actors.values()):
+            self.stage.plotter.renderer.RemoveActor(copy)
         self._mappers, self._props, self._actors = {}, {}, {}
 
     def shapes(self) -> list[Any]:
-        """Return the points of every neighbour."""
-        own = [shape for shape, _ in self._sources().values()]
-        return [
-            pv.PolyData(moved(np.asarray(shape.points), matrix))
-            for matrix in self._matrices.values()
-            for shape in own
-        ]
+        """Return the outermost points of every neighbour."""
+        if not self._matrices:
+            return []
+        every = [np.asarray(shape.points) for shape, _ in self._sources().values()]
+        ends = outermost(np.concatenate(every))
+        return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Show another state; points and values are those of the mesh itself."""
@@ -119,8 +136,10 @@ class CopyLayer:
         return found
 
     def _redraw(self, wanted: dict[int, FloatArray]) -> None:
-        for name in [n for n in self.stage.plotter.actors if n.startswith("copy:")]:
-            self.stage.remove(name)
+        # Not by name through the plotter: it looks at all actors each time, and these are many.
+        renderer = self.stage.plotter.renderer
+        for copy in chain.from_iterable(self._actors.values()):
+            renderer.RemoveActor(copy)
         self._actors, self._matrices = {}, wanted
         if not wanted:
             self._mappers, self._props = {}, {}
@@ -132,9 +151,8 @@ class CopyLayer:
             for number, matrix in wanted.items():
                 copy = pv.Actor(mapper=mapper, prop=prop, name=f"copy:{number}:{name}")
                 copy.user_matrix = matrix
-                self.stage.plotter.add_actor(
-                    copy, name=copy.name, reset_camera=False, render=False, pickable=False
-                )
+                copy.SetPickable(False)
+                renderer.AddActor(copy)
                 made.append(copy)
             self._actors[name] = made
 

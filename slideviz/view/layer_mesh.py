@@ -93,6 +93,7 @@ class BoundaryLayer:
         self.stage = stage
         self.drawn: dict[str, Drawn] = {}
         self._lift = 0.0
+        self._closed = False
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh."""
@@ -100,6 +101,7 @@ class BoundaryLayer:
         self._lift = self.stage.lift(session.mesh)
         for surface in surfaces:
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
+        self._closed = is_closed(surfaces)
 
     def clear(self) -> None:
         """Forget the mesh."""
@@ -138,6 +140,10 @@ class BoundaryLayer:
                 one.shape.cell_data[VALUES] = values[one.surface.owner]
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)
+        # Half of the faces look away; nobody sees them from outside, and they take their time.
+        culled = self._closed and seen_from_outside(new)
+        for one in self.drawn.values():
+            one.actor.prop.culling = "back" if culled else "none"
 
     def _place(self, points: FloatArray) -> None:
         for one in self.drawn.values():
@@ -168,3 +174,24 @@ def looks_inside(session: Session) -> bool:
     if session.mesh is None or session.mesh.dim == 2:
         return False
     return view.threshold is not None or any(section.shown for section in view.sections)
+
+
+def seen_from_outside(session: Session) -> bool:
+    """Tell whether boundaries that enclose a 3D mesh show nothing but their outside."""
+    view = session.view
+    glass = view.hidden or view.perspective or looks_inside(session)
+    # The outside of a folded cell is inside.
+    return not glass and session.frame is not None and session.frame.quality.inverted == 0
+
+
+def is_closed(surfaces: Sequence[Surface]) -> bool:
+    """Tell whether surfaces together enclose something: every edge has two faces."""
+    faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
+    if len(faces) != len(surfaces) or not faces:
+        return False
+    every = np.concatenate(faces)
+    start, end = every.ravel(), np.roll(every, -1, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    keys = np.sort((low * (every.max() + 1) + high)[low != high])
+    pairs = len(keys) % 2 == 0 and bool(np.all(keys[::2] == keys[1::2]))
+    return pairs and bool(np.all(keys[1:-1:2] != keys[2::2]))

@@ -10,10 +10,11 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import IntArray, Mesh
-from slideviz.mesh.topology import Boundary, Fans, find_boundary, find_fans
+from slideviz.mesh.topology import Fans, find_fans
 from slideviz.rbf.classify import classify
 from slideviz.view.look import ROLE_COLOURS
 from slideviz.view.state import Session
+from slideviz.view.surfaces import boundary_of
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
@@ -78,9 +79,7 @@ class NodeTypes:
     """The types of the boundary nodes of a mesh, worked out once for each case."""
 
     def __init__(self) -> None:
-        self._mesh: Mesh | None = None
-        self._boundary: Boundary | None = None
-        self._fans: tuple[float, Fans] | None = None
+        self._fans: tuple[Mesh, float, Fans] | None = None
         self._types: tuple[object, TypedNodes] | None = None
 
     def clear(self) -> None:
@@ -107,14 +106,12 @@ class NodeTypes:
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
         if not mesh.markers:
             return NOTHING
-        if self._mesh is not mesh or self._boundary is None:
-            self._mesh, self._boundary, self._fans = mesh, find_boundary(mesh), None
-        boundary, angle = self._boundary, case.feature_angle_deg
-        if self._fans is None or self._fans[0] != angle:
-            self._fans = angle, find_fans(boundary, mesh.points, angle)
+        boundary, angle = boundary_of(mesh), case.feature_angle_deg
+        if self._fans is None or self._fans[:2] != (mesh, angle):
+            self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
         method = (case.sliding, case.periodic)
         try:
-            classes = classify(boundary, self._fans[1], mesh.points, case.roles, method, angle)
+            classes = classify(boundary, self._fans[2], mesh.points, case.roles, method, angle)
         except SlidevizError:
             return NOTHING  # what is wrong with the case is said beside the Run button
         place = {kind: index for index, kind in enumerate(NODE_WORDS)}

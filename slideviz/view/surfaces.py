@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.topology import find_boundary
+from slideviz.mesh.topology import Boundary, find_boundary
+
+_BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,19 @@ def facet_connectivity(facets: IntArray) -> IntArray:
     return table[keep]
 
 
+def boundary_of(mesh: Mesh) -> Boundary:
+    """Return the oriented boundary of a mesh, found once as long as the mesh is there.
+
+    Raises
+    ------
+    MeshError
+        A marker element is no side of any cell.
+    """
+    if mesh not in _BOUNDARIES:
+        _BOUNDARIES[mesh] = find_boundary(mesh)
+    return _BOUNDARIES[mesh]
+
+
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     """Return every boundary of the mesh.
 
@@ -68,7 +84,7 @@ def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     """
     if not mesh.markers:
         return ()
-    boundary = find_boundary(mesh)
+    boundary = boundary_of(mesh)
     found = []
     for index, name in enumerate(boundary.names):
         mine = boundary.marker == index
