@@ -1,4 +1,8 @@
-"""The pictures in ``screenshots/``: the window in typical states, drawn by ``slideviz shots``."""
+"""The pictures in ``screenshots/``: the window in typical states, drawn by ``slideviz shots``.
+
+The screen is photographed, not the window drawn once more into a picture: Qt then paints tab bars
+that nobody sees.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.case.samples import write_sample
 from slideviz.errors import SlidevizError
 
 if TYPE_CHECKING:
@@ -20,21 +23,51 @@ if TYPE_CHECKING:
 
 PATIENCE = 300.0
 SIZE = (1280, 800)
+APART, OFTEN = 200, 56
+"""Colours of the palette of a picture: chosen for being different, and for being frequent."""
+
+
+def shots(folder: Path) -> list[Path]:
+    """Draw all pictures, and the film, into a folder and return them.
+
+    Raises
+    ------
+    SlidevizError
+        The folder cannot be written to, there is no screen, or the window does not get ready.
+    """
+    from slideviz.gui.shots_states import STATES, film_of_passage
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise SlidevizError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
+    with tempfile.TemporaryDirectory() as place, display():
+        made = []
+        for state in STATES:
+            with open_window(Path(place)) as window:
+                state.bring(window, Path(place))
+                made.append(photograph(window, folder / f"{state.name}.png"))
+        return [*made, film_of_passage(folder / "passage.gif")]
 
 
 @contextmanager
 def display() -> Iterator[None]:
-    """Offer a screen: the present one, or a virtual one for as long as it is needed.
+    """Offer a screen: one that nobody else draws on, or the present one where there is no Xvfb.
 
     Raises
     ------
     SlidevizError
         There is no screen and no Xvfb to make one.
     """
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+    from qtpy.QtWidgets import QApplication
+
+    program = shutil.which("Xvfb")
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    before = {name: os.environ[name] for name in names if name in os.environ}
+    there = before.get("DISPLAY") or before.get("WAYLAND_DISPLAY")
+    if QApplication.instance() is not None or (program is None and there):
         yield
         return
-    program = shutil.which("Xvfb")
     if program is None:
         raise SlidevizError("there is no display and no Xvfb; install Debian's package xvfb")
     read, write = os.pipe()
@@ -44,34 +77,20 @@ def display() -> Iterator[None]:
     try:
         with os.fdopen(read) as number:
             os.environ["DISPLAY"] = f":{number.readline().strip()}"
+        os.environ.pop("WAYLAND_DISPLAY", None)
+        os.environ["QT_QPA_PLATFORM"] = "xcb"
         yield
     finally:
-        os.environ.pop("DISPLAY", None)
+        for name in names:
+            os.environ.pop(name, None)
+        os.environ.update(before)
         server.terminate()
         server.wait()
 
 
-def shots(folder: Path) -> list[Path]:
-    """Draw all pictures into a folder and return them.
-
-    Raises
-    ------
-    SlidevizError
-        The folder cannot be written to, there is no screen, or the window does not get ready.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise SlidevizError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
-    with display(), tempfile.TemporaryDirectory() as place:
-        for name in ("passage", "hexahedron"):
-            # As motions: a displacement file would show a folder that is gone tomorrow.
-            write_sample(name, Path(place) / name, variant="motion")
-        return list(_states(Path(place), folder))
-
-
-def _states(place: Path, folder: Path) -> Iterator[Path]:
-    """Bring the window into each state and grab it."""
+@contextmanager
+def open_window(place: Path) -> Iterator[MainWindow]:
+    """Offer a window of the usual size that knows nothing of the user's settings."""
     from qtpy.QtCore import QSettings
     from qtpy.QtWidgets import QApplication
 
@@ -80,29 +99,28 @@ def _states(place: Path, folder: Path) -> Iterator[Path]:
 
     app = QApplication.instance() or QApplication(["slideviz"])
     settings = QSettings(str(place / "settings.ini"), QSettings.Format.IniFormat)
+    settings.clear()
     window = MainWindow(settings)
     window.resize(*SIZE)
+    window.move(0, 0)
     window.show()
     dialogs.ask_unsaved, asked = (lambda *_: "discard"), dialogs.ask_unsaved
     try:
-        yield _grab(window, folder / "start.png")
-        _open(window, place / "passage" / "mesh.su2")
-        yield _grab(window, folder / "boundaries.png")
-        _open(window, place / "passage" / "passage.cfg")
-        yield _grab(window, folder / "motion.png")
-        _run(window)
-        yield _grab(window, folder / "quality.png")
-        _open(window, place / "hexahedron" / "hexahedron.cfg")
-        window.set_theme("dark")
-        yield _grab(window, folder / "three-dimensional-dark.png")
+        yield window
     finally:
         window.close()
         dialogs.ask_unsaved = asked
         app.processEvents()
 
 
-def _wait(until: Callable[[], bool]) -> None:
-    """Let the window work until a condition holds."""
+def wait(until: Callable[[], bool]) -> None:
+    """Let the window work until a condition holds.
+
+    Raises
+    ------
+    SlidevizError
+        It does not hold within some minutes.
+    """
     from qtpy.QtWidgets import QApplication
 
     end = time.monotonic() + PATIENCE
@@ -113,25 +131,42 @@ def _wait(until: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def _settle(window: MainWindow) -> None:
-    _wait(lambda: not window.runner.busy)
+def settle(window: MainWindow) -> None:
+    """Let the window end what it does, and half a second more for what is drawn later."""
+    wait(lambda: not window.runner.busy)
     end = time.monotonic() + 0.5
-    _wait(lambda: time.monotonic() > end)
+    wait(lambda: time.monotonic() > end)
 
 
-def _open(window: MainWindow, path: Path) -> None:
-    window.files.open_path(path)
-    _settle(window)
+def photograph(window: MainWindow, path: Path) -> Path:
+    """Write what the screen shows where the window is, and return the path.
 
-
-def _run(window: MainWindow) -> None:
-    window.start_run()
-    _settle(window)
-
-
-def _grab(window: MainWindow, path: Path) -> Path:
-    _settle(window)
+    Raises
+    ------
+    SlidevizError
+        The file cannot be written.
+    """
+    settle(window)
     window.view.snapshot()
-    if not window.grab().save(str(path)):
+    window.viewing.render()
+    settle(window)
+    frame = window.geometry()
+    shown = window.screen().grabWindow(0, frame.x(), frame.y(), frame.width(), frame.height())
+    if not shown.save(str(path)):
         raise SlidevizError(f"{path}: the picture cannot be written; choose another folder")
+    shrink(path)
     return path
+
+
+def shrink(path: Path) -> None:
+    """Write a PNG picture again with a palette: a third of the size, and it looks the same."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        drawn = image.convert("RGB")
+    # Colours far apart, so that a red cell keeps its red; and many of those that fill areas.
+    apart = drawn.quantize(APART, Image.Quantize.MAXCOVERAGE, kmeans=1).getpalette() or []
+    often = drawn.quantize(OFTEN, Image.Quantize.MEDIANCUT).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(apart[: 3 * APART] + often[: 3 * OFTEN])
+    drawn.quantize(palette=palette, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -1,0 +1,171 @@
+"""The states in which the window is photographed for ``screenshots/``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slideviz.case.model import Case, Motion, Rotate, Translate
+from slideviz.case.samples import sample, write_sample
+from slideviz.gui.shots import settle
+from slideviz.view import changes
+from slideviz.view.section import Section
+
+if TYPE_CHECKING:
+    from slideviz.gui.window import MainWindow
+
+STATOR_CELLS = 40_000
+TURNED: tuple[Motion, ...] = (
+    Rotate("BLADE", 15.0, (0.275, 0.0, 0.0525), (1.0, 0.0, 0.0)),
+    Rotate("BLADE", 2.5, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+)
+"""The blade is staggered by 15 degrees, and moved around the machine by 2.5 of its 8.8 degrees."""
+
+FAR: tuple[Motion, ...] = (Rotate("airfoil", -14.0), Translate("airfoil", (0.0, 0.2)))
+"""Of the sample ``passage``, more than its own case has."""
+
+NEAR_HUB = 0.2512
+"""Radius of the cut in thesis Figure 6.20."""
+
+SLIDING = {"sliding": "ds", "periodic": "moving"}
+OUTER = ("SHROUD", "PER1", "PER2", "INFLOW", "OUTFLOW")
+"""What stands between the eye and the blade."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of the window: the name of its picture, and what brings the window there."""
+
+    name: str
+    bring: Callable[[MainWindow, Path], None]
+
+
+def _stator(place: Path) -> Path:
+    """Return the case of the stator, with motions that can be read instead of a table."""
+    folder = place / "stator"
+    if not folder.exists():
+        write_sample("stator", folder, STATOR_CELLS)
+        case = Case.read(folder / "stator.cfg")
+        case.change(motions=TURNED, steps=5).write(folder / "stator.cfg")
+    return folder / "stator.cfg"
+
+
+def _open(window: MainWindow, path: Path) -> None:
+    window.files.open_path(path)
+    settle(window)
+
+
+def _run(window: MainWindow, **changed: Any) -> None:
+    """Deform with other settings."""
+    window.store.change(changes.set_case, **changed)
+    window.start_run()
+    settle(window)
+
+
+def _look(window: MainWindow, azimuth: float, elevation: float) -> None:
+    """Turn the camera about the mesh, from where it stands, by degrees."""
+    camera = window.scene.plotter.camera
+    camera.Azimuth(azimuth)
+    camera.Elevation(elevation)
+    camera.OrthogonalizeViewUp()
+    window.viewing.fit()
+    window.viewing.render()
+
+
+def roles(window: MainWindow, place: Path) -> None:
+    """Bring up a blade passage whose roles are guesses, and a menu that gives another one."""
+    from qtpy.QtCore import QPoint
+
+    from slideviz.gui.boundaries import boundary_menu
+
+    _open(window, _stator(place).with_name("mesh.su2"))
+    store = window.store
+    store.change(changes.set_role, ["BLADE"], "moving")
+    store.change(changes.set_role, ["HUB", "SHROUD"], "internal")
+    for motion in TURNED:
+        store.change(changes.add_motion, motion)
+    store.change(changes.show, ["SHROUD", "PER1"], False)
+    store.change(changes.select, ("INFLOW",))
+    _look(window, 30.0, -8.0)
+    view = window.view
+    menu = boundary_menu(window, store, ("INFLOW",))
+    menu.popup(view.mapToGlobal(QPoint(view.width() * 7 // 10, view.height() * 2 // 3)))
+    menu.setActiveAction(next(act for act in menu.actions() if act.text() == "Sliding"))
+
+
+def quality(window: MainWindow, place: Path) -> None:
+    """Bring up the stator after a run, with neighbouring passages."""
+    _open(window, _stator(place))
+    _run(window, **SLIDING)
+    window.store.change(changes.show, OUTER, False)
+    window.store.change(changes.set_view, copies=1)
+    _look(window, 30.0, 0.0)
+
+
+def section(window: MainWindow, place: Path) -> None:
+    """Bring up a cylinder at mid-span, unrolled below the 3D view."""
+    _open(window, _stator(place))
+    _run(window, **SLIDING)
+    window.docks_.lead_to("sections")
+    window.docks_.panels["sections"].add_cylinder.click()
+    window.store.change(changes.set_view, copies=1)
+    window.cutting.want_flat(True)
+    window.store.change(changes.show, OUTER, False)
+    settle(window)
+    window.cutting.setSizes([45, 55])
+    _look(window, 25.0, -10.0)
+
+
+def beside(window: MainWindow, place: Path) -> None:
+    """Bring up two methods side by side, on a cut near the hub."""
+    _open(window, _stator(place))
+    _run(window, sliding="none", periodic="none")
+    _run(window, **SLIDING)
+    window.store.change(changes.add_section, Section("cylinder", radius=NEAR_HUB))
+    window.store.change(changes.show, ("BLADE", "HUB", *OUTER), False)
+    window.store.change(changes.show_beside, 1)
+    settle(window)
+    window.viewing.look_from("+x")
+    settle(window)
+    scene, view = window.viewing.second_scene, window.viewing.second
+    scene.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.7)
+
+
+def dark(window: MainWindow, place: Path) -> None:
+    """Bring up a 2D run and its worst cells, in dark colours."""
+    window.set_theme("dark")
+    write_sample("passage", place / "passage", 48)
+    case = Case.read(place / "passage" / "passage.cfg")
+    case.change(motions=FAR).write(place / "passage" / "passage.cfg")
+    _open(window, place / "passage" / "passage.cfg")
+    _run(window)
+    window.store.change(changes.set_view, copies=1)
+    window.docks_.lead_to("curves")
+
+
+STATES = (
+    State("roles", roles),
+    State("quality", quality),
+    State("section", section),
+    State("side-by-side", beside),
+    State("dark", dark),
+)
+
+
+def film_of_passage(path: Path) -> Path:
+    """Write a film of the passage that the dark picture shows, and return its path."""
+    from slideviz.mesh.quality import quality as quality_of
+    from slideviz.staircase import deform
+    from slideviz.view.film import film
+    from slideviz.view.reel import Reel
+    from slideviz.view.state import Frame
+
+    made = sample("passage", 24)
+    steps = deform(made.case.change(motions=FAR), made.mesh)
+    frames = [Frame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps]
+    frames.insert(0, Frame(made.mesh, quality_of(made.mesh)))
+    for _ in film(frames, path, Reel((480, 300), 5.0, 1.5, 1), overwrite=True):
+        pass
+    return path
