@@ -105,6 +105,11 @@ class RunTree(QTreeWidget):
         self.seen_before = now.shown, now.view.frame, now.view.beside
         super().mousePressEvent(event)
 
+    def dataChanged(self, first, last, roles=()) -> None:
+        super().dataChanged(first, last, roles)
+        # The line below spans all columns; Qt draws only the one that has changed.
+        self.viewport().update()
+
     def drawRow(self, painter, option, index) -> None:
         super().drawRow(painter, option, index)
         rect = self.visualRect(index.siblingAtColumn(RUN))
