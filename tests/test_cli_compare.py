@@ -154,3 +154,19 @@ def test_an_interrupt_leaves_what_was_finished(tmp_path):
     assert row["steps"] == "1"
     assert float(row["mean"]) > 0
     assert [path.name for path in out.iterdir()] == ["compare.csv"]
+
+
+def test_without_pictures_no_mesh_is_kept(square, tmp_path, monkeypatch):
+    from slideviz.cli import compare_command
+
+    kept = []
+
+    def drawn(arguments, case, mesh, rows, folder):
+        kept.extend(row.result.mesh for row in rows)
+        return []
+
+    monkeypatch.setattr(compare_command, "_drawn", drawn)
+    argv = ["compare", str(square), "--methods", "ps", "--periodic", "none", "--steps", "1,2"]
+    assert run([*argv, "-q", "-o", str(tmp_path / "a")]) == 0
+    assert run([*argv, "-q", "-o", str(tmp_path / "b"), "--no-pictures"]) == 0
+    assert [mesh is None for mesh in kept] == [False, False, True, True]

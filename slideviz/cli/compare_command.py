@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 STEPS = (1, 5, 20)
 KEPT_BYTES = 1_500_000_000
-"""Meshes and qualities are kept for the pictures up to this size."""
+"""Deformed meshes are kept for the pictures up to this size together."""
 
 
 def add_compare(calls: argparse._SubParsersAction) -> None:
@@ -146,7 +146,7 @@ def _computed(
     say: Callable[[str], None],
 ) -> tuple[list[Row], list[Path]]:
     """Return all rows and the tables written; after each row they have what was finished."""
-    from slideviz.view.compare import compare
+    from slideviz.view.compare import bounded, compare
     from slideviz.view.compare_table import csv_text, history_text, save_text, terminal_line
 
     table, histories = folder / "compare.csv", folder / "convergence.csv"
@@ -154,7 +154,8 @@ def _computed(
     rows: list[Row] = []
     case, mesh, wanted = asked
     bars: list[Bar] = []
-    pulled = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
+    rows_one_by_one = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
+    pulled = bounded(rows_one_by_one, 0 if arguments.no_pictures else KEPT_BYTES)
     while len(rows) < len(wanted):
         with Bar(not arguments.quiet) as bar:  # wiped away before the row is printed
             bars.append(bar)

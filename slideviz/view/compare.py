@@ -82,8 +82,8 @@ class Result:
     ----------
     steps : int
         Steps made.
-    mesh : Mesh
-        The last one.
+    mesh : Mesh or None
+        The last one; None where it was not kept, so that there is no picture of it.
     quality : Quality
         Of it.
     minimum, mean : (steps,) float64
@@ -104,7 +104,7 @@ class Result:
     """
 
     steps: int
-    mesh: Mesh
+    mesh: Mesh | None
     quality: Quality
     minimum: FloatArray
     mean: FloatArray
@@ -125,6 +125,19 @@ class Row:
     combination: Combination
     result: Result | None = None
     problem: str = ""
+
+
+def bounded(rows: Iterable[Row], bytes_kept: int) -> Iterator[Row]:
+    """Yield the rows; meshes are kept until their points take so many bytes, then no more."""
+    kept = 0
+    for row in rows:
+        result = row.result
+        if result is not None and result.mesh is not None:
+            kept += result.mesh.points.nbytes
+            if kept > bytes_kept:
+                yield replace(row, result=replace(result, mesh=None))
+                continue
+        yield row
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import Quality
 from slideviz.view.compare import METHODS, MODES, Result, Row
 from slideviz.view.compare_plots import WIDTH
 from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 Image = NDArray[np.uint8]
 
 DPI = 300
+NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
 _WHITE = 250
 _OVERSAMPLED = 2
 """Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
@@ -42,18 +44,22 @@ def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
     Parameters
     ----------
     rows : sequence of Row
-        Of one number of steps. Where a row has no result, its place says why.
+        Of one number of steps. Where a row has no result or no mesh, its place says why.
     base : Mesh
         The undeformed mesh.
 
     Returns
     -------
     Figure or None
-        None where no row has a result.
+        None where no row has a mesh.
     """
     methods = list(dict.fromkeys(row.combination.method for row in rows))
     modes = list(dict.fromkeys(row.combination.periodic for row in rows))
-    done = [row.result for row in rows if row.result is not None]
+    done = {
+        id(row.result): (row.result.mesh, row.result.quality)
+        for row in rows
+        if row.result is not None and row.result.mesh is not None
+    }
     if not done:
         return None
     beside, above = [METHODS[name][0] for name in methods], [MODES[name] for name in modes]
@@ -64,24 +70,23 @@ def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
     if len(modes) == 1:  # the methods beside each other instead of below
         beside, above = above, beside
         places = {at[::-1]: row for at, row in places.items()}
-    images = _images(done, base, WIDTH / max(len(above), 2))
-    drawn = dict(zip(map(id, done), images, strict=True))
-    figure = _composed((beside, above), places, drawn)
-    _colour_bar(figure, any(result.quality.inverted for result in done))
+    images = _images(list(done.values()), base, WIDTH / max(len(above), 2))
+    figure = _composed((beside, above), places, dict(zip(done, images, strict=True)))
+    _colour_bar(figure, any(found.inverted for _, found in done.values()))
     return figure
 
 
-def _images(results: Sequence[Result], base: Mesh, inches: float) -> list[Image]:
+def _images(results: Sequence[tuple[Mesh, Quality]], base: Mesh, inches: float) -> list[Image]:
     """Return a picture of each mesh, all seen by the same camera."""
     side = int(inches * DPI * _OVERSAMPLED)
     with offscreen((side, side)) as plotter:
-        portrait = Portrait(plotter, results[0].mesh, base)
+        portrait = Portrait(plotter, results[0][0], base)
         if portrait.detail is None:
-            _fit(plotter, [base, *(result.mesh for result in results)])
+            _fit(plotter, [base, *(mesh for mesh, _ in results)])
         shown = list(plotter.actors.values())
         images: list[Image] = []
-        for result in results:
-            portrait.show(Frame(result.mesh, result.quality))
+        for mesh, found in results:
+            portrait.show(Frame(mesh, found))
             for name in list(plotter.scalar_bars.keys()):
                 plotter.remove_scalar_bar(name, render=False)
             if not images and _crowded(image_of(plotter), shown):
@@ -129,7 +134,11 @@ def _composed(
     # One scale for all; a row of pictures is only as high as it must be.
     rows = [
         _drawn(
-            [images[id(row.result)] for at, row in places.items() if at[0] == k and row.result]
+            [
+                images[id(row.result)]
+                for at, row in places.items()
+                if at[0] == k and id(row.result) in images
+            ]
             or list(images.values()),
             0,
         )
@@ -147,18 +156,26 @@ def _composed(
         axes.spines[:].set_visible(False)
         _name(axes, at, names)
         row = places.get(at)
-        if row is not None and row.result is not None:
+        if row is None:
+            continue
+        if row.result is not None:
+            axes.set_xlabel(_numbers(row.result), fontsize=SMALLEST)
+        if id(row.result) in images:
             image = images[id(row.result)][rows[at[0]], columns]
             axes.imshow(image, interpolation="antialiased")
-            axes.set_xlabel(_numbers(row.result), fontsize=SMALLEST)
-        elif row is not None:
-            words = textwrap.shorten(f"not possible: {row.problem}", 150, placeholder=" ...")
+        else:
             blank = np.full((rows[at[0]].stop - rows[at[0]].start, columns.stop - columns.start), 1)
             axes.imshow(blank, cmap="gray", vmin=0, vmax=1)
-            place = {"ha": "center", "va": "center", "transform": axes.transAxes}
-            lines = textwrap.fill(words, max(12, int(tile * 11)))
-            axes.text(0.5, 0.5, lines, fontsize=SMALLEST, **place)
+            _say(axes, row, max(12, int(tile * 11)))
     return figure
+
+
+def _say(axes: Any, row: Row, letters: int) -> None:
+    """Write why there is no picture, in lines of so many letters."""
+    words = NOT_KEPT if row.result is not None else f"not possible: {row.problem}"
+    lines = textwrap.fill(textwrap.shorten(words, 150, placeholder=" ..."), letters)
+    place = {"ha": "center", "va": "center", "transform": axes.transAxes}
+    axes.text(0.5, 0.5, lines, fontsize=SMALLEST, **place)
 
 
 def _numbers(result: Result) -> str:

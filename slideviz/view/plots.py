@@ -8,17 +8,16 @@ a unit, 0 to 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.view.plots_histogram import histogram
+from slideviz.view.plots_series import GreedyRun, Outcome, QualityRun, StepRun
 from slideviz.view.plots_style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, dress, place
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
 __all__ = [
     "ON_DARK",
@@ -44,200 +43,8 @@ LABELS: dict[What, str] = {
     "control_nodes": "control nodes [-]",
     "max_error": "largest error [mesh unit]",
 }
-_BAND, _STEMS = 0.13, 0.07
-"""Width of the strip left of 0 where inverted cells are counted, and of the part for counts."""
-
 _CROWDED = 300
 """Selections of more cycles than this get a thin line."""
-
-
-@dataclass(frozen=True, eq=False)
-class QualityRun:
-    """Qualities of the cells of one mesh.
-
-    Attributes
-    ----------
-    label : str
-    values : (m,) float64
-        0 to 1.
-    inverted : (m,) bool, optional
-        Cells to count apart instead of at 0.
-    series : int, optional
-        Number of its look; its place in the sequence when left out.
-    """
-
-    label: str
-    values: FloatArray
-    inverted: NDArray[np.bool_] | None = None
-    series: int | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class StepRun:
-    """Quality after each step of a run.
-
-    Attributes
-    ----------
-    label : str
-    steps : (k,) int64
-        Numbers of the steps; 0 is the undeformed mesh.
-    minimum, mean : (k,) float64
-    series : int, optional
-        Number of its look; its place in the sequence when left out.
-    """
-
-    label: str
-    steps: IntArray
-    minimum: FloatArray
-    mean: FloatArray
-    series: int | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class GreedyRun:
-    """Convergence of a greedy selection.
-
-    Attributes
-    ----------
-    label : str
-    control_nodes : (c,) int64
-    error : (c,) float64
-        Largest error of the boundary after each cycle, in the mesh's length unit.
-    level : (c,) int64
-        Number of the level of each cycle.
-    tolerance : float or None
-    series : int, optional
-        Number of its look; its place in the sequence when left out.
-    """
-
-    label: str
-    control_nodes: IntArray
-    error: FloatArray
-    level: IntArray
-    tolerance: float | None = None
-    series: int | None = None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one run came to.
-
-    Attributes
-    ----------
-    label : str
-        The combination of methods; runs of one label are joined by a line.
-    steps : int
-    minimum, mean : float
-    inverted : int
-        Inverted cells.
-    seconds : float
-        Processor time of the deformation.
-    control_nodes : int
-    max_error : float
-        In the mesh's length unit.
-    series : int, optional
-        Number of the look of its label; the place of the label among all when left out.
-    """
-
-    label: str
-    steps: int
-    minimum: float
-    mean: float
-    inverted: int = 0
-    seconds: float = float("nan")
-    control_nodes: int = 0
-    max_error: float = float("nan")
-    series: int | None = None
-
-
-def histogram(
-    axes: Axes,
-    runs: Sequence[QualityRun],
-    metric: str = "size-skew",
-    bins: int = 50,
-    log: bool = False,
-    style: Style = PRINT,
-) -> None:
-    """Draw outlines of how many cells have which quality; inverted cells are left of 0.
-
-    Parameters
-    ----------
-    axes : Axes
-    runs : sequence of QualityRun
-    metric : str
-        Name of the value, for the axis.
-    bins : int
-        Equal intervals of 0 to 1.
-    log : bool
-        Whether the count is on a logarithmic axis, which shows a few bad cells among many.
-    style : Style
-    """
-    dress(axes, style, f"{metric} quality [-]", "cells [-]")
-    folded = [_inverted(run) for run in runs]
-    for index, (run, bad) in enumerate(zip(runs, folded, strict=True)):
-        look = style.series(place(run.series, index))
-        counts, edges = np.histogram(run.values[~bad], bins, range=(0.0, 1.0))
-        number = int(bad.sum())
-        # A legend elsewhere serves several axes, with other numbers of inverted cells.
-        told = number > 0 and style.legend
-        label = f"{run.label} ({number} inverted)" if told else run.label
-        axes.stairs(
-            counts,
-            edges,
-            color=look.colour,
-            linestyle=look.dash,
-            linewidth=style.width,
-            label=label,
-            baseline=None if len(runs) > 1 else 0,
-            fill=False,
-        )
-        if number:
-            at = -_STEMS * (index + 1) / (len(runs) + 1)
-            axes.plot(
-                [at, at],
-                [0.5 if log else 0.0, number],
-                color=look.colour,
-                linestyle=look.dash,
-                linewidth=style.width,
-                marker=look.marker,
-                markevery=[1],
-                markersize=4,
-            )
-    if log:
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=0.5)
-    else:
-        axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, 1.0)
-    left = 0.0
-    if any(bad.any() for bad in folded):
-        _inverted_band(axes, style)
-        left = _BAND / (1.0 + _BAND)
-    add_legend(axes, style, loc="best", bbox_to_anchor=(left, 0.0, 1.0 - left, 1.0))
-
-
-def _inverted(run: QualityRun) -> NDArray[np.bool_]:
-    if run.inverted is None:
-        return np.zeros(len(run.values), bool)
-    return np.asarray(run.inverted, bool)
-
-
-def _inverted_band(axes: Axes, style: Style) -> None:
-    """Mark the strip left of 0 where inverted cells are counted."""
-    axes.set_xlim(-_BAND, 1.0)
-    axes.axvspan(-_BAND, 0.0, color=style.alarm, alpha=0.13, linewidth=0)
-    axes.text(
-        -(_BAND + _STEMS) / 2,
-        0.97,
-        "inverted",
-        transform=axes.get_xaxis_transform(),
-        rotation="vertical",
-        ha="center",
-        va="top",
-        fontsize=style.size,
-        color=style.alarm,
-    )
-    axes.set_xticks(np.linspace(0.0, 1.0, 6))
 
 
 def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:

@@ -1,0 +1,171 @@
+"""Figures of comparisons, and sheets with a picture of each mesh."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from slideviz.case.model import Reduction, Translate
+from slideviz.case.samples import sample
+from slideviz.errors import CaseError
+from slideviz.view.compare import MODES, combinations, compare
+from slideviz.view.compare_panels import panels, profiler
+from slideviz.view.compare_plots import figures, save_figure, steps_name
+from slideviz.view.compare_sheets import NOT_KEPT, sheet
+from slideviz.view.compare_table import history_text
+
+
+@pytest.fixture(scope="module")
+def square():
+    return sample("square", 10, "motion")
+
+
+@pytest.fixture(scope="module")
+def rows(square):
+    wanted = combinations(("none", "ps"), ("none", "fixed", "moving"), (1, 4))
+    return list(compare(square.case, square.mesh, wanted))
+
+
+def test_panels_are_methods_and_a_mode_has_the_same_line_in_each(rows):
+    none, ps = panels(rows)
+    assert (none.title, ps.title) == ("no sliding", "pseudo sliding")
+    lines = {(panel.title, line.label): line.series for panel in (none, ps) for line in panel.lines}
+    assert lines["no sliding", MODES["fixed"]] == lines["pseudo sliding", MODES["fixed"]] == 1
+    assert ("no sliding", MODES["moving"]) not in lines
+
+
+def test_with_one_mode_the_methods_are_lines(rows):
+    (panel,) = panels([row for row in rows if row.combination.periodic == "fixed"])
+    assert panel.title == ""
+    assert {line.label for line in panel.lines} == {"no sliding", "pseudo sliding"}
+    assert panels([row for row in rows if row.result is None]) == ()
+
+
+def test_figures_show_the_rows(rows, square):
+    drawn = dict(figures(rows, None))
+    assert set(drawn) == {
+        "steps",
+        "histogram_01_steps",
+        "histogram_04_steps",
+        "by_step_04_steps",
+    }
+    figure = drawn["steps"]
+    assert len(figure.axes) == 6
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[:3] == [MODES["none"], MODES["fixed"], MODES["moving"]]
+    assert min(text.get_fontsize() for text in legend.get_texts()) >= 8
+    limits = {axes.get_ylim() for axes in figure.axes[::3]}
+    assert len(limits) == 1, "one scale, so that panels can be compared"
+    assert figure.get_size_inches()[0] <= 7.01
+    ps = [row for row in rows if row.combination.method == "ps"]
+    drawn_lines = [line for line in figure.axes[3].lines if not line.get_gid()]
+    for index, line in enumerate(drawn_lines):
+        for steps, shown, row in zip((1, 4), line.get_ydata(), ps[2 * index :], strict=False):
+            assert row.combination.steps == steps
+            lowest = row.result.quality.min if not row.result.quality.inverted else np.nan
+            np.testing.assert_equal(shown, lowest)
+    assert len(drawn_lines) == 3
+
+
+def test_convergence_and_span_are_drawn_when_there_is_something_to_draw():
+    made = sample("cylindrical", 6)
+    (block,) = made.case.markers_with("moving")
+    case = made.case.change(
+        reduction=Reduction(tolerance=1e-2), motions=(Translate(block, (0.01, 0.0, 0.02)),)
+    )
+    rows = list(compare(case, made.mesh, combinations(("ps", "idw"), ("moving",), (1,))))
+    assert all(row.result for row in rows), [row.problem for row in rows]
+    drawn = dict(figures(rows, profiler(case, made.mesh)))
+    assert set(drawn) == {"histogram_01_steps", "convergence_01_steps", "spanwise_01_steps"}
+    assert drawn["spanwise_01_steps"].axes[0].get_ylabel() == "r [mesh unit]"
+    (axes,) = drawn["convergence_01_steps"].axes
+    assert [text.get_text() for text in axes.texts] == ["tolerance 0.01"]
+    assert axes.get_legend_handles_labels()[1] == ["pseudo sliding"]
+    lines = list(csv.DictReader(history_text(rows).splitlines()))
+    assert len(lines) == len(rows[0].result.history)
+    assert float(lines[-1]["error"]) <= 1e-2
+
+
+@pytest.mark.parametrize(
+    ("name", "span", "coordinate"),
+    [
+        ("square", None, None),
+        ("square", "y", "y"),
+        ("hexahedron", None, "z"),
+        ("cylindrical", None, "r"),
+        ("cylindrical", "z", "z"),
+    ],
+)
+def test_the_span_follows_from_the_case(name, span, coordinate):
+    made = sample(name, 5)
+    (block,) = made.case.markers_with("moving")
+    case = made.case.change(motions=(Translate(block, (0.01,) * made.mesh.dim),))
+    make = profiler(case, made.mesh, span)
+    if coordinate is None:
+        assert make is None
+        return
+    (row,) = compare(case, made.mesh, combinations(("ps",), ("none",), (1,)))
+    ((line,),) = [panel.lines for panel in panels([row])]
+    assert make(line).coordinate == coordinate
+    assert make(line).count.sum() == len(made.mesh.cells)
+
+
+def test_the_sheet_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path):
+    group = [row for row in rows if row.combination.steps == 4]
+    figure = sheet(group, square.mesh)
+    assert figure is not None
+    (path,) = save_figure(figure, tmp_path, "sheet", 100, (".png",), tight=True)
+    words = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert len(words) == 1
+    assert "not possible" in words[0]
+    numbers = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel().startswith("min")]
+    assert len(numbers) == 5
+    pictures = [axes.images[0].get_array() for axes in figure.axes if axes.images]
+    assert len({picture.shape[:2] for picture in pictures[:3]}) == 1, "one scale"
+    coloured = [picture for picture in pictures if picture.ndim == 3]
+    assert len(coloured) == 5
+    assert all((picture.min(axis=2) < 200).mean() > 0.2 for picture in coloured)
+    with Image.open(path) as image:
+        assert image.width > 500
+    assert sheet([row for row in rows if row.result is None], square.mesh) is None
+
+
+def test_a_figure_that_cannot_be_written_is_told(rows, tmp_path):
+    figure = next(figures(rows, None))[1]
+    with pytest.raises(CaseError, match=r"nowhere.*cannot be written"):
+        save_figure(figure, tmp_path / "nowhere", "a", 50)
+    assert [path.suffix for path in save_figure(figure, tmp_path, "a", 50)] == [".png", ".svg"]
+
+
+def test_names_of_files_sort_by_steps():
+    assert [steps_name(n) for n in (0, 1, 20)] == ["auto_steps", "01_steps", "20_steps"]
+
+
+@pytest.mark.parametrize(("cells", "edges"), [(6, True), (240, False)])
+def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
+    made = sample("square", cells, "motion")
+    (block,) = made.case.markers_with("moving")
+    case = made.case.change(motions=(Translate(block, (1e-9, 0.0)),))
+    (row,) = compare(case, made.mesh, combinations(("ps",), ("none",), (1,)))
+    figure = sheet([row], made.mesh)
+    image = figure.axes[0].images[0].get_array()
+    middle = image[image.shape[0] // 8 : image.shape[0] // 4, image.shape[1] // 4 :]
+    # All cells are perfect: without edges there is one colour.
+    assert (len(np.unique(middle.reshape(-1, 3), axis=0)) > 3) == edges
+
+
+def test_a_mesh_that_was_not_kept_leaves_its_numbers_and_the_reason(rows, square):
+    group = [row for row in rows if row.combination.steps == 4 and row.result]
+    first, *others = group
+    figure = sheet([replace(first, result=replace(first.result, mesh=None)), *others], square.mesh)
+    words = [" ".join(text.get_text().split()) for axes in figure.axes for text in axes.texts]
+    assert NOT_KEPT in words
+    numbers = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel().startswith("min")]
+    assert len(numbers) == len(group)
+    bare = [replace(row, result=replace(row.result, mesh=None)) for row in group]
+    assert sheet(bare, square.mesh) is None
