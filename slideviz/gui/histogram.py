@@ -124,7 +124,6 @@ class HistogramPanel(QWidget):
             return
         self._told = session.frame
         what = shown_measure(session)
-        values = shown_values(session.frame, what, session.mesh)
         plain = session.frame.values(what, session.mesh)
         bad = session.frame.quality.inverted
         low = "highest" if what == "displacement" else "min"
@@ -137,6 +136,7 @@ class HistogramPanel(QWidget):
         threshold = session.view.threshold
         self.range_text.setVisible(threshold is not None)
         if threshold is not None:
+            values = shown_values(session.frame, what, session.mesh)
             count = len(chosen_cells(values, threshold))
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"

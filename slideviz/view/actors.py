@@ -26,17 +26,22 @@ class Drawn:
     Attributes
     ----------
     surface : Surface
-    shape, rim : pyvista.PolyData
-        Its facets; the lines that highlight it.
-    actor, band : pyvista.Actor
-        The actors of both.
+    shape : pyvista.PolyData
+        Its facets.
+    actor : pyvista.Actor
     """
 
     surface: Surface
     shape: Any
-    rim: Any
     actor: Any
-    band: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The lines that highlight a boundary, and their actor."""
+
+    shape: Any
+    actor: Any
 
 
 def surface_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
@@ -84,15 +89,16 @@ def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
 
 
 def shown_values(frame: Frame, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
-    """Return the numbers to colour the cells by, (m,); inverted cells are below any range.
+    """Return the numbers to colour the cells by, (m,); not a number where a cell is inverted.
 
     For displacements, ``undeformed`` says where the nodes were.
     """
-    return np.where(frame.quality.status == INVERTED, -np.inf, frame.values(what, undeformed))
+    return np.where(frame.quality.status == INVERTED, np.nan, frame.values(what, undeformed))
 
 
 def lookup_table() -> Any:
-    """Return the colours of 0 to 1, and of what is below: inverted cells."""
+    """Return the colours of 0 to 1, with those of the ends beyond, and that of inverted cells."""
     table = pv.LookupTable(COLOUR_MAP, n_values=256, scalar_range=(0.0, 1.0))
-    table.below_range_color = INVERTED_COLOUR
+    # Not what is below the range: a valid cell may be below one that was chosen.
+    table.nan_color = INVERTED_COLOUR
     return table

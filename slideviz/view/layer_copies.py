@@ -65,12 +65,14 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
 def outermost(points: FloatArray) -> FloatArray:
     """Return of points (n, 3) those that are furthest in some of `DIRECTIONS` directions.
 
-    Seen from any side they fill the same room as all, to less than a hundredth.
+    Seen from any side they fill the room of all, but for a few hundredths.
     """
     rank = np.arange(DIRECTIONS) + 0.5
     height, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * rank
     across = np.sqrt(1.0 - height**2)
     ways = np.column_stack([across * np.cos(turn), across * np.sin(turn), height])
+    # Even as seen from a mesh that is long in one direction and short in another.
+    ways /= np.maximum(np.ptp(points, axis=0), 1e-300)
     return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
 
 
@@ -190,4 +192,4 @@ class CopyLayer:
         values[:, :3] += PALER * (plain - values[:, :3])
         self._table.values = values.round().astype(np.uint8)
         self._table.scalar_range = own.scalar_range
-        self._table.below_range_color = own.below_range_color
+        self._table.nan_color = own.nan_color

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors
-from slideviz.view.actors import VALUES, Drawn
+from slideviz.view.actors import VALUES, Band, Drawn
 from slideviz.view.look import ROLE_COLOURS, SELECTED_COLOUR
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
@@ -87,11 +87,14 @@ class BoundaryLayer:
     ----------
     drawn : dict of str to Drawn
         By name.
+    bands : dict of str to Band
+        Of those that are, or were, selected.
     """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.drawn: dict[str, Drawn] = {}
+        self.bands: dict[str, Band] = {}
         self._lift = 0.0
         self._closed = False
 
@@ -105,27 +108,30 @@ class BoundaryLayer:
 
     def clear(self) -> None:
         """Forget the mesh."""
-        self.drawn = {}
+        self.drawn, self.bands = {}, {}
 
     def shapes(self) -> list[Any]:
         """Return the data sets of all boundaries."""
         return [one.shape for one in self.drawn.values()]
 
     def _add(self, surface: Surface, points: FloatArray) -> Drawn:
-        flat = surface.facets.shape[1] == 2
         shape = actors.surface_shape(surface, points, 2 * self._lift)
+        actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not surface.flat)
+        if not surface.flat:
+            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
+        return Drawn(surface, shape, actor)
+
+    def _add_band(self, surface: Surface, points: FloatArray) -> Band:
+        """Return what highlights a boundary; made when first wanted, for most never are."""
         rim = actors.rim_shape(surface, points, self._lift)
-        actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not flat)
         band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
         band.prop.color = SELECTED_COLOUR
-        band.prop.line_width = 11 if flat else 6
+        band.prop.line_width = 11 if surface.flat else 6
         band.prop.opacity = 1.0
-        band.visibility = False
-        if not flat:
-            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
+        if not surface.flat:
             # Lines on a face flicker unless they are drawn a little nearer.
             band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
-        return Drawn(surface, shape, rim, actor, band)
+        return Band(rim, band)
 
     def update(self, old: Session | None, new: Session) -> None:
         """Show another state."""
@@ -149,16 +155,21 @@ class BoundaryLayer:
         for one in self.drawn.values():
             at = points[one.surface.nodes]
             actors.place(one.shape, at, 2 * self._lift)
-            actors.place(one.rim, at, self._lift)
+            if one.surface.name in self.bands:
+                actors.place(self.bands[one.surface.name].shape, at, self._lift)
 
     def _style(self, name: str, one: Drawn, session: Session, by_value: bool) -> None:
         view = session.view
         shown = name not in view.hidden
         one.actor.visibility = shown
-        one.band.visibility = shown and name in view.selected
+        lit = shown and name in view.selected
+        if lit and name not in self.bands and session.frame is not None:
+            self.bands[name] = self._add_band(one.surface, session.frame.mesh.points)
+        if name in self.bands:
+            self.bands[name].actor.visibility = lit
         one.actor.prop.color = ROLE_COLOURS[session.role(name)]
         one.actor.mapper.scalar_visibility = by_value
-        if one.surface.facets.shape[1] == 2:
+        if one.surface.flat:
             one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
         else:
             self.stage.edges(one.actor.prop, view.edges)

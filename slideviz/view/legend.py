@@ -9,6 +9,7 @@ from typing import Any
 
 from slideviz.case.model import Role
 from slideviz.view.look import ROLE_COLOURS, Look
+from slideviz.view.ticks import tick_format, ticks
 
 STRIP = 104
 """Pixels at the right edge that are kept free of the mesh, at normal letter size."""
@@ -64,17 +65,21 @@ def _line(
 ) -> None:
     """Write a sign in its colour and a word, so far below the top and left of the right edge."""
     import pyvista as pv
+    from vtkmodules.vtkRenderingCore import vtkCoordinate
 
     (sign, colour, word), (down, right, size) = said, place
-    width, height = plotter.window_size
-    top = 1.0 - down * font_scale / max(height, 1)
+    # Counted from a corner, the place is right in a view of any size.
+    corner = vtkCoordinate()
+    corner.SetCoordinateSystemToNormalizedViewport()
+    corner.SetValue(1.0, 1.0)
     for what, said_in, edge, letters in (
         (sign, colour, STRIP - 8, 1.4 * size),
         (word, look.text, right, size),
     ):
         text = pv.Text(what)
-        text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        text.GetPositionCoordinate().SetValue(1.0 - edge * font_scale / max(width, 1), top)
+        text.GetPositionCoordinate().SetReferenceCoordinate(corner)
+        text.GetPositionCoordinate().SetCoordinateSystemToViewport()
+        text.GetPositionCoordinate().SetValue(-edge * font_scale, -down * font_scale)
         set_letters(text.prop, look, letters * font_scale)
         text.prop.color = said_in
         text.prop.SetVerticalJustificationToCentered()
@@ -95,22 +100,18 @@ def clear_legend(plotter: Any) -> None:
 def add_colour_bar(
     plotter: Any, mapper: Any, title: str, inverted: bool, style: tuple[Look, float]
 ) -> None:
-    """Draw the colour bar of a mapper at the right edge; below it ``inverted`` if wanted."""
+    """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
     look, font_scale = style
-    width = plotter.window_size[0]
-    low, high = mapper.lookup_table.scalar_range
+    at = ticks(*mapper.lookup_table.scalar_range)
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
-        n_labels=6,
-        fmt="%.1f" if high - low >= 0.5 and high < 1000 else "%.2g",
+        fmt=tick_format(at),
         vertical=True,
         interactive=False,
         color=look.text,
-        position_x=1.0 - (STRIP - 14) * font_scale / max(width, 1),
-        position_y=0.16,
-        width=(STRIP - 20) * font_scale / max(width, 1),
-        height=0.68,
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
@@ -120,6 +121,21 @@ def add_colour_bar(
     set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
     bar.SetBarRatio(0.24)
     bar.SetVerticalTitleSeparation(round(8 * font_scale))
-    bar.SetDrawBelowRangeSwatch(inverted)
+    bar.SetUseCustomLabels(True)
+    bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
+    bar.SetDrawNanAnnotation(inverted)
     bar.SetDrawAnnotations(inverted)
-    bar.SetBelowRangeAnnotation("inverted" if inverted else "")
+    bar.SetNanAnnotation("inverted" if inverted else "")
+
+
+def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> None:
+    """Put the colour bar at the right edge of the view as it is now, ``below`` pixels from its top.
+
+    There its title ends, where lines about points above it do.
+    """
+    width, height = (max(side, 1) for side in plotter.window_size)
+    bar, bottom = plotter.scalar_bars[title], 0.16
+    bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
+    bar.SetWidth((STRIP - 20) * font_scale / width)
+    free = 1.0 - below * font_scale / height
+    bar.SetHeight(max(min(0.68, free - bottom), 0.2))

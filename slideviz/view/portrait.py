@@ -11,7 +11,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
-from slideviz.view.legend import STRIP, add_colour_bar
+from slideviz.view.legend import STRIP, add_colour_bar, place_bar
 from slideviz.view.look import PAPER
 from slideviz.view.moved import Detail, Zoom, half_of, lengths, tiny_motion
 from slideviz.view.offscreen import font_scale
@@ -101,6 +101,7 @@ class Portrait:
         inverted = frame.quality.inverted > 0
         words = COLOUR_BY[self.colour_by]
         add_colour_bar(self.plotter, self._mapper, words, inverted, (PAPER, scale))
+        place_bar(self.plotter, words, 0.0, scale)
         self.plotter.renderer.ResetCameraClippingRange()
 
     def caption(self, name: str, found: Quality) -> str:

@@ -114,6 +114,8 @@ class ViewState:
     colour_range : (float, float) or None
         Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
         above the largest of all runs for the displacement.
+    ranges : tuple of (str, (float, float))
+        The colour ranges of what else the view was coloured by.
     colour_map : str
         A key of `slideviz.view.look.COLOUR_MAPS`.
     threshold : (float, float) or None
@@ -146,10 +148,13 @@ class ViewState:
         The cell that is marked, by its number in the mesh.
     beside : int or None
         The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
+    swapped : bool
+        Whether the second view stands to the left of the first.
     """
 
     colour_by: ColourBy = "role"
     colour_range: tuple[float, float] | None = None
+    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
     colour_map: str = "viridis"
     threshold: tuple[float, float] | None = None
     points: PointsShown = "none"
@@ -166,11 +171,12 @@ class ViewState:
     frame: int = 0
     marked: int | None = None
     beside: int | None = None
+    swapped: bool = False
 
     @property
     def style(self) -> ViewState:
         """Return it without what passes: the step, what is selected or marked, the second view."""
-        return replace(self, selected=(), frame=0, marked=None, beside=None)
+        return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,7 +317,8 @@ def essence(case: Case) -> Case:
 
 def cell_displacement(mesh: Mesh, undeformed: Mesh) -> FloatArray:
     """Return the mean distance of the nodes of each cell from where they were, (m,)."""
-    shift = np.linalg.norm(mesh.points - undeformed.points, axis=1)
+    moved = mesh.points - undeformed.points
+    shift = np.sqrt(np.einsum("nd,nd->n", moved, moved))
     offsets = mesh.cells.offsets
     total = np.add.reduceat(shift[mesh.cells.connectivity], offsets[:-1])
     return np.asarray(total / np.diff(offsets))

@@ -37,6 +37,11 @@ class Surface:
     owner: IntArray
     rim: IntArray
 
+    @property
+    def flat(self) -> bool:
+        """Tell whether it is a line, of a 2D mesh."""
+        return self.facets.shape[1] == 2
+
 
 def padded(points: FloatArray) -> FloatArray:
     """Return points (n, d) as (n, 3), z = 0 where there is none."""

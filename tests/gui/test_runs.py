@@ -311,7 +311,7 @@ def test_a_click_in_the_second_view_selects(ran):
     QTest.mouseClick(viewing.second, Qt.MouseButton.LeftButton, pos=where)
     assert ran.session.view.selected == ("airfoil",)
     for one in viewing._scenes():
-        assert one.drawn["airfoil"].band.visibility
+        assert one.plotter.actors["selected:airfoil"].visibility
 
 
 def test_the_theme_reaches_both(ran):

@@ -1,6 +1,7 @@
 """The window, driven by mouse and keyboard under a virtual screen."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -572,6 +573,30 @@ def test_playing_ends_at_the_last_step(ready):
     assert ready.session.view.frame == 0
     ready.qtbot.waitUntil(lambda: ready.session.view.frame == 3)
     ready.qtbot.waitUntil(lambda: not player._timer.isActive())
+
+
+def test_where_drawing_takes_long_steps_are_left_out(ready, monkeypatch):
+    run(ready)
+    player = ready.window.player
+    player._timer.setInterval(40)
+    told = []
+    ready.window.store.listen(lambda _old, new: told.append(new.view.frame))
+    ready.click(player.buttons["play"])
+    monkeypatch.setattr(player, "_clock", SimpleNamespace(restart=lambda: 85))
+    ready.qtbot.waitUntil(lambda: not player._timer.isActive())
+    assert told == [0, 2, 3]
+
+
+def test_the_view_keeps_its_size_whatever_the_numbers_are(ready):
+    run(ready)
+    player = ready.window.player
+    player.result.setText("")
+    widths = []
+    for step in (3, 0, 2, 0, 1):
+        player.go(step)
+        widths.append(player.result.minimumWidth())
+    assert len(set(widths)) == 1
+    assert widths[0] >= player.result.minimumSizeHint().width()
 
 
 def test_cancel_keeps_the_steps_that_are_done(ready):

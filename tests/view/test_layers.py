@@ -7,7 +7,7 @@ import pyvista as pv
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
-from slideviz.view.layer_copies import PALER, CopyLayer, Period, matrices
+from slideviz.view.layer_copies import PALER, CopyLayer, Period, matrices, outermost
 from slideviz.view.layer_triad import COLOURS, SIZE
 from slideviz.view.look import DARK, LIGHT, ROLE_COLOURS
 from slideviz.view.node_types import NODE_COLOURS
@@ -256,3 +256,12 @@ def has_hue(colours, wanted):
     strong = parts.max(axis=1) > 60
     parts = parts[strong] / parts[strong].max(axis=1, keepdims=True)
     return int((np.abs(parts - wanted).max(axis=1) < 0.3).sum())
+
+
+def test_few_points_fill_the_room_of_all():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(5000, 3)) * (3.0, 1.0, 0.2) + (10.0, -4.0, 0.0)
+    few = outermost(points)
+    assert len(few) < 200
+    for way in rng.normal(size=(50, 3)):
+        assert np.ptp(few @ way) == pytest.approx(np.ptp(points @ way), rel=0.05)

@@ -107,3 +107,15 @@ def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passag
     bare = replace(session, mesh=replace(passage.mesh, markers=()))
     assert NodeTypes().of(bare) is NOTHING
     assert NodeTypes().of(changes.set_view(session, points="none")) is NOTHING
+
+
+def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
+    from slideviz.view import surfaces
+
+    mesh, found = replace(passage.mesh, name="another"), []
+    real = surfaces.find_boundary
+    monkeypatch.setattr(surfaces, "find_boundary", lambda m: found.append(m) or real(m))
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), passage.case)
+    surfaces.find_surfaces(mesh)
+    NodeTypes().of(changes.set_view(session, points="types"))
+    assert found == [mesh]

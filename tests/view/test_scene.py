@@ -6,6 +6,7 @@ import pyvista as pv
 
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
+from slideviz.view.layer_mesh import is_closed
 from slideviz.view.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
 from slideviz.view.pick import to_display
 from slideviz.view.scene import Scene
@@ -285,6 +286,30 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
     assert len(made) == 1, "its letters have another colour"
 
 
+def legend_actors(plotter):
+    return {n: a.GetAddressAsString("") for n, a in plotter.actors.items() if "legend" in n}
+
+
+@pytest.mark.parametrize("by", ["role", "size_skew"])
+def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(cube, by):
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_view(session, colour_by=by, points="types")
+    pictures = []
+    for first, last in (((300, 260), (500, 420)), ((500, 420), (500, 420))):
+        plotter = pv.Plotter(off_screen=True, window_size=first)
+        scene = Scene(plotter)
+        opened(scene, session)
+        plotter.window_size = last
+        made = legend_actors(plotter)
+        scene.resized()
+        assert legend_actors(plotter) == made
+        pictures.append(image(scene)[:, -100:])
+        plotter.close()
+    differs = np.abs(pictures[0] - pictures[1]).max(axis=2) > 40
+    assert differs.sum() < 40
+    assert count(pictures[0], ROLE_COLOURS["fixed"]) > 20 or by != "role"
+
+
 def test_another_map_and_another_range_give_other_colours(scene, session):
     session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
     scene.update(session)
@@ -327,3 +352,63 @@ def test_a_camera_comes_back(scene, session):
     assert scene.eye.place != place
     scene.eye.go(place)
     assert np.allclose(scene.eye.place, place)
+
+
+def culling(scene):
+    return {one.actor.prop.culling for one in scene.drawn.values()}
+
+
+def test_faces_that_look_away_are_left_out_and_nobody_sees_it(scene, cube):
+    session = opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    for side in ("iso", "+x", "-z"):
+        scene.look_from(side)
+        assert culling(scene) == {"back"}
+        without = image(scene)
+        for one in scene.drawn.values():
+            one.actor.prop.culling = "none"
+        assert (np.abs(image(scene) - without).max(axis=2) > 8).mean() < 1e-4
+        scene.update(session)
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        {"hidden": frozenset({"FRONT"})},
+        {"perspective": True},
+        {"threshold": (0.0, 0.5)},
+    ],
+)
+def test_where_the_inside_can_be_seen_all_faces_are_drawn(scene, cube, view):
+    session = opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    assert culling(scene) == {"back"}
+    scene.update(changes.set_view(session, **view))
+    assert culling(scene) == {"none"}
+    scene.update(session)
+    assert culling(scene) == {"back"}
+
+
+def test_boundaries_with_a_hole_show_their_inside(scene, cube):
+    from dataclasses import replace
+
+    for gone in ("FRONT", "BLOCK"):
+        left = replace(cube, markers=tuple(m for m in cube.markers if m.name != gone))
+        assert is_closed(find_surfaces(left)) == (gone == "BLOCK"), gone
+    opened(scene, changes.open_mesh(Frame(left, quality(left)), None))
+    holed = replace(cube, markers=tuple(m for m in cube.markers if m.name != "FRONT"))
+    opened(scene, changes.open_mesh(Frame(holed, quality(holed)), None))
+    assert culling(scene) == {"none"}
+
+
+def test_what_highlights_a_boundary_is_made_when_it_is_selected_and_moves_with_it(scene, session):
+    opened(scene, session)
+    assert not [name for name in scene.plotter.actors if name.startswith("selected:")]
+    chosen = changes.select(session, ("top",))
+    scene.update(chosen)
+    band = scene.plotter.actors["selected:top"]
+    assert band.visibility
+    mesh = session.mesh.with_points(session.mesh.points + np.array([0.0, 1.0]))
+    moved = changes.add_frames(changes.start_run(chosen), [Frame(mesh, quality(mesh))])
+    scene.update(changes.show_frame(moved, 1))
+    assert np.asarray(band.mapper.dataset.points)[:, 1].min() == 5.0
+    scene.update(changes.select(moved, ()))
+    assert not band.visibility
