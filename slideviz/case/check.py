@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, ROLE_KEYS
 from slideviz.case.keys import KEYS
-from slideviz.case.model import FromFile, Motion, Rotate, Translate
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError
@@ -128,7 +128,7 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
         return
     if motion.point != "centroid" and len(motion.point) != dim:
         yield f"the point has {len(motion.point)} coordinates, and {needed}; give {dim}"
-    if isinstance(motion, Rotate):
+    if isinstance(motion, Rotate | Radial):
         if dim == 2 and any(motion.axis[:2]):
             yield f"the axis {motion.axis} leaves the plane; in 2D leave the axis out"
     elif len(motion.factors) not in (1, dim):

@@ -51,6 +51,21 @@ class Scale:
 
 
 @dataclass(frozen=True)
+class Radial:
+    """Push a marker away from an axis: each radius r becomes ``factor`` r + ``distance``.
+
+    ``factor`` 1.03 is 3 % outwards. The axis goes through ``point`` (d,) along ``axis``, that of
+    z in 2D; ``distance`` is in the mesh's length unit. Nodes on the axis stay on it.
+    """
+
+    marker: str
+    factor: float = 1.0
+    distance: float = 0.0
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    point: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class FromFile:
     """Displace nodes as a file lists: node index, then the Cartesian displacement.
 
@@ -61,7 +76,7 @@ class FromFile:
     marker: str = ""
 
 
-Motion = Translate | Rotate | Scale | FromFile
+Motion = Translate | Rotate | Scale | Radial | FromFile
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from slideviz.case.check import (
     require_valid,
 )
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import Case, FromFile, Motion, Point, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Motion, Point, Radial, Rotate, Scale, Translate
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -145,10 +145,12 @@ def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, str], Displacements]:
     return files
 
 
-def _increment(motion: Translate | Rotate | Scale, points: FloatArray) -> FloatArray:
+def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:
     """Return by how much a motion displaces the points from where they are, (k, d)."""
     if isinstance(motion, Translate):
         return np.broadcast_to(np.array(motion.vector, np.float64), points.shape)
+    if isinstance(motion, Radial):
+        return _pushed(motion, points)
     arm = points - _centre(motion.point, points)
     if isinstance(motion, Scale):
         return arm * (np.array(motion.factors, np.float64) - 1.0)
@@ -178,6 +180,20 @@ def _turned(arm: FloatArray, angle: float, axis: tuple[float, float, float]) -> 
     u, v, w = across
     twice = (b * w - c * v, c * u - a * w, a * v - b * u)
     return np.stack([sine * p + versine * q for p, q in zip(across, twice, strict=True)], axis=1)
+
+
+def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
+    """Return the change (k, d) of points pushed away from an axis."""
+    arm = points - np.array(motion.point, np.float64)
+    if arm.shape[1] == 3:
+        unit = np.array(motion.axis, np.float64) / math.hypot(*motion.axis)
+        # Component by component: the same bits whatever the number of points.
+        along = arm[:, 0] * unit[0] + arm[:, 1] * unit[1] + arm[:, 2] * unit[2]
+        arm = arm - along[:, None] * unit
+    radius = np.sqrt((arm * arm).sum(axis=1))
+    # On the axis there is no direction to be pushed into.
+    outwards = np.divide(motion.distance, radius, out=np.zeros_like(radius), where=radius > 0)
+    return arm * ((motion.factor - 1.0) + outwards)[:, None]
 
 
 def _motions_of(case: Case, marker: str) -> tuple[Motion, ...]:

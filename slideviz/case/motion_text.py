@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from slideviz.case.model import FromFile, Motion, Point, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Motion, Point, Radial, Rotate, Scale, Translate
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, is_none, name_text, nearest, number, shown, words_of
 from slideviz.errors import CaseError
 
-VERBS = ("translate", "rotate", "scale", "file")
+VERBS = ("translate", "rotate", "scale", "radial", "file")
 ALL_MOVING = "*"
 
 
@@ -91,7 +91,9 @@ def _read_motion(group: list[Word]) -> Motion:
         raise CaseError("* (all moving markers) goes with `file` only; name the marker")
     if verb == "translate":
         return Translate(marker, read_vector(_flat(rest), "the shift"))
-    return _read_rotate(marker, rest) if verb == "rotate" else _read_scale(marker, rest)
+    if verb == "rotate":
+        return _read_rotate(marker, rest)
+    return _read_scale(marker, rest) if verb == "scale" else _read_radial(marker, rest)
 
 
 def _read_file(marker: str, rest: list[Word]) -> FromFile:
@@ -155,6 +157,23 @@ def _read_scale(marker: str, rest: list[Word]) -> Scale:
     return Scale(marker, values, read_vector(place, "the point") if place else "centroid")
 
 
+def _read_radial(marker: str, rest: list[Word]) -> Radial:
+    items = _flat(rest)
+    letter = len(items) > 2 and items[2].text.lower() in ("x", "y", "z")
+    n_axis = 1 if letter else 3 if len(items) > 5 else 0
+    place = items[2 + n_axis :]
+    if len(items) < 4 or len(place) != (3 if n_axis else 2):
+        raise CaseError(
+            "needed are the factor of the radius, the distance, the axis (x, y, z or three "
+            "numbers) and a point on it; in 2D no axis: radial, 1.03, 0, z, (0, 0, 0)"
+        )
+    factor, distance = number(items[0].text), number(items[1].text)
+    if factor <= 0.0:
+        raise CaseError(f"the factor {factor:g} is not above 0: it would fold the marker")
+    axis = read_axis(items[2 : 2 + n_axis]) if n_axis else (0.0, 0.0, 1.0)
+    return Radial(marker, factor, distance, axis, read_vector(place, "the point"))
+
+
 def _motion_text(motion: Motion) -> str:
     if isinstance(motion, FromFile):
         marker = name_text(motion.marker) if motion.marker else ALL_MOVING
@@ -165,6 +184,10 @@ def _motion_text(motion: Motion) -> str:
     head = name_text(motion.marker)
     if isinstance(motion, Translate):
         return f"({head}, translate, {_numbers(motion.vector)})"
+    if isinstance(motion, Radial):
+        numbers = f"{float(motion.factor)!r}, {float(motion.distance)!r}"
+        axis = f"{axis_text(motion.axis)}, " if len(motion.point) == 3 else ""
+        return f"({head}, radial, {numbers}, {axis}{vector_text(motion.point)})"
     place = "centroid" if motion.point == "centroid" else vector_text(motion.point)
     if isinstance(motion, Scale):
         return f"({head}, scale, {_numbers(motion.factors)}, {place})"
@@ -188,6 +211,7 @@ GRAMMAR = (
     "(BLADE, rotate, degrees, AXIS, px, py, pz)",
     "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
     "(BLADE, scale, FACTORS, (px, py[, pz]))",
+    "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  radius r becomes FACTOR r + dr; 2D: no AXIS",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, file, path)                               the same for all moving boundaries",
     "centroid: mean of the nodes of the boundary, where it is at that moment",

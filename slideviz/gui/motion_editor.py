@@ -15,16 +15,20 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.model import FromFile, Motion, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
 from slideviz.gui.fields import Choice, NumberField, VectorField, not_zero
 
 KINDS: dict[type, str] = {
     Translate: "translate",
     Rotate: "rotate",
     Scale: "scale",
+    Radial: "push radially",
     FromFile: "displacement file",
 }
 ALL_MOVING = ""
+ABOUT = {"centroid": "its centroid", "axis": "the machine's axis", "point": "a point"}
+Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Direction, and a point on it."""
 
 
 class MotionEditor(QWidget):
@@ -38,6 +42,7 @@ class MotionEditor(QWidget):
         self._dim = 3
         self._markers: tuple[str, ...] = ()
         self._centroid = {}
+        self._machine: Axis | None = None
         self.form = QFormLayout(self)
         self.form.setContentsMargins(0, 2, 0, 0)
         self.form.setVerticalSpacing(4)
@@ -57,7 +62,11 @@ class MotionEditor(QWidget):
         self.factors.set_tip("Enlargement along each axis: 1 leaves it, 2 doubles it.")
         for field in self.factors.fields:
             field._allowed = not_zero
-        self.about = Choice({"centroid": "its centroid", "point": "a point"})
+        self.percent = NumberField(allowed=_above_minus_100)
+        self.percent.set_tip("How much larger the radius becomes, in percent: 3 is 3 % outwards.")
+        self.distance = NumberField()
+        self.distance.set_tip("How far outwards besides, in the mesh's length unit.")
+        self.about = Choice({"centroid": ABOUT["centroid"], "point": ABOUT["point"]})
         self.about.setToolTip("What stays in place while it turns or grows.")
         self.point = VectorField()
         self.point.set_tip("The point that stays in place.")
@@ -71,7 +80,15 @@ class MotionEditor(QWidget):
         self.marker.chosen.connect(lambda _: self._tell())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        for field in (self.vector, self.angle, self.factors, self.point, self.axis):
+        for field in (
+            self.vector,
+            self.angle,
+            self.factors,
+            self.percent,
+            self.distance,
+            self.point,
+            self.axis,
+        ):
             field.changed.connect(lambda _: self._tell())
         self.path.textEdited.connect(lambda _: self._tell())
         self.browse.clicked.connect(self._browse)
@@ -94,12 +111,24 @@ class MotionEditor(QWidget):
             "vector": self.vector,
             "angle": self.angle,
             "factors": self.factors,
+            "percent": self.percent,
+            "distance": self.distance,
             "about": self.about,
             "point": self.point,
             "axis": self.axis,
             "path": row,
         }
-        titles = ("By", "Angle (°)", "Factors", "About", "Point", "Axis", "File")
+        titles = (
+            "By",
+            "Angle (°)",
+            "Factors",
+            "Radius by (%)",
+            "and by",
+            "About",
+            "Point",
+            "Axis",
+            "File",
+        )
         for title, widget in zip(titles, self._rows.values(), strict=True):
             self.form.addRow(QLabel(title), widget)
 
@@ -111,29 +140,59 @@ class MotionEditor(QWidget):
             return
         self._sync_markers(motion, markers)
         self.kind.show_value(type(motion))
-        shown = {"path"} if isinstance(motion, FromFile) else set()
-        if isinstance(motion, Translate):
-            shown = {"vector"}
-            self.vector.show_value(motion.vector)
-        elif isinstance(motion, Rotate):
-            shown = {"angle", "about"} | ({"axis"} if dim == 3 else set())
-            self.angle.show_value(motion.angle_deg)
-            self.axis.show_value(motion.axis)
-        elif isinstance(motion, Scale):
-            shown = {"factors", "about"}
-            factors = motion.factors if len(motion.factors) > 1 else motion.factors * dim
-            self.factors.show_value(factors)
-        elif str(motion.path) != self.path.text() and not self.path.hasFocus():
-            self.path.setText("" if motion.path == Path() else str(motion.path))
-        if isinstance(motion, Rotate | Scale):
-            self.about.show_value("centroid" if motion.point == "centroid" else "point")
-            if motion.point != "centroid":
-                shown.add("point")
-                self.point.show_value(motion.point)
+        shown = self._show_numbers(motion, dim)
+        if isinstance(motion, Rotate | Scale | Radial):
+            shown |= {"about"} | self._show_place(motion, dim)
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
         for name, widget in self._rows.items():
             self.form.setRowVisible(widget, name in shown)
+
+    def _show_numbers(self, motion: Motion, dim: int) -> set[str]:
+        """Show what a motion does, and return the rows for it."""
+        if isinstance(motion, Translate):
+            self.vector.show_value(motion.vector)
+            return {"vector"}
+        if isinstance(motion, Rotate):
+            self.angle.show_value(motion.angle_deg)
+            return {"angle"}
+        if isinstance(motion, Scale):
+            factors = motion.factors if len(motion.factors) > 1 else motion.factors * dim
+            self.factors.show_value(factors)
+            return {"factors"}
+        if isinstance(motion, Radial):
+            # Rounded: 1.03 is not 3 % to the last bit.
+            self.percent.show_value(round(100.0 * (motion.factor - 1.0), 10))
+            self.distance.show_value(motion.distance)
+            return {"percent", "distance"}
+        if str(motion.path) != self.path.text() and not self.path.hasFocus():
+            self.path.setText("" if motion.path == Path() else str(motion.path))
+        return {"path"}
+
+    def _show_place(self, motion: Rotate | Scale | Radial, dim: int) -> set[str]:
+        """Show what a motion leaves in place, and return the rows for it."""
+        offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
+        if self._machine is not None and not isinstance(motion, Scale):
+            offered.insert(-1, "axis")
+        if [self.about.itemData(row) for row in range(self.about.count())] != offered:
+            self.about.clear()
+            for what in offered:
+                self.about.addItem(ABOUT[what], what)
+        what = "centroid" if motion.point == "centroid" else "point"
+        if "axis" in offered and self._is_machine(motion) and self.about.currentData() != "point":
+            what = "axis"
+        self.about.show_value(what)
+        if what != "centroid":
+            self.point.show_value(motion.point)
+        if not isinstance(motion, Scale):
+            self.axis.show_value(motion.axis)
+        turns = not isinstance(motion, Scale) and dim == 3 and what != "axis"
+        return ({"point"} if what == "point" else set()) | ({"axis"} if turns else set())
+
+    def _is_machine(self, motion: Rotate | Radial) -> bool:
+        """Tell whether a motion is about the machine's axis."""
+        axis, origin = self._machine
+        return motion.axis == axis and motion.point == origin[: self._dim]
 
     def _sync_markers(self, motion: Motion, markers: tuple[str, ...]) -> None:
         names = dict.fromkeys(markers)
@@ -149,17 +208,27 @@ class MotionEditor(QWidget):
 
     def _kind_chosen(self, kind: type) -> None:
         if self._motion is not None and type(self._motion) is not kind:
-            self.changed.emit(new_motion(kind, self._motion.marker, self._dim))
+            self.changed.emit(new_motion(kind, self._motion.marker, self._dim, self._machine))
 
     def _about_chosen(self, what: str) -> None:
-        if what == "point" and isinstance(self._motion, Rotate | Scale):
+        if what == "point" and getattr(self._motion, "point", None) == "centroid":
             centre = self._centroid.get(self._motion.marker, (0.0,) * self._dim)
             self.point.show_value(centre)
+        elif what == "axis":
+            axis, origin = self._machine
+            self.axis.show_value(axis)
+            self.point.show_value(origin)
         self._tell()
+        # What is about the axis already is the same motion: only the fields differ.
+        self.show_motion(self._motion, self._markers, self._dim)
 
     def set_centroids(self, centroids: dict[str, tuple[float, ...]]) -> None:
         """Take the centroids of boundaries: where a point starts that nobody has typed yet."""
         self._centroid = centroids
+
+    def set_machine(self, machine: Axis | None) -> None:
+        """Take the axis about which the mesh repeats; None where it does not."""
+        self._machine = machine
 
     def _tell(self) -> None:
         marker, kind = self.marker.currentData() or "", type(self._motion)
@@ -174,6 +243,10 @@ class MotionEditor(QWidget):
             motion = Rotate(marker, self.angle.value, point, axis)
         elif kind is Scale:
             motion = Scale(marker, self.factors.value, point)
+        elif kind is Radial:
+            axis = self.axis.value if self._dim == 3 else (0.0, 0.0, 1.0)
+            factor = round(1.0 + self.percent.value / 100.0, 14)
+            motion = Radial(marker, factor, self.distance.value, axis, point)
         else:
             motion = FromFile(Path(self.path.text().strip()), marker)
         if motion != self._motion:
@@ -186,12 +259,19 @@ class MotionEditor(QWidget):
             self._tell()
 
 
-def new_motion(kind: type, marker: str, dim: int) -> Motion:
-    """Return a motion of that kind which does not move anything yet."""
+def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -> Motion:
+    """Return a motion of that kind which does not move anything yet.
+
+    Where the mesh repeats about an axis, what turns or is pushed does so about that axis.
+    """
+    axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     if kind is Translate:
         return Translate(marker, (0.0,) * dim)
     if kind is Rotate:
-        return Rotate(marker, 0.0)
+        about = "centroid" if machine is None else origin[:dim]
+        return Rotate(marker, 0.0, about, axis)
+    if kind is Radial:
+        return Radial(marker, 1.0, 0.0, axis, origin[:dim])
     if kind is Scale:
         return Scale(marker, (1.0,) * dim)
     return FromFile(Path(), marker)
@@ -205,6 +285,10 @@ def describe(motion: Motion) -> str:
         what = f"rotate by {motion.angle_deg:.5g}°" + _about(motion.point)
     elif isinstance(motion, Scale):
         what = f"scale by {' × '.join(f'{v:.4g}' for v in motion.factors)}" + _about(motion.point)
+    elif isinstance(motion, Radial):
+        parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
+        parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
+        what = f"push radially by {' and '.join(parts)}"
     else:
         what = f"displace as in {motion.path.name or '(no file yet)'}"
     return f"{motion.marker or 'all moving'}: {what}"
@@ -214,3 +298,8 @@ def _about(point: object) -> str:
     if point == "centroid":
         return " about its centroid"
     return f" about ({', '.join(f'{v:.4g}' for v in point)})"
+
+
+def _above_minus_100(value: float) -> str:
+    """Return why a radius cannot change by so many percent."""
+    return "" if value > -100.0 else "-100 % or less would fold the boundary"

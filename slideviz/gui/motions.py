@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.icons import icon
-from slideviz.gui.motion_editor import KINDS, MotionEditor, describe, new_motion
+from slideviz.gui.motion_editor import KINDS, Axis, MotionEditor, describe, new_motion
 from slideviz.view import changes
 from slideviz.view.look import Look
 from slideviz.view.state import Session
@@ -119,6 +119,7 @@ class MotionPanel(QWidget):
         if session.mesh is not self._mesh:
             self._mesh = session.mesh
             self.editor.set_centroids(_centroids(session))
+        self.editor.set_machine(_machine(session))
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
@@ -157,7 +158,8 @@ class MotionPanel(QWidget):
         moving = session.case.markers_with("moving")
         chosen = [name for name in session.view.selected if name in moving]
         marker = (chosen or list(moving))[0]
-        self.store.change(changes.add_motion, new_motion(kind, marker, session.mesh.dim))
+        motion = new_motion(kind, marker, session.mesh.dim, _machine(session))
+        self.store.change(changes.add_motion, motion)
 
     def _edited(self, motion: object) -> None:
         self.store.change(changes.replace_motion, self.list.currentRow(), motion)
@@ -186,3 +188,12 @@ def _centroids(session: Session) -> dict[str, tuple[float, ...]]:
         for marker in session.mesh.markers
         if len(marker.nodes)
     }
+
+
+def _machine(session: Session) -> Axis | None:
+    """Return the axis about which periodic boundaries repeat, if they do."""
+    for pair in session.pairs:
+        both = {session.role(pair.first), session.role(pair.second)}
+        if pair.kind == "rotational" and both == {"periodic"}:
+            return pair.axis, pair.origin
+    return None

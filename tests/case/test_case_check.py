@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import Case, FromFile, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.case.motion import check_case, require_valid
 from slideviz.errors import CaseError
 
@@ -73,6 +73,10 @@ def test_good_cases(square, case):
         (
             good(motions=(Rotate("UPPER", 5.0, "centroid", (1.0, 0.0, 0.0)),)),
             "motion 1: the axis (1.0, 0.0, 0.0) leaves the plane; in 2D leave the axis out",
+        ),
+        (
+            good(motions=(Radial("UPPER", 1.1),)),
+            "motion 1: the point has 3 coordinates, and the mesh has 2 dimensions; give 2",
         ),
         (
             good(motions=(Scale("UPPER", (1.0, 1.0, 1.0)),)),

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import displacement_of, displacements, moved_points, read_files
 from slideviz.errors import CaseError
 
@@ -235,3 +235,34 @@ class TestDisplacements:
             [Rotate("BLOCK", 60.0, "centroid"), Translate("BLOCK", (-0.2, -0.3))], points
         )
         np.testing.assert_allclose(found.vectors, fit, atol=1e-9)
+
+
+def test_a_radial_push_changes_the_radius_only():
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(20, 3))
+    axis, point = np.array([1.0, 2.0, -0.5]), np.array([0.3, -1.0, 2.0])
+    motion = Radial("A", 1.03, 0.2, tuple(axis), tuple(point))
+    moved = moved_points([motion], points)
+    unit = axis / np.linalg.norm(axis)
+
+    def parts(at):
+        arm = at - point
+        along = arm @ unit
+        across = arm - along[:, None] * unit
+        radius = np.linalg.norm(across, axis=1)
+        return along, radius, across / radius[:, None]
+
+    for now, before, wanted in zip(parts(moved), parts(points), (0, 1, 2), strict=True):
+        expected = 1.03 * before + 0.2 if wanted == 1 else before
+        assert np.allclose(now, expected, rtol=0, atol=1e-12)
+
+
+def test_a_radial_push_in_2d_leaves_its_centre_where_it_is():
+    points = np.array([[1.0, 2.0], [3.0, 2.0]])
+    moved = moved_points([Radial("A", 2.0, 0.5, point=(1.0, 2.0))], points)
+    assert np.array_equal(moved, [[1.0, 2.0], [5.5, 2.0]])
+
+
+def test_a_radial_push_by_nothing_changes_no_bit():
+    points = np.random.default_rng(1).normal(size=(9, 3))
+    assert np.array_equal(moved_points([Radial("A")], points), points)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import FromFile, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion_text import GRAMMAR, read_motions
 from slideviz.errors import CaseError
 
@@ -35,6 +35,10 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         ("(B, scale, 2, 3, (0, 1))", Scale("B", (2.0, 3.0), (0.0, 1.0))),
         ("(B, scale, (2, 3), (0, 1))", Scale("B", (2.0, 3.0), (0.0, 1.0))),
         ("(B, scale, 2, 3, 4, 0, 1, 2)", Scale("B", (2.0, 3.0, 4.0), (0.0, 1.0, 2.0))),
+        ("(B, radial, 1.03, 0, 1, 2)", Radial("B", 1.03, 0.0, Z, (1.0, 2.0))),
+        ("(B, radial, 1, -0.5, (1, 2))", Radial("B", 1.0, -0.5, Z, (1.0, 2.0))),
+        ("(B, radial, 1.03, 0, x, (1, 2, 3))", Radial("B", 1.03, 0.0, X, (1.0, 2.0, 3.0))),
+        ("(B, radial, 1.1, 0, (1, 0, 0), (1, 2, 3))", Radial("B", 1.1, 0.0, X, (1.0, 2.0, 3.0))),
         ("(B, file, a\\b.txt)", FromFile(Path("a/b.txt"), "B")),
         ('(B, file, "my, (file).txt")', FromFile(Path("my, (file).txt"), "B")),
         ("(*, file, b.txt)", FromFile(Path("b.txt"))),
@@ -69,6 +73,8 @@ def test_examples_of_the_reference_are_read():
             "px, py": "1, 2",
             "AXIS": "0, 1, 0",
             "FACTORS": "2",
+            "FACTOR": "2",
+            "dr": "0.1",
         }.items():
             text = text.replace(word, value)
         assert len(read_motions(text)) == 1, line
@@ -82,7 +88,7 @@ def test_examples_of_the_reference_are_read():
         ("(B, translate, 1, 0))", "each motion needs a pair of brackets"),
         ("(B, translate, 1, 0", "a bracket is not closed; .* needs a backslash at the end"),
         ('(B, file, "a)', "the quotation mark .* is not closed"),
-        ("(B)", "motion 1: needed are a marker and one of translate, rotate, scale, file"),
+        ("(B)", "motion 1: needed are a marker and one of translate, rotate, scale, radial, file"),
         ("(B, translate, 1, 0) ; ()", "motion 2: needed are a marker and one of"),
         ("((B), translate, 1, 0)", "motion 1: it does not begin with the name of a marker"),
         ('("", translate, 1, 0)', "motion 1: it does not begin with the name of a marker"),
@@ -102,6 +108,10 @@ def test_examples_of_the_reference_are_read():
         ("(B, rotate, 5, 1, 2, 3, 4, 5, 6, 7)", "after the angle needed are the axis"),
         ("(B, rotate, 5, 0, 0, 0, centroid)", "the axis .* has no direction"),
         ("(B, rotate, 5, w, centroid)", "after the angle needed are"),
+        ("(B, radial, 1.03)", "needed are the factor of the radius, the distance, the axis"),
+        ("(B, radial, 1.03, 0, z, (0, 0))", "and a point on it; in 2D no axis"),
+        ("(B, radial, 1.03, 0, 0, 0, 0)", "and a point on it; in 2D no axis"),
+        ("(B, radial, 0, 1, (0, 0))", "the factor 0 is not above 0: it would fold the marker"),
         ("(B, scale, 2)", "needed are one factor .* put the point in brackets"),
         ("(B, scale)", "needed are one factor or one for each axis"),
         ("(B, scale, centroid)", "0 factors are given; needed is one, or one for each axis"),

@@ -15,6 +15,7 @@ from slideviz.case.model import (
     SLIDING,
     Case,
     FromFile,
+    Radial,
     Reduction,
     Rotate,
     Scale,
@@ -50,6 +51,8 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
         st.builds(Translate, marker, vector),
         st.builds(Rotate, marker, finite, point, axis),
         st.builds(Scale, marker, factors, point),
+        st.builds(Radial, marker, positive, finite, axis, st.tuples(finite, finite, finite)),
+        st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
         st.builds(FromFile, path, marker | st.just("")),
     )
 
