@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, field
-from functools import cache
+from threading import Lock, Thread
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,6 +17,9 @@ from slideviz.view.plots_style import Style
 
 DPI = 100
 """Of a screen whose pixels are not scaled."""
+
+THREAD = "slideviz-plot"
+_ONE = Lock()  # matplotlib is not made for several threads
 
 Draw = Callable[[Figure, Style], None]
 """Fills a figure; it holds no widget, for it is called, and forgotten, in another thread."""
@@ -93,12 +96,19 @@ def _arrange(figure: Figure, place: Place) -> Place:
     return place
 
 
-@cache
-def _thread() -> ThreadPoolExecutor:
-    """Return the one thread that draws plots: matplotlib is not made for several."""
-    return ThreadPoolExecutor(1, "slideviz-plots", stand_back)
-
-
 def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:
-    """Return at once what will be the plot."""
-    return _thread().submit(picture, draw_on, paper, place)
+    """Return at once what will be the plot, or what went wrong with it."""
+    coming: Future[Picture] = Future()
+
+    def work() -> None:
+        stand_back()
+        try:
+            with _ONE:
+                coming.set_result(picture(draw_on, paper, place))
+        except Exception as error:
+            # Whatever it is, the window must hear of it: a thread swallows it otherwise.
+            coming.set_exception(error)
+
+    # Ended with each plot: a thread that waits for the next would keep what it drew.
+    Thread(target=work, name=THREAD).start()
+    return coming

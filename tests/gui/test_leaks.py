@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from qtpy.QtCore import QCoreApplication, QEvent
 
+from slideviz.gui.plot_image import THREAD
 from slideviz.gui.window import MainWindow
 from slideviz.view import changes
 
@@ -45,6 +46,9 @@ def cycle(qtbot, settings, path):
 
 
 def settle():
+    for thread in threading.enumerate():
+        if thread.name == THREAD:
+            thread.join()  # a plot that was on its way
     for _ in range(3):
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         QCoreApplication.processEvents()
