@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 
 import pytest
+from PIL import Image
 
 from slideviz.case.cfg import set_key
 from slideviz.case.model import PERIODIC_MODES, Case
@@ -13,6 +14,7 @@ from slideviz.view.compare import METHODS
 from tools.study import __main__ as study
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense
+from tools.study.publish import FIGURES, WIDTH
 from tools.study.sections import SECTIONS
 from tools.study.summary import HERE, Line, write_summary
 
@@ -149,3 +151,26 @@ def test_the_dense_square_gives_its_figures_and_counts(tmp_path, monkeypatch):
         counts = [int(row["control_nodes"]) for row in csv.DictReader(file)]
     assert len(counts) == 3 * 3 * 2
     assert all(few < many for few, many in zip(counts[::2], counts[1::2], strict=True))
+
+
+def test_main_figures_are_published_small(tmp_path, capsys):
+    for figure in FIGURES.values():
+        path = tmp_path / "study" / figure
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.new("RGB", (2 * WIDTH, 1000), "white").save(path)
+    (tmp_path / "pictures").mkdir()
+    argv = ["-o", str(tmp_path / "study"), "--publish", str(tmp_path / "pictures")]
+    assert study.main(argv) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(FIGURES)
+    for name in FIGURES:
+        with Image.open(tmp_path / "pictures" / name) as image:
+            assert image.size == (WIDTH, 500)
+
+
+def test_what_is_published_are_figures_that_calls_write():
+    folders = {call.name for call in CALLS} | {"dense"}
+    lines = {f"figure_{line.figure}" for line in GREEDY}
+    for figure in FIGURES.values():
+        folder, name = figure.split("/")
+        assert folder in folders
+        assert folder != "dense" or name.removesuffix(".png") in lines

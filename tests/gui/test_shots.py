@@ -99,6 +99,7 @@ def test_a_palette_keeps_a_few_red_pixels_and_a_smooth_background(tmp_path):
     drawn = np.repeat(np.repeat(across[None, :, None], 300, axis=0), 3, axis=2)
     noise = np.random.default_rng(0).integers(0, 255, (60, 60, 3))
     drawn[100:160, 100:160] = noise
+    drawn[250:] = 255
     drawn[10:13, 10:13] = (232, 17, 45)
     path = tmp_path / "drawn.png"
     Image.fromarray(drawn).save(path)
@@ -108,6 +109,7 @@ def test_a_palette_keeps_a_few_red_pixels_and_a_smooth_background(tmp_path):
         kept = np.asarray(image.convert("RGB")).astype(int)
     assert np.abs(kept[11, 11] - (232, 17, 45)).max() < 30
     assert np.abs(kept[200:] - drawn[200:]).max() <= 4
+    assert (kept[250:] == 255).all()
 
 
 def test_a_folder_that_cannot_be_made(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 from slideviz.cli import run
 from tools.study.cases import CALLS, Call
 from tools.study.dense import dense
+from tools.study.publish import publish
 from tools.study.sections import SECTIONS, draw_sections
 from tools.study.summary import write_summary
 
@@ -21,7 +22,17 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("-o", "--output", type=Path, default=Path("study"), metavar="DIR")
     parser.add_argument("--quick", action="store_true", help="small meshes, few steps, no summary")
     parser.add_argument("--only", metavar="LIST", help="names of cases, with commas")
+    parser.add_argument(
+        "--publish",
+        type=Path,
+        metavar="DIR",
+        help="run nothing; put the main figures of a finished study there",
+    )
     arguments = parser.parse_args(argv)
+    if arguments.publish:
+        for path in publish(arguments.output, arguments.publish):
+            _say(str(path))
+        return 0
     names = [call.name for call in CALLS] + ["dense"]
     wanted = arguments.only.split(",") if arguments.only else names
     for name in wanted:
