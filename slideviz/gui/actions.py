@@ -8,6 +8,7 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QLabel, QMainWindow, QMenu, QSizePolicy, QToolBar, QWidget
 
+from slideviz.gui.beside import fill_compare
 from slideviz.gui.fields import Choice
 from slideviz.gui.icons import icon
 from slideviz.gui.theme import THEMES
@@ -143,6 +144,8 @@ class Actions:
         for side, keys in {**SIDE_KEYS, "iso": "0"}.items():
             text = "isometric" if side == "iso" else side
             sides.addAction(self._add(f"side{side}", text, partial(window.look_from, side), keys))
+        self.compare = self._menu(menu, "compare", "Co&mpare with")
+        self.compare.aboutToShow.connect(lambda: fill_compare(self.compare, window.store))
         menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
         for name, text, keys in (
             ("add_plane", "&Cut by a plane", "C"),
@@ -281,6 +284,7 @@ class Actions:
         for name in ("save_case", "save_picture", "copy_picture", "fit", "show_all"):
             self.by_name[name].setEnabled(opened)
         self._sync_export(session, busy)
+        self.compare.setEnabled(session.deformed is not None)
         self.by_name["save_mesh"].setEnabled(opened and not busy)
         self.by_name["run"].setEnabled(ready and not busy)
         self.by_name["cancel"].setEnabled(busy)

@@ -4,19 +4,71 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QToolButton
+from qtpy.QtGui import QActionGroup
+from qtpy.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton
 
 from slideviz.gui.canvas import View3D
+from slideviz.view import changes
+from slideviz.view.panes import choices, panes, show_in
 from slideviz.view.scene import Scene
+from slideviz.view.store import Store
+
+
+def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
+    """Put into a menu what one of two views can show: the undeformed mesh and the runs."""
+    _fill(menu, store, panes(store.session)[pane], lambda n: store.change(show_in, pane, n))
+
+
+def fill_compare(menu: QMenu, store: Store) -> None:
+    """Put into a menu with what the run that is shown can be compared, and the end of that."""
+    beside, shown = store.session.view.beside, store.session.shown
+    _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
+    menu.addSeparator()
+    end = menu.addAction("End the comparison")
+    end.setEnabled(beside is not None)
+    end.triggered.connect(lambda: store.change(changes.show_beside, None))
+
+
+def _fill(
+    menu: QMenu,
+    store: Store,
+    now: int | None,
+    choose: Callable[[int], None],
+    leave: int | None = None,
+) -> None:
+    menu.clear()
+    group = QActionGroup(menu)
+    for number, text in choices(store.session).items():
+        if number == leave:
+            continue
+        act = menu.addAction(text)
+        act.setCheckable(True)
+        act.setChecked(number == now)
+        act.setData(number)
+        group.addAction(act)
+        act.triggered.connect(lambda _=False, number=number: choose(number))
 
 
 class TitleBar(QFrame):
-    """Says what a view shows, cut short where there is no room, with a button to close it."""
+    """Says what a view shows, cut short where there is no room, with a button to close it.
+
+    Parameters
+    ----------
+    name : str
+    closable : bool
+        Whether there is the button to close it.
+    fill : callable, optional
+        Puts into a menu what the view can show instead; the title is a drop-down then.
+    """
 
     closed = Signal()
 
-    def __init__(self, name: str, closable: bool) -> None:
+    def __init__(
+        self, name: str, closable: bool, fill: Callable[[QMenu], None] | None = None
+    ) -> None:
         super().__init__()
         self.setObjectName(name)
         self._text = ""
@@ -25,18 +77,29 @@ class TitleBar(QFrame):
         self.setFixedHeight(26)
         row = QHBoxLayout(self)
         row.setContentsMargins(6, 0, 2, 0)
-        self.label = QLabel()
-        self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.label: QLabel | QToolButton = self._drop_down(fill) if fill else QLabel()
+        if isinstance(self.label, QLabel):
+            self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         row.addWidget(self.label, 1)
         self.close_button = QToolButton()
         self.close_button.setText("✕")
         self.close_button.setAutoRaise(True)
-        self.close_button.setToolTip("End the comparison")
+        self.close_button.setToolTip("End the comparison; the other view stays")
         self.close_button.clicked.connect(self.closed)
         self.close_button.setVisible(closable)
         row.addWidget(self.close_button)
         self.hide()
+
+    def _drop_down(self, fill: Callable[[QMenu], None]) -> QToolButton:
+        button = QToolButton()
+        button.setAutoRaise(True)
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.menu = QMenu(button)
+        self.menu.aboutToShow.connect(lambda: fill(self.menu))
+        button.setMenu(self.menu)
+        return button
 
     @property
     def text(self) -> str:
@@ -49,11 +112,15 @@ class TitleBar(QFrame):
         self._fit()
 
     def _fit(self) -> None:
-        room = max(self.label.width() - 4, 20)
+        drops = isinstance(self.label, QToolButton)
+        room = max(self.label.width() - (28 if drops else 4), 20)
         metrics = self.label.fontMetrics()
         shown = metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room)
         self.label.setText(shown)
-        self.setToolTip(self._text if shown != self._text else "")
+        tip = self._text if shown != self._text else ""
+        if drops:
+            tip = f"{self._text}\nClick to show something else here"
+        self.setToolTip(tip)
 
     def resizeEvent(self, event) -> None:
         super().resizeEvent(event)

@@ -23,8 +23,8 @@ from slideviz.gui.worst import WorstPanel
 
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
-LEFT_WIDTH, RIGHT_WIDTH = 350, 300
-"""Pixels that the panels at the sides need at least."""
+LEFT_WIDTH, RIGHT_WIDTH = 356, 316
+"""Pixels that the panels at the sides need at least, and have at first: the view gets the rest."""
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,11 @@ class Docks:
         window = self.window
         heights = {"boundaries": 240, "motion": 330, "run": 90}
         docks = [self.by_name[name] for name in heights]
-        window.resizeDocks(docks[:1], [372], Qt.Orientation.Horizontal)
+        window.resizeDocks(docks[:1], [LEFT_WIDTH], Qt.Orientation.Horizontal)
         window.resizeDocks(docks, list(heights.values()), Qt.Orientation.Vertical)
         right = [self.by_name[row.name] for row in DOCKS if row.area == RIGHT and not row.after]
         if right:
-            window.resizeDocks(right[:1], [320], Qt.Orientation.Horizontal)
+            window.resizeDocks(right[:1], [RIGHT_WIDTH], Qt.Orientation.Horizontal)
             window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
 
     def lead_to(self, name: str) -> None:

@@ -24,6 +24,8 @@ _STROKES = {
     "pause": '<path d="M8 5v14M16 5v14" stroke-width="3.4"/>',
     "first": '<path d="M19 5v14L8 12z" fill="{c}"/><path d="M5.5 5v14"/>',
     "last": '<path d="M5 5v14l11-7z" fill="{c}"/><path d="M18.5 5v14"/>',
+    "loop": '<path d="M17 3l3 3-3 3"/><path d="M20 6H8a5 5 0 0 0-4 5"/>'
+    '<path d="M7 21l-3-3 3-3"/><path d="M4 18h12a5 5 0 0 0 4-5"/>',
     "previous": '<path d="M15 6l-6 6 6 6"/>',
     "next": '<path d="M9 6l6 6-6 6"/>',
     "fit": '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/><circle cx="12" cy="12" r="3"/>',

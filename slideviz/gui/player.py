@@ -1,17 +1,74 @@
 """The step player under the view, and the line with the quality of the step that is shown."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
 from qtpy.QtCore import QElapsedTimer, Qt, QTimer
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
+from qtpy.QtGui import QAction, QActionGroup, QTextDocument
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
 
 from slideviz.gui.icons import icon
 from slideviz.view import changes
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
-INTERVAL_MS = 100
-"""Between two steps; where drawing takes longer, steps are left out."""
+FILM_MS = 3000
+"""What all steps take together at the usual speed, where no limit for one step is reached."""
+STEP_MS = (50, 500)
+"""The shortest and the longest time that a step is seen at the usual speed."""
+TICK_MS = 33
+"""Shortest time between two pictures; where drawing takes longer too, steps are left out."""
+SPEEDS = (0.5, 1.0, 2.0, 4.0)
+
+
+def step_ms(steps: int, speed: float = 1.0) -> float:
+    """Return how long each of ``steps`` is seen, in milliseconds."""
+    shortest, longest = STEP_MS
+    return min(max(FILM_MS / max(steps, 1), shortest), longest) / speed
+
+
+class Results(QLabel):
+    """The numbers of a step, in the order of what matters; those without room are left out."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._parts: list[str] = []
+        self.setTextFormat(Qt.TextFormat.RichText)
+        self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        # Numbers that come and go may not take room from the view or the panels.
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def show_parts(self, parts: list[str]) -> None:
+        """Show other numbers, each as rich text."""
+        if parts != self._parts:
+            self._parts = parts
+            self._fit()
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        metrics = self.fontMetrics()
+        room, fitting = self.width() - 4, []
+        for part in self._parts:
+            # Bold letters are somewhat wider than those that are measured.
+            room -= round(1.1 * metrics.horizontalAdvance(plain(part) + "  · "))
+            if room < 0:
+                break
+            fitting.append(part)
+        self.setText("&nbsp;· ".join(fitting))
+        missing = len(fitting) < len(self._parts)
+        self.setToolTip("<br>".join(self._parts) if missing else "")
+
+
+def plain(rich: str) -> str:
+    """Return rich text without its marks."""
+    document = QTextDocument()
+    document.setHtml(rich)
+    return document.toPlainText()
 
 
 class Player(QWidget):
@@ -38,37 +95,76 @@ class Player(QWidget):
             button.clicked.connect(function)
             self.buttons[name] = button
             row.addWidget(button)
+        self._add_speed(row)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setObjectName("steps_slider")
-        self.slider.setMinimumWidth(60)
+        self.slider.setMinimumWidth(50)
         self.slider.setMaximumWidth(320)
         self.slider.setPageStep(1)
         self.slider.valueChanged.connect(self.go)
         row.addSpacing(6)
-        row.addWidget(self.slider, 2)
+        row.addWidget(self.slider, 1)
         self.step_text = QLabel()
-        self.step_text.setMinimumWidth(82)
         row.addSpacing(6)
         row.addWidget(self.step_text)
-        self.result = QLabel()
-        self.result.setTextFormat(Qt.TextFormat.RichText)
-        self.result.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.result.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.result = Results()
         row.addWidget(self.result, 3)
         self._timer = QTimer(self)
-        self._timer.setInterval(INTERVAL_MS)
         self._timer.timeout.connect(self._tick)
         self._clock = QElapsedTimer()
-        self._mesh: object = None
+        self._owed = 0.0
         self._colour = "#3b4652"
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
+
+    def _advance(self, text: str) -> int:
+        return self.step_text.fontMetrics().horizontalAdvance(text)
+
+    def _add_speed(self, row: QHBoxLayout) -> None:
+        self.loop = QToolButton()
+        self.loop.setObjectName("player_loop")
+        self.loop.setCheckable(True)
+        self.loop.setToolTip("Play again and again")
+        self.buttons["loop"] = self.loop
+        self.speed = 1.0
+        self.speed_button = QToolButton()
+        self.speed_button.setObjectName("player_speed")
+        self.speed_button.setToolTip("How fast the steps are played")
+        self.speed_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.speed_button.setAutoRaise(True)
+        menu, group = QMenu(self), QActionGroup(self)
+        self.speeds: dict[float, QAction] = {}
+        for speed in SPEEDS:
+            act = menu.addAction(f"{speed:g}×")
+            act.setCheckable(True)
+            group.addAction(act)
+            act.triggered.connect(lambda _=False, speed=speed: self.set_speed(speed))
+            self.speeds[speed] = act
+        self.speed_button.setMenu(menu)
+        for button in (self.loop, self.speed_button):
+            row.addWidget(button)
+        self.set_speed(self.speed)
+        self.loop.setIcon(icon("loop"))
+
+    def set_speed(self, speed: float) -> None:
+        """Play that many times as fast as usual, also what plays already."""
+        self.speed = speed
+        self.speeds[speed].setChecked(True)
+        self.speed_button.setText(f"{speed:g}×")
+        if hasattr(self, "_timer"):
+            self._timer.setInterval(self._tick_ms())
+
+    def _step_ms(self) -> float:
+        return step_ms(len(self.store.session.frames) - 1, self.speed)
+
+    def _tick_ms(self) -> int:
+        return max(round(self._step_ms()), TICK_MS)
 
     def set_icon_colour(self, colour: str) -> None:
         """Redraw the icons in another colour."""
         self._colour = colour
         for name, button in self.buttons.items():
-            button.setIcon(icon(name, colour))
+            button.setIcon(icon("pause" if name == "play" and self.playing else name, colour))
 
     def sync(self, session: Session) -> None:
         """Show the session."""
@@ -83,24 +179,25 @@ class Player(QWidget):
         self.slider.setToolTip(why or "Which step is shown.")
         for name, button in self.buttons.items():
             ahead = name in ("next", "last")
-            enabled = last > 0 and (name == "play" or (at < last if ahead else at > 0))
+            always = name in ("play", "loop")
+            enabled = last > 0 and (always or (at < last if ahead else at > 0))
             button.setEnabled(enabled)
+        # The slider keeps its length, whatever the text says.
+        widest = max(self._advance(text) for text in ("Undeformed", f"Step {last} of {last}"))
+        self.step_text.setFixedWidth(widest + 4)
         if session.mesh is None:
             self.step_text.setText("")
         else:
             self.step_text.setText(f"Step {at} of {last}" if at else "Undeformed")
-        self._tell(session)
+        self.speed_button.setEnabled(last > 0)
+        self.result.show_parts(result_parts(session))
         if not last:
             self.stop()
 
-    def _tell(self, session: Session) -> None:
-        """Show the numbers; what they need of room they keep, or the view would change its size."""
-        if session.mesh is not self._mesh:
-            self._mesh = session.mesh
-            self.result.setMinimumWidth(0)
-        self.result.setText(result_text(session))
-        wanted = self.result.minimumSizeHint().width()
-        self.result.setMinimumWidth(max(wanted, self.result.minimumWidth()))
+    @property
+    def playing(self) -> bool:
+        """Tell whether the steps are played now."""
+        return self._timer.isActive()
 
     def go(self, index: int) -> None:
         """Show a step; 0 is the undeformed mesh."""
@@ -112,12 +209,13 @@ class Player(QWidget):
 
     def toggle(self) -> None:
         """Play, or stop playing."""
-        if self._timer.isActive():
+        if self.playing:
             self.stop()
         elif len(self.store.session.frames) > 1:
             if self.store.session.view.frame >= len(self.store.session.frames) - 1:
                 self.go(0)
-            self._timer.start()
+            self._owed = 0.0
+            self._timer.start(self._tick_ms())
             self._clock.start()
             self.buttons["play"].setIcon(icon("pause", self._colour))
 
@@ -127,26 +225,35 @@ class Player(QWidget):
         self.buttons["play"].setIcon(icon("play", self._colour))
 
     def _tick(self) -> None:
-        self.step(max(1, round(self._clock.restart() / self._timer.interval())))
-        if self.store.session.view.frame >= len(self.store.session.frames) - 1:
+        last = len(self.store.session.frames) - 1
+        if self.store.session.view.frame >= last:
+            # The last step, too, was seen for its time.
+            if self.loop.isChecked():
+                self._clock.restart()
+                self._owed = 0.0
+                self.go(0)
+            else:
+                self.stop()
+            return
+        # A timer that comes a little early or late may not change the speed.
+        self._owed += self._clock.restart() / self._step_ms()
+        by = max(1, round(self._owed))
+        self._owed -= by
+        self.step(by)
+        if self.store.session.view.frame >= last and not self.loop.isChecked():
             self.stop()
 
 
-def result_text(session: Session) -> str:
-    """Return the numbers of the step that is shown: quality, inverted cells, seconds."""
+def result_parts(session: Session) -> list[str]:
+    """Return the numbers of the step that is shown, the most important first, as rich text."""
     frame = session.frame
     if frame is None:
-        return ""
+        return []
     quality = frame.quality
-    parts = []
-    if session.ran is not None and not session.ran.steps and session.deformed is not None:
-        count = len(session.frames) - 1
-        parts.append(f"automatic: <b>{count}</b> step{'s' if count > 1 else ''}")
-    parts += [f"min <b>{quality.min:.4f}</b>", f"mean <b>{quality.mean:.4f}</b>"]
     bad = quality.inverted
     colour = " style='color:#e8112d'" if bad else ""
-    parts.append(f"<span{colour}><b>{bad:,}</b> inverted</span>")
-    if frame.step is not None:
-        seconds = sum(sum(f.step.seconds.values()) for f in session.frames if f.step is not None)
-        parts.append(f"<b>{seconds:.2f}</b> s")
-    return "&nbsp;· ".join(parts)
+    return [
+        f"<span{colour}><b>{bad:,}</b> inverted</span>",
+        f"min <b>{quality.min:.4f}</b>",
+        f"mean <b>{quality.mean:.4f}</b>",
+    ]

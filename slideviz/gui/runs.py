@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
+from slideviz.gui.beside import fill_compare
 from slideviz.gui.icons import icon
 from slideviz.gui.runs_tree import MIN, NUMBER, RUN, WORDS, RunTree
 from slideviz.view import changes
@@ -29,12 +30,15 @@ from slideviz.view.state import Run, Session
 from slideviz.view.store import Store
 
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
-TIP_UNDEFORMED = "Compare with the undeformed mesh, side by side"
+TIP_COMPARE = (
+    "Show the undeformed mesh or another run beside the run that is shown. "
+    "Ctrl+click on a run does so too."
+)
 TABLE_FILTERS = "Table (*.csv)"
 
 
 class RunsPanel(QWidget):
-    """Lists the runs; a click shows one, a double click shows it beside the one that is shown.
+    """Lists the runs; a click shows one, with Ctrl beside the one that is shown.
 
     Parameters
     ----------
@@ -70,6 +74,7 @@ class RunsPanel(QWidget):
         self.tree.session = lambda: self.store.session
         self.tree.currentItemChanged.connect(self._chosen)
         self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
+        self.tree.beside_wanted.connect(self.show_beside)
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
         layout.addWidget(self.empty, 1)
         layout.addWidget(self.tree, 1)
@@ -80,9 +85,9 @@ class RunsPanel(QWidget):
     def _make_buttons(self) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setSpacing(2)
-        self.buttons: dict[str, QToolButton] = {}
+        self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
+        row.addWidget(self.buttons["compare"])
         for name, image, tip, function in (
-            ("undeformed", "undeformed", TIP_UNDEFORMED, self.compare_undeformed),
             ("settings", "settings", "Put its settings back into the panels", self.take_settings),
             ("save", "save", "Save the mesh of this run", self.save_mesh),
             ("remove", "remove", "Remove this run from the list", self.remove),
@@ -99,9 +104,22 @@ class RunsPanel(QWidget):
             if name == "copy":
                 row.addStretch(1)
             row.addWidget(button)
-        self.buttons["undeformed"].setCheckable(True)
         self.take_theme(None, self._colour)
         return row
+
+    def _make_compare(self) -> QToolButton:
+        button = QToolButton()
+        button.setObjectName("runs_compare")
+        button.setText("Compare")
+        button.setToolTip(TIP_COMPARE)
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setIconSize(QSize(18, 18))
+        button.setProperty("image", "beside")
+        menu = QMenu(button)
+        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
+        button.setMenu(menu)
+        return button
 
     def take_theme(self, _look: Look | None, colour: str) -> None:
         """Draw the icons in the colours of another theme."""
@@ -130,7 +148,7 @@ class RunsPanel(QWidget):
         run = session.run_shown
         done = run is not None and run.last is not None
         for name, can in (
-            ("undeformed", done),
+            ("compare", done),
             ("settings", run is not None),
             ("save", done and bool(run.end)),
             ("remove", run is not None and bool(run.end)),
@@ -138,7 +156,6 @@ class RunsPanel(QWidget):
             ("export", bool(session.runs)),
         ):
             self.buttons[name].setEnabled(can)
-        self.buttons["undeformed"].setChecked(session.view.beside == changes.UNDEFORMED)
 
     def _fill(self, session: Session) -> None:
         tree, runs = self.tree, session.runs
@@ -208,13 +225,16 @@ class RunsPanel(QWidget):
         session, menu = self.store.session, QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
+        # A click with the right button chooses no row: which one is meant, the menu says.
+        menu.addAction(f"Run {number}: {method_words(run.case)}").setEnabled(False)
+        menu.addSeparator()
         beside = session.view.beside == number
         for text, can, function in (
             ("Show", True, lambda: self.store.change(changes.show_run, number)),
             (
-                "End the comparison" if beside else "Show beside the run that is shown",
+                "End the comparison" if beside else f"Show beside run {session.shown}",
                 beside or number != session.shown,
-                lambda: self.store.change(changes.show_beside, None if beside else number),
+                lambda: self.show_beside(number),
             ),
             ("Put its settings back into the panels", True, lambda: self.take_settings(number)),
             ("Save its mesh…", bool(run.frames and run.end), lambda: self.save_mesh(number)),
@@ -233,10 +253,12 @@ class RunsPanel(QWidget):
 
     # What can be done ------------------------------------------------------------------
 
-    def compare_undeformed(self) -> None:
-        """Show the undeformed mesh beside the run that is shown, or no longer."""
-        ends = self.store.session.view.beside == changes.UNDEFORMED
-        self.store.change(changes.show_beside, None if ends else changes.UNDEFORMED)
+    def show_beside(self, number: int) -> None:
+        """Show a run beside the one that is shown, or no longer."""
+        session = self.store.session
+        if number != session.shown:
+            ends = session.view.beside == number
+            self.store.change(changes.show_beside, None if ends else number)
 
     def take_settings(self, number: int | None = None) -> None:
         """Put the settings of a run back into the panels."""

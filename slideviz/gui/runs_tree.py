@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from qtpy.QtCore import QSize, Qt
+from qtpy.QtCore import QSize, Qt, Signal
 from qtpy.QtGui import QPalette
 from qtpy.QtWidgets import (
     QAbstractItemView,
@@ -25,7 +25,7 @@ WORDS = NUMBER + 1
 """What a row keeps beside its texts: the number of its run, and the line below."""
 PAD = 4
 TIPS = (
-    "Number and method; below it the settings. A double click shows a run beside the shown one.",
+    "Number and method; below it the settings. A click shows a run; Ctrl+click shows it beside.",
     "Lowest quality of a cell after the last step; the best of all runs is bold.",
     "Mean quality of the cells after the last step.",
     "Inverted cells after the last step.",
@@ -69,7 +69,15 @@ def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
 
 
 class RunTree(QTreeWidget):
-    """A row for each run: numbers in columns, and below them a line over the whole width."""
+    """A row for each run: numbers in columns, and below them a line over the whole width.
+
+    Signals
+    -------
+    beside_wanted(int)
+        A run was clicked with Ctrl, by its number.
+    """
+
+    beside_wanted = Signal(int)
 
     def __init__(self) -> None:
         super().__init__()
@@ -99,11 +107,33 @@ class RunTree(QTreeWidget):
         self.session: Callable[[], Session] = Session
 
     def mousePressEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.RightButton:
+            event.accept()  # the menu is about the run below the mouse; another may stay shown
+            return
+        if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            item = self.itemAt(event.position().toPoint())
+            if item is not None:
+                self.beside_wanted.emit(item.data(RUN, NUMBER))
+            event.accept()
+            return
         # A double click begins with a click, which shows the run: what was shown before it is
         # what the run is to be compared with.
         now = self.session()
         self.seen_before = now.shown, now.view.frame, now.view.beside
         super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event) -> None:
+        # A drag with Ctrl or the right button chooses nothing.
+        if event.buttons() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseMoveEvent(event)
+
+    def mouseReleaseEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseReleaseEvent(event)
+
+    def mouseDoubleClickEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseDoubleClickEvent(event)
 
     def dataChanged(self, first, last, roles=()) -> None:
         super().dataChanged(first, last, roles)

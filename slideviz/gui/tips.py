@@ -22,6 +22,7 @@ TIPS: dict[str, str] = {
     "fit": "Make the whole mesh fill the view.",
     "look_from": "Look at the mesh from a side.",
     "sideiso": "Look at the mesh from a corner.",
+    "compare": "Show the undeformed mesh or another run beside the run that is shown.",
     "show_all": "Show the boundaries that were hidden.",
     "add_plane": "Show the cells that a plane cuts, and put it where you want.",
     "add_cylinder": "Show the cells that a cylinder about the axis cuts, and unroll it.",

@@ -5,16 +5,16 @@ from __future__ import annotations
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from slideviz.gui.beside import CameraLink, TitleBar
+from slideviz.gui.beside import CameraLink, TitleBar, fill_pane
 from slideviz.gui.boundaries import boundary_menu
 from slideviz.gui.canvas import View3D
 from slideviz.gui.hover import CellHover
 from slideviz.view import changes, jobs
 from slideviz.view.ghosts import Ghosts
 from slideviz.view.look import Look
-from slideviz.view.runs_table import brief, method_words
+from slideviz.view.panes import choices, close_pane, panes
 from slideviz.view.scene import Scene
-from slideviz.view.state import Run, Session
+from slideviz.view.state import Session
 from slideviz.view.store import Store
 
 
@@ -53,8 +53,10 @@ class Viewing(QWidget):
     # Parts -----------------------------------------------------------------------------
 
     def _title(self, column: int) -> TitleBar:
-        title = TitleBar(f"view_title_{column}", closable=column == 1)
-        title.closed.connect(lambda: self.store.change(changes.show_beside, None))
+        title = TitleBar(
+            f"view_title_{column}", True, lambda menu: fill_pane(menu, self.store, column)
+        )
+        title.closed.connect(lambda: self.store.change(close_pane, column))
         self._grid.addWidget(title, 0, column)
         self._grid.setColumnStretch(column, 0 if column else 1)
         return title
@@ -69,7 +71,7 @@ class Viewing(QWidget):
     def _connect(self, view: View3D, scene: Scene) -> None:
         view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
         view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
-        view.told.resized.connect(scene.resized)
+        view.told.resized.connect(lambda: self._resized(scene))
         view.told.unveiled.connect(lambda: scene.update(scene.session))
         CellHover(view, scene, self.store)
         view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
@@ -78,8 +80,8 @@ class Viewing(QWidget):
         """Make the second view; from now on what moves one camera moves the other."""
         whole = self.scene.sees_all()
         self.second = self._make_view()
-        self._grid.addWidget(self.second, 1, 1)
         self._grid.setColumnStretch(1, 1)
+        self._place(session.view.swapped)
         self.second.setVisible(True)
         self.second_scene = Scene(self.second, self.scene.look)
         self._connect(self.second, self.second_scene)
@@ -91,6 +93,31 @@ class Viewing(QWidget):
         self.scene.set_legend(False)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self._rearranged(whole)
+
+    def _place(self, swapped: bool) -> None:
+        """Put the second view to the right of the first, or to the left."""
+        pair = (self.second, self.view) if swapped else (self.view, self.second)
+        if self._grid.itemAtPosition(1, 0) is not None and (
+            self._grid.itemAtPosition(1, 0).widget() is pair[0]
+            and self._grid.itemAtPosition(1, 1) is not None
+        ):
+            return
+        for view in pair:
+            self._grid.removeWidget(view)
+        for column, view in enumerate(pair):
+            self._grid.addWidget(view, 1, column)
+
+    def _resized(self, scene: Scene) -> None:
+        """Draw a view of another size; where everything filled it, everything does again."""
+        fitted = self._leader.eye.fitted
+        scene.resized()
+        if fitted and scene is self._leader:
+            self._leader.fit()
+
+    @property
+    def _leader(self) -> Scene:
+        """Return what is fitted: of two views the one with less room, beside the legend."""
+        return self._scenes()[-1]
 
     def _rearranged(self, whole: bool) -> None:
         """Draw views of another width; who saw the whole mesh still does, who a detail too."""
@@ -106,7 +133,9 @@ class Viewing(QWidget):
         whole = self.scene.sees_all()
         self._link.end()
         self._link = None
-        self._grid.removeWidget(second)
+        for view in (second, self.view):
+            self._grid.removeWidget(view)
+        self._grid.addWidget(self.view, 1, 0)
         self._grid.setColumnStretch(1, 0)
         second.close()
         second.deleteLater()
@@ -155,12 +184,14 @@ class Viewing(QWidget):
         if other is None and beside != changes.UNDEFORMED:
             self._drop_second()
             return
-        for title, run in zip(self.titles, (session.run_shown, other), strict=True):
+        names = choices(session)
+        for title, number in zip(self.titles, panes(session), strict=True):
             title.setVisible(True)
-            title.set_text(run_title(run) if run is not None else "Undeformed mesh")
+            title.set_text(names.get(number, f"Run {number}"))
         if self.second is None:
             self._make_second(session)
         else:
+            self._place(session.view.swapped)
             self.second_scene.update(changes.seen_beside(session))
             self.second.render_soon()
 
@@ -207,8 +238,7 @@ class Viewing(QWidget):
     def fit(self) -> None:
         """Make everything fill the view."""
         self._before = None
-        # Of two, the second has less room, beside the legend; the first follows.
-        self._scenes()[-1].fit()
+        self._leader.fit()
         self.render()
 
     def fly_to(self, cell: int) -> None:
@@ -229,7 +259,7 @@ class Viewing(QWidget):
 
     def look_from(self, side: str) -> None:
         """Look from a side."""
-        self._scenes()[-1].look_from(side)
+        self._leader.look_from(side)
         self.render()
 
     def set_look(self, look: Look) -> None:
@@ -242,8 +272,3 @@ class Viewing(QWidget):
         """Give the views' graphics back."""
         self._drop_second()
         self.view.close()
-
-
-def run_title(run: Run) -> str:
-    """Return what a run is called: its number and what sets it apart."""
-    return f"Run {run.number}: {method_words(run.case)} · {brief(run)}"

@@ -239,7 +239,7 @@ def show_beside(session: Session, number: int | None) -> Session:
     known = number == UNDEFORMED or session.run(number) is not None
     if number == session.shown or not known:
         number = None
-    return set_view(session, beside=number)
+    return set_view(session, beside=number, swapped=False)
 
 
 def remove_run(session: Session, number: int) -> Session:

@@ -41,6 +41,7 @@ class Eye:
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
         self.stage = stage
         self._shapes = shapes
+        self._fitted: tuple[float, ...] = ()
 
     @property
     def _camera(self) -> Any:
@@ -74,6 +75,12 @@ class Eye:
         free = max(width - self.stage.strip(), 1.0)
         half = max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
         self.aim(centre, half, float(np.linalg.norm(extent)))
+        self._fitted = self.place
+
+    @property
+    def fitted(self) -> bool:
+        """Tell whether nobody has moved the camera since everything was made to fill the view."""
+        return self._fitted == self.place
 
     def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
         """Look at a point, seeing ``half`` the height above and below it.

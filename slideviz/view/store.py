@@ -80,7 +80,8 @@ class Memento:
             mesh_out=session.case.mesh_out,
             warnings=session.case.warnings,
         )
-        passing = {name: getattr(view, name) for name in ("selected", "frame", "marked", "beside")}
+        names = ("selected", "frame", "marked", "beside", "swapped")
+        passing = {name: getattr(view, name) for name in names}
         return replace(
             session,
             case=case,

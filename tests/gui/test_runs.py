@@ -6,14 +6,15 @@ import weakref
 
 import numpy as np
 import pytest
-from qtpy.QtCore import QCoreApplication, QEvent, QPoint, QPointF, Qt
-from qtpy.QtGui import QWheelEvent
+from qtpy.QtCore import QCoreApplication, QEvent, QPoint, QPointF, Qt, QTimer
+from qtpy.QtGui import QContextMenuEvent, QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.runs_tree import INVERTED, MEAN, MIN, NUMBER, RUN, WORDS
 from slideviz.view import changes
 from slideviz.view.look import DARK
+from slideviz.view.panes import run_title
 from slideviz.view.pick import to_display
 
 
@@ -41,11 +42,15 @@ def row(driver, number):
     return next(item for item in items if item.data(RUN, NUMBER) == number)
 
 
-def click(driver, number, double=False):
+def place(driver, number):
+    return panel(driver).tree.visualItemRect(row(driver, number)).center()
+
+
+def click(driver, number, double=False, keys=Qt.KeyboardModifier.NoModifier):
     tree = panel(driver).tree
-    where = tree.visualItemRect(row(driver, number)).center()
+    where = place(driver, number)
     button = Qt.MouseButton.LeftButton
-    QTest.mouseClick(tree.viewport(), button, pos=where)
+    QTest.mouseClick(tree.viewport(), button, keys, where)
     if double:
         QTest.mouseDClick(tree.viewport(), button, pos=where)
 
@@ -102,6 +107,106 @@ def test_a_double_click_compares_with_the_run_that_was_shown(ran):
     assert ran.window.viewing.second is None
 
 
+def test_a_click_with_ctrl_shows_a_run_beside_and_again_ends_that(ran):
+    ctrl = Qt.KeyboardModifier.ControlModifier
+    ran.window.store.change(changes.show_frame, 2)
+    click(ran, 1, keys=ctrl)
+    session = ran.session
+    assert (session.shown, session.view.beside, session.view.frame) == (2, 1, 2)
+    assert panel(ran).tree.currentItem() is row(ran, 2)
+    click(ran, 2, keys=ctrl)
+    assert (ran.session.shown, ran.session.view.beside) == (2, 1), "no run beside itself"
+    click(ran, 1, keys=ctrl)
+    assert (ran.session.shown, ran.session.view.beside) == (2, None)
+
+
+def test_a_click_with_the_right_button_shows_no_other_run(ran):
+    ran.window.store.change(changes.show_frame, 1)
+    tree, where = panel(ran).tree, place(ran, 1)
+    QTest.mousePress(tree.viewport(), Qt.MouseButton.RightButton, pos=where)
+    QTest.mouseRelease(tree.viewport(), Qt.MouseButton.RightButton, pos=where)
+    spot = tree.viewport().mapToGlobal(where)
+    event = QContextMenuEvent(QContextMenuEvent.Reason.Mouse, where, spot)
+    QApplication.sendEvent(tree.viewport(), event)
+    menu = QApplication.activePopupWidget()
+    assert (ran.session.shown, ran.session.view.frame) == (2, 1)
+    assert tree.currentItem() is row(ran, 2)
+    choose(ran, menu, "Show beside run 2")
+    assert (ran.session.shown, ran.session.view.beside) == (2, 1)
+
+
+def choose(driver, menu, text):
+    """Click on a line of a menu that is open."""
+    driver.qtbot.waitUntil(menu.isVisible)
+    act = next(act for act in menu.actions() if act.text() == text)
+    where = menu.actionGeometry(act).center()
+    QTest.mouseMove(menu, where)
+    QTest.mouseClick(menu, Qt.MouseButton.LeftButton, pos=where)
+    driver.qtbot.waitUntil(lambda: QApplication.activePopupWidget() is None)
+
+
+def open_and_choose(driver, button, text):
+    """Press a button that opens a menu, and click on one of its lines.
+
+    Qt comes back from the press when the menu is closed: what is done meanwhile has a timer.
+    """
+    failed = []
+
+    def go():
+        try:
+            choose(driver, QApplication.activePopupWidget(), text)
+        except BaseException as error:
+            failed.append(error)
+            QApplication.activePopupWidget().close()
+
+    QTimer.singleShot(50, go)
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert not failed, failed
+
+
+def title(driver, number):
+    return run_title(driver.session.run(number))
+
+
+def test_the_button_compares_with_the_undeformed_mesh_or_a_run(ran):
+    button = panel(ran).buttons["compare"]
+    open_and_choose(ran, button, "Undeformed mesh")
+    assert ran.session.view.beside == changes.UNDEFORMED
+    open_and_choose(ran, button, title(ran, 1))
+    assert (ran.session.shown, ran.session.view.beside) == (2, 1)
+    texts = [act.text() for act in button.menu().actions()]
+    assert title(ran, 2) not in texts, "a run is not compared with itself"
+    open_and_choose(ran, button, "End the comparison")
+    assert ran.session.view.beside is None
+    compare = ran.window.actions_.compare
+    assert compare.isEnabled()
+    compare.aboutToShow.emit()
+    assert [act.text() for act in compare.actions()] == texts
+
+
+def test_each_title_chooses_what_its_view_shows(ran):
+    viewing = compare(ran)
+    left, right = viewing.titles
+    open_and_choose(ran, right.label, "Undeformed mesh")
+    assert (ran.session.shown, ran.session.view.beside) == (2, changes.UNDEFORMED)
+    open_and_choose(ran, left.label, title(ran, 1))
+    assert (left.text, right.text) == (title(ran, 1), "Undeformed mesh")
+    open_and_choose(ran, left.label, "Undeformed mesh")
+    assert (left.text, right.text) == ("Undeformed mesh", title(ran, 1))
+    QApplication.processEvents()
+    assert viewing.second.x() < viewing.view.x()
+    seen = np.asarray(viewing.second_scene.drawn["airfoil"].shape.points)[:, :2]
+    nodes = viewing.scene.drawn["airfoil"].surface.nodes
+    assert np.allclose(seen, ran.session.mesh.points[nodes])
+    open_and_choose(ran, left.label, title(ran, 2))
+    assert (left.text, right.text) == (title(ran, 2), title(ran, 1))
+    QApplication.processEvents()
+    assert viewing.view.x() < viewing.second.x()
+    ran.click(left.close_button)
+    assert (ran.session.shown, ran.session.view.beside) == (1, None)
+    assert viewing.view.width() > 0.9 * viewing.width()
+
+
 def test_a_row_grows_while_its_run_goes_on(ran):
     session = ran.session
     running = changes.add_frames(changes.start_run(session), session.runs[1].frames[:1])
@@ -126,8 +231,8 @@ def test_settings_are_put_back_and_that_can_be_undone(ran):
 
 
 def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
-    assert not actions(ran, 2)["Show beside the run that is shown"].isEnabled()
-    actions(ran, 1)["Show beside the run that is shown"].trigger()
+    assert not actions(ran, 2)["Show beside run 2"].isEnabled()
+    actions(ran, 1)["Show beside run 2"].trigger()
     assert ran.session.view.beside == 1
     actions(ran, 1)["End the comparison"].trigger()
     assert ran.session.view.beside is None
@@ -245,6 +350,28 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
     assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
     ran.window.actions_.by_name["fit"].trigger()
     assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+
+
+@pytest.mark.parametrize("two", [False, True])
+def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved(ran, two):
+    viewing = compare(ran) if two else ran.window.viewing
+    ran.window.fit()
+    lead = viewing._scenes()[-1]
+    before = lead.eye.place
+    ran.window.docks["runs"].hide()
+    ran.window.docks["histogram"].hide()
+    ran.window.resize(1100, 640)
+    ran.qtbot.waitUntil(lambda: lead.eye.place != before)
+    QApplication.processEvents()
+    place = lead.eye.place
+    assert lead.eye.fitted
+    ran.window.fit()
+    assert lead.eye.place == pytest.approx(place)
+    lead.zoom_at(100, 100, 1.5)
+    place = lead.eye.place
+    ran.window.resize(1280, 800)
+    QApplication.processEvents()
+    assert lead.eye.place == place
 
 
 def test_linked_views_come_to_rest(ran, qtbot):
