@@ -21,8 +21,11 @@ SHOWN = ("edges", "undeformed", "motion-ghost", "legend", "triad", "perspective"
 FORMS = {"plane": 6, "cylinder": 7}
 """Numbers of a section: normal and point of a plane; radius, axis and point of a cylinder."""
 
-SectionText = tuple[str, tuple[float, ...], bool]
-"""Form, numbers, and whether whole cells are shown."""
+FLAT = {"plane": "flat", "cylinder": "unrolled"}
+"""What stands at the end of a section that is laid flat beside the view."""
+
+SectionText = tuple[str, tuple[float, ...], bool, bool]
+"""Form, numbers, whether whole cells are shown, and whether it is laid flat."""
 
 
 def numbers(count: int, allowed: str, rising: bool = False) -> Kind:
@@ -65,11 +68,14 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
         items = [item.text for item in list_of(part.strip())]
         form = items[0].lower() if items else ""
+        flat = items[-1].lower() == FLAT.get(form)
+        if flat:
+            items.pop()
         how = items[-1].lower() if items else ""
         if form not in FORMS or how not in ("whole", "cut"):
             raise CaseError(
                 f"section {place}: {shown(part.strip())} does not begin with plane or cylinder and "
-                "end with whole or cut"
+                f"end with whole or cut, and after that {FLAT.get(form, 'flat')} or nothing"
             )
         values = tuple(number(item) for item in items[1:-1])
         if len(values) != FORMS[form]:
@@ -80,16 +86,16 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
             raise CaseError(f"section {place}: its direction has no length")
         if form == "cylinder" and values[0] <= 0:
             raise CaseError(f"section {place}: the radius {values[0]:g} is not above 0")
-        found.append((form, values, how == "whole"))
+        found.append((form, values, how == "whole", flat))
     return tuple(found)
 
 
 def write_sections(sections: tuple[SectionText, ...]) -> str:
     """Return the value of ``VIEW_SECTIONS`` that ``read_sections`` reads back, without loss."""
-    texts = [
-        f"({form}, {', '.join(repr(float(v)) for v in values)}, {'whole' if all_ else 'cut'})"
-        for form, values, all_ in sections
-    ]
+    texts = []
+    for form, values, whole_cells, flat in sections:
+        words = (form, *(repr(float(v)) for v in values), "whole" if whole_cells else "cut")
+        texts.append(f"({', '.join((*words, FLAT[form]) if flat else words)})")
     return " ; ".join(texts) or "( )"
 
 
@@ -100,6 +106,7 @@ SECTIONS = Kind(
     details=(
         "(plane, nx, ny, nz, x, y, z, whole | cut): normal and a point",
         "(cylinder, r, ax, ay, az, x, y, z, whole | cut): radius, axis and a point on it",
+        "after that flat (plane) or unrolled (cylinder): laid flat beside the view",
     ),
 )
 

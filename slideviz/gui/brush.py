@@ -24,9 +24,12 @@ class BrushCanvas(PlotCanvas):
     -------
     brushed(object)
         The range (low, high) that the mouse holds, or None for a click beside it.
+    held(bool)
+        The button is down, or up again.
     """
 
     brushed = Signal(object)
+    held = Signal(bool)
 
     def __init__(self, drawing) -> None:
         super().__init__(drawing)
@@ -60,6 +63,7 @@ class BrushCanvas(PlotCanvas):
             for near, far in ((0, 1), (1, 0)):
                 if abs(x - ends[near]) <= GRIP_PX:
                     self._held, self._moved = self.band[far], True
+        self.held.emit(True)
 
     def mouseMoveEvent(self, event) -> None:
         if self._held is None:
@@ -76,6 +80,7 @@ class BrushCanvas(PlotCanvas):
             self._held = None
             if not self._moved:
                 self.brushed.emit(None)
+            self.held.emit(False)
 
     def mouseDoubleClickEvent(self, _event) -> None:
         self.brushed.emit(None)

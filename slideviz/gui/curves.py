@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.fields import Choice
@@ -27,6 +28,7 @@ from slideviz.view.plots_style import add_legend
 from slideviz.view.spanwise import spanwise
 from slideviz.view.state import Session
 from slideviz.view.store import Store
+from slideviz.view.ticks import rounded_out
 
 KINDS = {
     "steps": "Quality by step",
@@ -83,8 +85,13 @@ class CurvesPanel(QWidget):
         self.save = QPushButton("Save…")
         self.save.setToolTip("Save the plot as PNG, SVG or PDF.")
         self.save.clicked.connect(self._save)
+        self.whole = QCheckBox("0–1")
+        self.whole.setObjectName("whole_quality")
+        self.whole.setToolTip("All qualities there can be, instead of those of the curves.")
+        self.whole.toggled.connect(lambda _: self.canvas.ask())
         row = QHBoxLayout()
         row.addWidget(self.kind, 1)
+        row.addWidget(self.whole)
         row.addWidget(self.save)
         return row
 
@@ -123,6 +130,7 @@ class CurvesPanel(QWidget):
         missing = self._missing(session, kind)
         self.kind.setToolTip(TIPS[kind])
         self.span_row.setVisible(kind == "span" and not missing)
+        self.whole.setVisible(kind != "greedy" and not missing)
         self.save.setEnabled(not missing)
         shape = Qt.CursorShape.PointingHandCursor if kind == "steps" else Qt.CursorShape.ArrowCursor
         self.canvas.setCursor(shape)
@@ -160,10 +168,15 @@ class CurvesPanel(QWidget):
         session, kind = self.store.session, self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None
+        whole = self.whole.isChecked()
         if kind == "span":
             along = self.coordinate.currentData(), self.what.currentData()
-            return partial(draw_span, self._profiles, session, along)
-        return partial({"steps": draw_steps, "greedy": draw_greedy}[kind], session)
+            return partial(draw_span, self._profiles, session, along, whole)
+        return (
+            partial(draw_greedy, session)
+            if kind == "greedy"
+            else partial(draw_steps, session, whole)
+        )
 
     # What the user does ----------------------------------------------------------------
 
@@ -179,10 +192,20 @@ class CurvesPanel(QWidget):
         )
 
 
-def draw_steps(session: Session, figure, style) -> None:
+def close_limits(values) -> tuple[float, float]:
+    """Return the ends of an axis around qualities: round numbers, with room for the markers."""
+    good = np.concatenate(list(values))
+    low, high = rounded_out(float(np.nanmin(good)), float(np.nanmax(good)))
+    room = 0.04 * (high - low)
+    return low - room, high + room
+
+
+def draw_steps(session: Session, whole: bool, figure, style) -> None:
     """Draw minimum and mean quality of each run against the step."""
-    axes = figure.add_subplot()
-    quality_by_step(axes, curves.step_runs(session), style)
+    axes, runs = figure.add_subplot(), curves.step_runs(session)
+    quality_by_step(axes, runs, style)
+    if not whole:
+        axes.set_ylim(close_limits(part for run in runs for part in (run.minimum, run.mean)))
     at = session.view.frame
     axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
     last = max(len(run.frames) for run in session.runs)
@@ -197,7 +220,12 @@ def draw_greedy(session: Session, figure, style) -> None:
 
 
 def draw_span(
-    profiles: curves.Profiles, session: Session, along: tuple[str, str], figure, style
+    profiles: curves.Profiles,
+    session: Session,
+    along: tuple[str, str],
+    whole: bool,
+    figure,
+    style,
 ) -> None:
     """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
     axes, (coordinate, what) = figure.add_subplot(), along
@@ -211,4 +239,6 @@ def draw_span(
         )  # fmt: skip
         return
     spanwise(axes, found, what, style=style)
+    if not whole:
+        axes.set_xlim(close_limits(getattr(profile, what) for profile in found))
     add_legend(axes, style, loc="best")

@@ -29,8 +29,8 @@ class Cutting(QSplitter):
     ----------
     chosen : int or None
         The place of the section in the list of the view.
-    wants_handle, wants_flat : bool
-        Whether the chosen section gets a handle, if it is a plane; whether it is laid flat.
+    wants_handle : bool
+        Whether the chosen section gets a handle, if it is a plane.
     handle, flat
         Both, None while nobody wants them.
     look : Look
@@ -46,7 +46,7 @@ class Cutting(QSplitter):
         self.addWidget(viewing)
         self._multi_samples = multi_samples
         self.chosen: int | None = None
-        self.wants_handle = self.wants_flat = False
+        self.wants_handle = False
         self.handle: PlaneHandle | None = None
         self.flat: FlatView | None = None
         self.look = viewing.scene.look
@@ -62,6 +62,11 @@ class Cutting(QSplitter):
             return None
         return sections[self.chosen]
 
+    @property
+    def is_flat(self) -> bool:
+        """Tell whether the section that is chosen is laid flat."""
+        return self.section is not None and self.section.flat
+
     def choose(self, index: int | None) -> None:
         """Choose a section."""
         if index != self.chosen:
@@ -75,8 +80,8 @@ class Cutting(QSplitter):
 
     def want_flat(self, wanted: bool) -> None:
         """Lay the chosen section flat beside the 3D view, or do not."""
-        self.wants_flat = wanted
-        self._sync()
+        if wanted != self.is_flat or not wanted:
+            self.store.change(changes.lay_flat, self.chosen if wanted else None)
 
     def look_along(self) -> None:
         """Look at the chosen section along its normal, or along its axis."""
@@ -94,8 +99,9 @@ class Cutting(QSplitter):
 
     def _session_changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh:
-            self.chosen = 0 if new.view.sections else None
-            self.wants_handle = self.wants_flat = False
+            flat = flat_one(new.view.sections)
+            self.chosen = flat if flat is not None else 0 if new.view.sections else None
+            self.wants_handle = False
         elif old.view.sections != new.view.sections:
             self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
         elif self.flat is None and self.handle is None:
@@ -105,7 +111,7 @@ class Cutting(QSplitter):
     def _sync(self) -> None:
         session, section = self.store.session, self.section
         self._sync_handle(session, section)
-        self._sync_flat(session, section)
+        self._sync_flat(session)
         self.changed.emit()
 
     def _sync_handle(self, session: Session, section: Section | None) -> None:
@@ -118,7 +124,7 @@ class Cutting(QSplitter):
                 self.viewing.view.render_soon()
             return
         if self.handle is None:
-            self.handle = PlaneHandle(self.viewing.view, self._dragged)
+            self.handle = PlaneHandle(self.viewing.view, self._dragged, self.store.hold)
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
         room = 0.03 * (high - low).max()
         box = np.stack([low - room, high + room], axis=1).ravel()
@@ -135,8 +141,10 @@ class Cutting(QSplitter):
         ):
             self.store.change(changes.replace_section, self.chosen, moved)
 
-    def _sync_flat(self, session: Session, section: Section | None) -> None:
-        if not self.wants_flat or section is None or not can_cut(session.mesh, section):
+    def _sync_flat(self, session: Session) -> None:
+        at = flat_one(session.view.sections)
+        section = session.view.sections[at] if at is not None else None
+        if section is None or session.frame is None or not can_cut(session.mesh, section):
             self._drop_flat()
             return
         if self.flat is None:
@@ -183,7 +191,12 @@ class Cutting(QSplitter):
         if self.flat is not None:
             self.flat.close_view()
             self.flat = None
-        self.wants_handle = self.wants_flat = False
+        self.wants_handle = False
+
+
+def flat_one(sections: Sequence[Section]) -> int | None:
+    """Return the place of the section that is laid flat, if one is."""
+    return next((index for index, section in enumerate(sections) if section.flat), None)
 
 
 def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:

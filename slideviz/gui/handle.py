@@ -31,11 +31,18 @@ class PlaneHandle:
     view : View3D
     moved : callable
         Gets origin and normal while they are dragged, at most once per turn of the event loop.
+    held : callable
+        Gets whether the mouse begins to drag, or ends it.
     """
 
-    def __init__(self, view: View3D, moved: Callable[[Triple, Triple], None]) -> None:
+    def __init__(
+        self,
+        view: View3D,
+        moved: Callable[[Triple, Triple], None],
+        held: Callable[[bool], None] = lambda _held: None,
+    ) -> None:
         self.view = view
-        self._moved = moved
+        self._moved, self._held = moved, held
         self.shape = vtkImplicitPlaneRepresentation()
         self.shape.SetPlaceFactor(1.0)
         self.shape.OutlineTranslationOff()
@@ -97,6 +104,7 @@ class PlaneHandle:
         if not dragging:
             self._soon.stop()
             self.tell()
+        self._held(dragging)
 
     def _colour(self, look: Look) -> None:
         strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, look.text))

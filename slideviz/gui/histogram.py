@@ -26,10 +26,17 @@ from slideviz.gui.plot_image import Draw
 from slideviz.view import changes
 from slideviz.view.actors import shown_values
 from slideviz.view.curves import look_of
-from slideviz.view.distribution import Distribution, Outline, distribution, draw_distribution
+from slideviz.view.distribution import (
+    Distribution,
+    Outline,
+    distribution,
+    draw_distribution,
+    spread,
+)
 from slideviz.view.inspect import ONLY_INVERTED, chosen_cells
 from slideviz.view.state import COLOUR_BY, ColourBy, Frame, Session
 from slideviz.view.store import Store
+from slideviz.view.ticks import rounded_out
 
 
 class HistogramPanel(QWidget):
@@ -44,6 +51,7 @@ class HistogramPanel(QWidget):
         self.area = PlotArea(self.drawing, BrushCanvas)
         self.canvas: BrushCanvas = self.area.canvas
         self.canvas.brushed.connect(self._brushed)
+        self.canvas.held.connect(self._held)
         self.numbers = QLabel()
         self.numbers.setTextFormat(Qt.TextFormat.RichText)
         self.numbers.setWordWrap(True)
@@ -72,6 +80,10 @@ class HistogramPanel(QWidget):
         self.log.setToolTip("Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
         self.log.toggled.connect(lambda _: self.canvas.ask())
+        self.whole = QCheckBox("0–1")
+        self.whole.setObjectName("whole_range")
+        self.whole.setToolTip("All values there can be, instead of those that the cells have.")
+        self.whole.toggled.connect(lambda _: self.canvas.ask())
         self.show_all = QPushButton("Show all cells")
         self.show_all.setObjectName("show_all_cells")
         self.show_all.setToolTip("Show cells of any value again (Esc).")
@@ -81,6 +93,7 @@ class HistogramPanel(QWidget):
         self.save.clicked.connect(self._save)
         row = QHBoxLayout()
         row.addWidget(self.log)
+        row.addWidget(self.whole)
         row.addStretch(1)
         row.addWidget(self.show_all)
         row.addWidget(self.save)
@@ -102,7 +115,8 @@ class HistogramPanel(QWidget):
 
     def sync(self, session: Session) -> None:
         """Show the session."""
-        for widget in (self.numbers, self.log, self.save):
+        self.whole.setText("from 0" if session.view.colour_by == "displacement" else "0–1")
+        for widget in (self.numbers, self.log, self.whole, self.save):
             widget.setVisible(session.frame is not None)
         self.show_all.setVisible(session.frame is not None)
         self.show_all.setEnabled(session.view.threshold is not None)
@@ -156,8 +170,8 @@ class HistogramPanel(QWidget):
 
     def drawing(self) -> Draw:
         """Return what draws the histogram of what is shown now."""
-        session, log = self.store.session, self.log.isChecked()
-        return partial(draw_histogram, self._counts, session, log)
+        session, how = self.store.session, (self.log.isChecked(), self.whole.isChecked())
+        return partial(draw_histogram, self._counts, session, how)
 
     # What the user does ----------------------------------------------------------------
 
@@ -166,10 +180,16 @@ class HistogramPanel(QWidget):
             self.clear_range()
             return
         # Left of the values only inverted cells are; from there on they belong to it.
-        low, high = band
-        self._wanted = ONLY_INVERTED if high < 0.0 else (max(low, 0.0), high)
+        (low, high), left = band, first_value(self.canvas.figure.axes[0])
+        self._wanted = ONLY_INVERTED if high < left else (0.0 if low < left else low, high)
         if not self._soon.isActive():
             self._soon.start()
+
+    def _held(self, held: bool) -> None:
+        if not held and self._soon.isActive():
+            self._soon.stop()
+            self._choose()
+        self.store.hold(held)
 
     def _choose(self) -> None:
         if self._wanted is not None:
@@ -195,6 +215,24 @@ class Counts:
 
     def __init__(self) -> None:
         self._kept: WeakKeyDictionary[Frame, dict[object, Distribution]] = WeakKeyDictionary()
+        self._spreads: WeakKeyDictionary[Frame, dict[ColourBy, Range | None]] = WeakKeyDictionary()
+
+    def limits(self, session: Session, whole: bool) -> Range:
+        """Return round numbers around the values that cells have; or, whole, that they can have.
+
+        They are the same for all steps of a run, so that bars can be compared as it is played.
+        """
+        what = shown_measure(session)
+        shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
+        for frame in shown:
+            kept = self._spreads.setdefault(frame, {})
+            if what not in kept:
+                kept[what] = spread(frame, what, session.mesh)
+        found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
+        low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
+        if what != "displacement":
+            return (0.0, 1.0) if whole else rounded_out(low, high)
+        return rounded_out(0.0 if whole else low, high)
 
     def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:
         """Return the counts of a frame of the session between limits."""
@@ -205,21 +243,29 @@ class Counts:
         return kept[what, limits]
 
 
-def draw_histogram(counts: Counts, session: Session, log: bool, figure, style) -> None:
-    """Draw the histogram of what a session shows; nothing without a mesh."""
+def draw_histogram(counts: Counts, session: Session, how: tuple[bool, bool], figure, style) -> None:
+    """Draw the histogram of what a session shows; nothing without a mesh.
+
+    ``how`` is whether counts are logarithmic, and whether all values there can be are shown.
+    """
     if session.frame is None:
         return
-    what = shown_measure(session)
-    limits = session.colour_range if what == "displacement" else (0.0, 1.0)
+    what, (log, whole) = shown_measure(session), how
+    limits = counts.limits(session, whole)
     shown = counts.of(session, session.frame, limits)
     label = "undeformed" if session.view.frame == 0 else f"run {session.shown}"
-    words = label, "displacement [mesh unit]" if what == "displacement" else _words(what)
+    words = label, "displacement [mesh units]" if what == "displacement" else _words(what)
     outlines = [
         Outline(name, counts.of(session, frame, limits), series)
         for name, frame, series in _others(session)
     ]
     axes, table = figure.add_subplot(), _colours(session, shown)
     draw_distribution(axes, shown, outlines, words, table, log, style)
+
+
+def first_value(axes) -> float:
+    """Return where the values of a histogram begin; left of it is the strip of inverted cells."""
+    return min(bar.get_x() for bar in axes.patches if bar.get_gid() == "shown")
 
 
 def _others(session: Session) -> Iterator[tuple[str, Frame, int | None]]:

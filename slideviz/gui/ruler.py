@@ -10,7 +10,7 @@ from qtpy.QtCore import QRectF, Qt
 from qtpy.QtGui import QPainter, QPalette
 from qtpy.QtWidgets import QWidget
 
-STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+from slideviz.view.ticks import ticks
 
 
 class Ruler(QWidget):
@@ -84,12 +84,7 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     """Return round numbers in a range, rising, at most so many and one more."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low):
         return []
-    rough = (high - low) / most
-    scale = 10.0 ** math.floor(math.log10(rough))
-    step = next(factor * scale for factor in STEPS if factor * scale >= rough * (1 - 1e-9))
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
-    return [number * step for number in range(first, last + 1)]
+    return ticks(low, high, most).tolist()
 
 
 def tick_text(value: float, step: float) -> str:

@@ -29,6 +29,7 @@ class SectionEditor(QWidget):
     """
 
     changed = Signal(object)
+    held = Signal(bool)
 
     def __init__(self) -> None:
         super().__init__()
@@ -59,6 +60,8 @@ class SectionEditor(QWidget):
         self.slider.setPageStep(STEPS // 20)
         self.slider.setMinimumWidth(80)
         self.slider.valueChanged.connect(lambda _: self._soon.start())
+        self.slider.sliderPressed.connect(lambda: self.held.emit(True))
+        self.slider.sliderReleased.connect(self._let_go)
         self.number = NumberField(0.0, self._allowed)
         self.number.setFixedWidth(84)
         self.number.changed.connect(self._position_typed)
@@ -187,6 +190,12 @@ class SectionEditor(QWidget):
         except CaseError as problem:
             return str(problem)
         return ""
+
+    def _let_go(self) -> None:
+        if self._soon.isActive():
+            self._soon.stop()
+            self._slid()
+        self.held.emit(False)
 
     def _slid(self) -> None:
         if self._section is None:

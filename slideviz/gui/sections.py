@@ -97,6 +97,7 @@ class SectionsPanel(QWidget):
     def _make_rest(self) -> None:
         self.editor = SectionEditor()
         self.editor.changed.connect(self._replace)
+        self.editor.held.connect(self.store.hold)
         self.handle, self.flat = QCheckBox("Handle"), QCheckBox("Flat view")
         self.handle.setToolTip("Drag the plane in the view: its face moves it, the arrow turns it.")
         self.handle.clicked.connect(self.cutting.want_handle)
@@ -183,7 +184,7 @@ class SectionsPanel(QWidget):
         self.handle.setEnabled(chosen is not None and chosen.shown)
         self.handle.setChecked(self.cutting.wants_handle)
         self.flat.setText("Flat view" if plane else "Unrolled")
-        self.flat.setChecked(self.cutting.wants_flat)
+        self.flat.setChecked(self.cutting.is_flat)
         self.flat.setVisible(not flat)
         self.flat.setToolTip(
             "Show the section along its normal beside the 3D view."

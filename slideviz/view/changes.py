@@ -13,8 +13,9 @@ from slideviz.case.model import Case, FromFile, Motion, Reduction, Role
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.view.guess import guess_case, guess_roles
+from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.keep import kept_view
-from slideviz.view.state import Frame, Run, Session, ViewState
+from slideviz.view.state import ColourBy, Frame, Run, Session, ViewState
 
 if TYPE_CHECKING:
     from slideviz.view.section import Section
@@ -142,8 +143,22 @@ def move_motion(session: Session, index: int, by: int) -> Session:
 
 
 def set_view(session: Session, **values: Any) -> Session:
-    """Return the session looked at in another way."""
-    return replace(session, view=replace(session.view, **values))
+    """Return the session looked at in another way.
+
+    What the colours say has a range of its own, which is there again when it is coloured by again.
+    """
+    old = session.view
+    what: ColourBy = values.get("colour_by", old.colour_by)
+    if what != old.colour_by:
+        ranges = dict(old.ranges)
+        if old.colour_range is not None:
+            ranges[old.colour_by] = old.colour_range
+        values = {"colour_range": ranges.pop(what, None)} | values
+        values["ranges"] = tuple(sorted(ranges.items()))
+        # Cells chosen by a quality say nothing of a displacement, and the other way round.
+        if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
+            values.setdefault("threshold", None)
+    return replace(session, view=replace(old, **values))
 
 
 def select(session: Session, names: Iterable[str]) -> Session:
@@ -185,6 +200,12 @@ def remove_section(session: Session, index: int) -> Session:
     """Return the session without the section at that place."""
     sections = session.view.sections
     return set_view(session, sections=sections[:index] + sections[index + 1 :])
+
+
+def lay_flat(session: Session, index: int | None) -> Session:
+    """Return the session with the section at that place laid flat beside the view; None: none."""
+    laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
+    return set_view(session, sections=tuple(laid))
 
 
 def mark(session: Session, cell: int | None) -> Session:

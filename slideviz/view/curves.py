@@ -25,10 +25,13 @@ def look_of(run: Run) -> int:
 
 
 def step_runs(session: Session) -> list[StepRun]:
-    """Return minimum and mean of each run from the undeformed mesh on, the shown one first."""
+    """Return minimum and mean of each run from the undeformed mesh on, by their numbers.
+
+    The solid line of the first is below dashed ones, which let see it where both coincide.
+    """
     found = []
     first = session.first
-    for run in sorted(session.runs, key=lambda run: run.number != session.shown):
+    for run in sorted(session.runs, key=lambda run: run.number):
         if first is None or not run.frames:
             continue
         frames = (first, *run.frames)

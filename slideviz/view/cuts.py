@@ -41,7 +41,7 @@ class Cuts:
         if self._points is not mesh.points:
             self._points = mesh.points
             self._found.clear()
-        key = replace(section, name="", shown=True)
+        key = replace(section, name="", shown=True, flat=False)
         if key not in self._found:
             while len(self._found) >= KEPT:
                 self._found.pop(next(iter(self._found)))

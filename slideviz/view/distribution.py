@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -67,6 +67,15 @@ def distribution(
     return Distribution(counts, np.linspace(low, high, BINS + 1), len(values) - len(right))
 
 
+def spread(
+    frame: Frame, what: ColourBy, undeformed: Mesh | None = None
+) -> tuple[float, float] | None:
+    """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
+    values = shown_values(frame, what, undeformed)
+    right = values[np.isfinite(values)]
+    return (float(right.min()), float(right.max())) if len(right) else None
+
+
 def draw_distribution(
     axes: Axes,
     shown: Distribution,
@@ -108,9 +117,10 @@ def draw_distribution(
         linewidth=0,
         gid="shown",
     )
-    # One colour for the legend, of the bars there are: that of the highest one.
-    key = face if isinstance(face, str) else face[int(shown.counts.argmax())]
-    axes.plot([], [], "s", color=key, markersize=6, label=label)
+    # The colour of one bar would say that all are its value.
+    key = face if isinstance(face, str) else "none"
+    edge = face if isinstance(face, str) else style.look.text
+    axes.plot([], [], "s", markerfacecolor=key, markeredgecolor=edge, markersize=6, label=label)
     axes.stairs(shown.counts, shown.edges, color=style.look.text, linewidth=0.6)
     for other in outlines:
         thin = other.series is None
@@ -135,7 +145,23 @@ def draw_distribution(
     else:
         axes.set_ylim(bottom=0.0)
     inset = (low - left) / (low + width - left)
-    add_legend(axes, style, loc="upper left", bbox_to_anchor=(inset, 0.0, 1.0 - inset, 1.0))
+    add_legend(
+        axes,
+        style,
+        **_in_order(axes),
+        loc="upper left",
+        bbox_to_anchor=(inset, 0.0, 1.0 - inset, 1.0),
+    )
+
+
+def _in_order(axes: Axes) -> dict[str, list[Any]]:
+    """Return handles and labels of a legend: the undeformed mesh, then runs by their numbers."""
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(
+        range(len(labels)),
+        key=lambda i: (labels[i] != "undeformed", len(labels[i]), labels[i]),
+    )
+    return {"handles": [handles[i] for i in order], "labels": [labels[i] for i in order]}
 
 
 def _strip(

@@ -119,8 +119,8 @@ def _mesh(axes: Any, session: Session, figure: Figure, point: float) -> None:
     mesh, view = frame.mesh, session.view
     by_role = view.colour_by == "role"
     values = frame.values(view.colour_by, session.mesh)
-    values = np.where(frame.quality.status == INVERTED, -np.inf, values)
-    colours = colormaps[view.colour_map].with_extremes(under=INVERTED_COLOUR)
+    values = np.where(frame.quality.status == INVERTED, np.nan, values)
+    colours = colormaps[view.colour_map].with_extremes(bad=INVERTED_COLOUR)
     kept = np.ones(len(mesh.cells), bool)
     if view.threshold is not None and not by_role:
         kept[:] = False

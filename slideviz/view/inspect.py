@@ -101,13 +101,13 @@ def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray
     Parameters
     ----------
     values : (m,) float64
-        As `slideviz.view.actors.shown_values` gives them: -inf for an inverted cell.
+        As `slideviz.view.actors.shown_values` gives them: not a number for an inverted cell.
     threshold : (float, float)
         Lowest and highest value. From 0 or below, inverted cells are chosen too.
     """
     low, high = threshold
-    below = -np.inf if low <= 0.0 else low
-    return np.flatnonzero((values >= below) & (values <= high))
+    chosen = (values >= low) & (values <= high)
+    return np.flatnonzero(chosen | np.isnan(values) if low <= 0.0 else chosen)
 
 
 def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:

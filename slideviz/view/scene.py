@@ -198,13 +198,15 @@ class Scene:
             return None
         if session.mesh.dim == 2:
             values = self.stage.values(session)
+            # Where cells overlap, an inverted one is told of before the others.
+            rank = np.where(np.isnan(values), -np.inf, values)
             if session.view.threshold is not None:
-                chosen = chosen_cells(values, session.view.threshold)
                 some = np.full(len(values), np.nan)
-                some[chosen] = values[chosen]
-                values = some
+                chosen = chosen_cells(values, session.view.threshold)
+                some[chosen] = rank[chosen]
+                rank = some
             at = pick_cell.on_plane(self.plotter, x, y)
-            return cell_at(session.frame.mesh, *at, values)
+            return cell_at(session.frame.mesh, *at, rank)
         # Boundaries in front of a section are glass.
         cut = pick_cell.front_cell(self.plotter, x, y, self.sections.pickable())
         return pick_cell.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut

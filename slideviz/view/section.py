@@ -39,6 +39,8 @@ class Section:
         What people call it; empty: see `describe`.
     shown : bool
         Whether a view draws it.
+    flat : bool
+        Whether it is laid flat beside the view: a cylinder unrolled, a plane along its normal.
 
     Raises
     ------
@@ -53,6 +55,7 @@ class Section:
     whole: bool = False
     name: str = ""
     shown: bool = True
+    flat: bool = False
 
     def __post_init__(self) -> None:
         numbers = (*self.origin, *self.direction, self.radius)

@@ -114,8 +114,6 @@ class ViewState:
     colour_range : (float, float) or None
         Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
         above the largest of all runs for the displacement.
-    ranges : tuple of (str, (float, float))
-        The colour ranges of what else the view was coloured by.
     colour_map : str
         A key of `slideviz.view.look.COLOUR_MAPS`.
     threshold : (float, float) or None
@@ -150,11 +148,12 @@ class ViewState:
         The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
     swapped : bool
         Whether the second view stands to the left of the first.
+    ranges : tuple of (str, (float, float))
+        The colour ranges of what else the view was coloured by.
     """
 
     colour_by: ColourBy = "role"
     colour_range: tuple[float, float] | None = None
-    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
     colour_map: str = "viridis"
     threshold: tuple[float, float] | None = None
     points: PointsShown = "none"
@@ -172,6 +171,7 @@ class ViewState:
     marked: int | None = None
     beside: int | None = None
     swapped: bool = False
+    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
 
     @property
     def style(self) -> ViewState:

@@ -28,6 +28,7 @@ WORDS: dict[str, str] = {
     "add_section": "new section",
     "replace_section": "section",
     "remove_section": "removing a section",
+    "lay_flat": "flat view",
     "show": "hidden boundaries",
     "isolate": "hidden boundaries",
     "take_settings": "settings of a run",
@@ -35,6 +36,24 @@ WORDS: dict[str, str] = {
     "set_view": "view",
 }
 """What the menu calls a change, by the name of its function; others cannot be undone."""
+
+VIEW_WORDS: dict[str, str] = {
+    "colour_by": "colour by",
+    "colour_range": "colour range",
+    "colour_map": "colours",
+    "threshold": "range of cells",
+    "points": "points",
+    "edges": "mesh edges",
+    "undeformed": "undeformed boundaries",
+    "motion_ghost": "motion ghost",
+    "legend": "legend",
+    "triad": "axes",
+    "perspective": "perspective",
+    "sections": "sections",
+    "copies": "neighbouring passages",
+    "hidden": "hidden boundaries",
+}
+"""What the menu calls a change of the view, by the field; it says "view" of several at once."""
 
 
 def tell_all(
@@ -127,6 +146,7 @@ class Store:
         self.failed: Failed | None = None
         self._undo: list[_Done] = []
         self._redo: list[_Done] = []
+        self._held = False
 
     def listen(self, listener: Listener) -> None:
         """Call ``listener(old, new)`` after each change from now on."""
@@ -140,8 +160,22 @@ class Store:
         if name in WORDS:
             # The first value says which boundary or motion it is, where there are several.
             which = values[0] if values and isinstance(values[0], (int, str, tuple)) else None
-            self._remember(old, new, WORDS[name], (name, which, *sorted(named)))
+            words = WORDS[name]
+            if name == "set_view" and len(named) == 1:
+                words = VIEW_WORDS.get(next(iter(named)), words)
+            self._remember(old, new, words, (name, which, *sorted(named)))
         self.put(new)
+
+    def hold(self, held: bool) -> None:
+        """Take note that the mouse begins to drag something, or ends it.
+
+        What changes meanwhile is undone as one, however long it takes, and apart from the rest.
+        """
+        self._held = held
+        if self._undo:
+            last = self._undo[-1]
+            if held or last.at_s == float("inf"):
+                self._undo[-1] = replace(last, at_s=float("-inf"))
 
     def put(self, session: Session) -> None:
         """Replace the session and tell the listeners; the same one again is no news.
@@ -206,10 +240,12 @@ class Store:
         self._redo.clear()
         now = self._clock()
         last = self._undo[-1] if self._undo else None
+        # Nothing is later than what the mouse still holds, so that it goes with the rest of it.
+        at_s = float("inf") if self._held else now
         if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
             self._undo.pop()
             if last.before != Memento.of(new):
-                self._undo.append(replace(last, at_s=now))
+                self._undo.append(replace(last, at_s=at_s))
             return
-        self._undo.append(_Done(before, words, kind, now))
+        self._undo.append(_Done(before, words, kind, at_s))
         del self._undo[:-DEEPEST]

@@ -8,9 +8,11 @@ from test_worst import session_with_runs
 
 from slideviz.gui import dialogs, plot_canvas
 from slideviz.gui.histogram import HistogramPanel
+from slideviz.mesh.quality import quality
 from slideviz.view import changes
 from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.look import DARK
+from slideviz.view.state import Frame
 from slideviz.view.store import Store
 
 
@@ -70,9 +72,50 @@ def test_it_follows_the_colours_of_the_view(full, qtbot):
         with qtbot.waitSignal(full.canvas.drawn):
             full.store.change(changes.set_view, colour_by=by)
         assert full.canvas.figure.axes[0].get_xlabel().startswith(word)
-    limit = full.store.session.colour_range[1]
-    assert full.canvas.figure.axes[0].get_xlim()[1] == pytest.approx(limit)
+    moved = full.store.session.frame.values("displacement", full.store.session.mesh)
+    low, high = full.canvas.figure.axes[0].get_xlim()
+    assert moved.max() <= high <= 1.3 * moved.max()
+    assert low <= moved.min()
     assert "highest" in full.numbers.text()
+
+
+def good_session(mesh):
+    """A session whose cells all are of about the same quality."""
+    rng = np.random.default_rng(5)
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    points = mesh.points + rng.uniform(-0.004, 0.004, mesh.points.shape)
+    frame = Frame(mesh.with_points(points), quality(mesh.with_points(points), mesh))
+    return changes.end_run(changes.add_frames(changes.start_run(session), [frame]), "done")
+
+
+def test_the_axis_is_close_around_the_values_or_from_0_to_1(panel, qtbot):
+    session = good_session(session_with_runs().mesh)
+    with qtbot.waitSignal(panel.canvas.drawn):
+        panel.store.put(session)
+    low, high = panel.canvas.figure.axes[0].get_xlim()
+    worst = session.frame.quality.values.min()
+    assert 0.8 < low <= worst
+    assert high == pytest.approx(1.0)
+    bars = [bar.get_height() for bar in panel.canvas.figure.axes[0].patches if bar.get_gid()]
+    assert np.count_nonzero(bars) > 5
+    # A range that begins at the left end of the axis has all that are worse, too.
+    drag(panel, low, 0.5 * (low + high))
+    assert panel.store.session.view.threshold[0] <= worst
+    panel.clear_range()
+    with qtbot.waitSignal(panel.canvas.drawn):
+        panel.whole.click()
+    assert panel.canvas.figure.axes[0].get_xlim() == pytest.approx((0.0, 1.0))
+
+
+def test_each_drag_is_undone_as_one(full, qtbot):
+    full.whole.click()
+    qtbot.waitUntil(lambda: not full.canvas.busy)
+    drag(full, 0.6, 0.9)
+    drag(full, 0.3, 0.5)
+    full.store.undo()
+    assert full.store.session.view.threshold == pytest.approx((0.6, 0.9), abs=0.01)
+    full.store.undo()
+    assert full.store.session.view.threshold is None
 
 
 def test_the_count_can_be_linear(full, qtbot):

@@ -32,7 +32,7 @@ def two_runs(session):
 
 
 def test_quality_by_step_begins_with_the_undeformed_mesh(two_runs):
-    shown, other = curves.step_runs(two_runs)
+    other, shown = curves.step_runs(two_runs)
     assert (shown.label, other.label) == ("run 2", "run 1")
     assert shown.steps.tolist() == [0, 1, 2, 3]
     assert shown.minimum.tolist() == [frame.quality.min for frame in two_runs.frames]

@@ -36,7 +36,7 @@ def test_a_range_chooses_its_ends_and_what_is_between():
 def test_inverted_cells_are_chosen_from_0_alone(frames):
     frame = frames[-1]
     values = shown_values(frame, "size_skew")
-    inverted = np.flatnonzero(np.isneginf(values))
+    inverted = np.flatnonzero(np.isnan(values))
     assert len(inverted) == frame.quality.inverted > 0
     assert set(inverted) <= set(inspect.chosen_cells(values, (0.0, 0.3)))
     assert not set(inverted) & set(inspect.chosen_cells(values, (1e-9, 1.0)))

@@ -7,6 +7,8 @@ import pytest
 from slideviz.case.model import Case, FromFile, Rotate, Translate
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
+from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.section import Section
 from slideviz.view.state import Frame, Session, essence
 from slideviz.view.store import Store
 
@@ -233,3 +235,31 @@ def test_the_range_of_the_displacement_ends_at_a_round_number():
 
     for value, wanted in ((0.0202, 0.025), (1.0, 1.0), (9.1, 10.0), (3e-7, 3e-7), (0.0, 0.0)):
         assert round_above(value) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_each_quantity_has_a_colour_range_of_its_own(session):
+    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
+    moved = changes.set_view(session, colour_by="displacement")
+    assert moved.view.colour_range is None
+    assert moved.colour_range == (0.0, 1.0)
+    moved = changes.set_view(moved, colour_range=(0.0, 0.02))
+    assert changes.set_view(moved, colour_by="skew").view.colour_range is None
+    back = changes.set_view(changes.set_view(moved, colour_by="role"), colour_by="size_skew")
+    assert back.view.colour_range == (0.949, 0.967)
+    assert changes.set_view(back, colour_by="displacement").view.colour_range == (0.0, 0.02)
+
+
+def test_cells_chosen_by_quality_are_not_chosen_by_displacement(session):
+    session = changes.set_view(session, colour_by="skew", threshold=(0.2, 0.4))
+    assert changes.set_view(session, colour_by="size").view.threshold == (0.2, 0.4)
+    assert changes.set_view(session, colour_by="displacement").view.threshold is None
+    session = changes.set_view(session, threshold=ONLY_INVERTED)
+    assert changes.set_view(session, colour_by="displacement").view.threshold == ONLY_INVERTED
+
+
+def test_one_section_is_laid_flat(session):
+    for _ in range(2):
+        session = changes.add_section(session, Section("plane"))
+    for index, wanted in ((0, [True, False]), (1, [False, True]), (None, [False, False])):
+        session = changes.lay_flat(session, index)
+        assert [section.flat for section in session.view.sections] == wanted

@@ -1,6 +1,6 @@
 """The store: what listeners hear, and what undo brings back."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from slideviz.case.model import ROLES, Translate
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
-from slideviz.view.state import COLOUR_BY, Frame, Session
-from slideviz.view.store import TOGETHER_S, WORDS, Memento, Store
+from slideviz.view.state import COLOUR_BY, Frame, Session, ViewState
+from slideviz.view.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
 
 
 class Clock:
@@ -85,7 +85,7 @@ def test_what_passes_is_not_undone(store, clock):
     clock.now += 10
     store.change(changes.select, ("left",))
     store.change(changes.mark, 3)
-    assert store.can_undo == "view"
+    assert store.can_undo == "mesh edges"
     store.undo()
     assert store.session.view.edges
     assert store.session.view.selected == ("left",)
@@ -111,6 +111,37 @@ def test_another_mesh_cannot_be_undone(store, cube):
 def test_every_word_belongs_to_a_change():
     for name in WORDS:
         assert callable(getattr(changes, name))
+
+
+def test_each_field_of_the_view_that_can_be_undone_has_a_word():
+    passing = {"selected", "frame", "marked", "beside", "swapped", "ranges"}
+    assert set(VIEW_WORDS) == {field.name for field in fields(ViewState)} - passing
+
+
+def test_undo_says_what_of_the_view_it_brings_back(store, clock):
+    for values in ({"colour_by": "skew"}, {"colour_range": (0.5, 1.0)}, {"copies": 1}):
+        store.change(changes.set_view, **values)
+        clock.now += 10
+    said = []
+    while store.can_undo:
+        said.append(store.can_undo)
+        store.undo()
+    assert said == ["neighbouring passages", "colour range", "colour by"]
+
+
+def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, clock):
+    for low in (0.1, 0.5):
+        store.hold(True)
+        for step in range(4):
+            store.change(changes.set_view, threshold=(low + 0.01 * step, 0.9))
+            clock.now += 3 * TOGETHER_S
+        store.hold(False)
+    assert store.session.view.threshold == (0.53, 0.9)
+    store.undo()
+    assert store.session.view.threshold == (0.13, 0.9)
+    store.undo()
+    assert store.session.view.threshold is None
+    assert not store.can_undo
 
 
 names = st.lists(st.sampled_from(["left", "right", "top", "bottom"]), min_size=1, unique=True)

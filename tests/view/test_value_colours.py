@@ -1,0 +1,82 @@
+"""Colours of values: a range that cells are below, and the red of inverted cells alone."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.cuts import Cuts
+from slideviz.view.flat_scene import FlatScene
+from slideviz.view.look import INVERTED_COLOUR
+from slideviz.view.scene import Scene
+from slideviz.view.section import Section
+from slideviz.view.state import Frame
+from slideviz.view.surfaces import find_surfaces
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=[300, 300])
+    yield plotter
+    plotter.close()
+
+
+def colours(plotter):
+    plotter.render()
+    return np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(int)
+
+
+def count(picture, colour, within=30):
+    wanted = np.array(pv.Color(colour).int_rgb)
+    return int((np.abs(picture - wanted).max(axis=2) <= within).sum())
+
+
+def folded(session):
+    """Return the session after a step that folds some cells and spoils others."""
+    points = session.mesh.points.copy()
+    points[12] += (1.6, 0.4)
+    mesh = session.mesh.with_points(points)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    assert frame.quality.inverted
+    session = changes.add_frames(changes.start_run(session), [frame])
+    return changes.set_view(session, colour_by="size_skew", edges=False, legend=False)
+
+
+def above_all(session):
+    return changes.set_view(session, colour_range=(2.0, 3.0), colour_map="plasma")
+
+
+LOWEST = tuple(pv.LookupTable("plasma").map_value(0.0)[:3])
+
+
+def test_cells_below_the_range_have_its_lowest_colour_and_inverted_ones_are_red(plotter, session):
+    scene = Scene(plotter)
+    for state, red in ((session, False), (folded(session), True)):
+        state = above_all(changes.set_view(state, colour_by="size_skew", edges=False, legend=False))
+        scene.open(state, find_surfaces(state.mesh))
+        picture = colours(plotter)
+        assert count(picture, LOWEST) > 5000
+        assert (count(picture, INVERTED_COLOUR) > 200) == red
+
+
+def test_so_it_is_in_the_flat_view(plotter, cube):
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = above_all(changes.set_view(session, colour_by="size_skew", edges=False))
+    scene = FlatScene(plotter, Cuts())
+    scene.update(session, Section("plane", (0.5, 0.5, 0.52)))
+    scene.fit()
+    picture = colours(plotter)
+    assert count(picture, LOWEST) > 5000
+    assert count(picture, INVERTED_COLOUR) == 0
+
+
+def test_the_labels_of_the_bar_differ(plotter, session):
+    scene = Scene(plotter)
+    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
+    scene.open(session, find_surfaces(session.mesh))
+    bar = plotter.scalar_bars["size-skew"]
+    at = [bar.GetCustomLabels().GetValue(i) for i in range(bar.GetCustomLabels().GetSize())]
+    assert at == pytest.approx([0.950, 0.955, 0.960, 0.965])
+    assert bar.GetUseCustomLabels()
+    assert len({bar.GetLabelFormat() % value for value in at}) == 4
