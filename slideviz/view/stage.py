@@ -43,7 +43,7 @@ class Stage:
     font_scale : float
         Enlarges the letters, for pictures of many pixels.
     table : pyvista.LookupTable
-        The colours of values, and of inverted cells below them; changed in place.
+        The colours of values, and of inverted cells; changed in place.
     point_words : tuple of (str, str)
         Words and colours of the nodes drawn as points, for the legend.
     has_legend : bool
@@ -67,6 +67,7 @@ class Stage:
             name=name,
             scalars=VALUES if valued else None,
             cmap=self.table if valued else None,
+            clim=tuple(self.table.scalar_range) if valued else None,
             show_scalar_bar=False,
             reset_camera=False,
             render=False,
@@ -102,7 +103,7 @@ class Stage:
     def values(self, session: Session) -> FloatArray:
         """Return the number of every cell of the frame that is shown, (m,), for the colours.
 
-        Inverted cells are below the range. Made once for a frame, whatever layers ask for it.
+        Not a number for inverted cells. Made once for a frame, whatever layers ask for it.
         """
         frame, what = session.frame, session.view.colour_by
         assert frame is not None
