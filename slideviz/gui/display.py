@@ -113,8 +113,10 @@ class DisplayPanel(QWidget):
         )
         self.form.addRow("Points", self.points)
         self.copies = Copies()
+        # Arrows as large as those of the fields above it.
+        self.copies.setMinimumHeight(self.points.sizeHint().height())
         self.copies.valueChanged.connect(self._copies)
-        self.copies_label = QLabel("Passages")
+        self.copies_label = QLabel("Neighbours")
         self.form.addRow(self.copies_label, self.copies)
         grid = QGridLayout()
         grid.setVerticalSpacing(3)

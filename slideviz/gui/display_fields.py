@@ -29,7 +29,7 @@ class Copies(QSpinBox):
     def textFromValue(self, value: int) -> str:  # noqa: N802
         """Return the words for a number of neighbours."""
         if value == 0:
-            return "none"
+            return "0"
         if self.around is not None and value == self.maximum():
             return f"all {self.around} around"
         return f"{value} on each side"
@@ -43,7 +43,7 @@ class Copies(QSpinBox):
 
     def validate(self, text: str, at: int) -> object:
         """Let anything be typed that a number can be read from."""
-        good = any(sign.isdigit() for sign in text) or text.strip() in ("none", "all")
+        good = any(sign.isdigit() for sign in text) or text.strip() == "all"
         state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
         return state, text, at
 
@@ -82,7 +82,6 @@ class Span(QWidget):
         for field, value in zip((self.low, self.high), values, strict=True):
             if value != field.value:
                 field.show_value(value)
-            field.setCursorPosition(0)
 
     def set_tip(self, text: str) -> None:
         """Explain both."""

@@ -17,19 +17,37 @@ def number_text(value: float) -> str:
     return text.removesuffix(".0")
 
 
+SHORT = 8
+"""A number with so many signs is shown with every digit."""
+
+NOTHING = 1e-10
+"""Part of a length below which another is what is left of zero by rounding."""
+
+
+def short_text(value: float, scale: float = 0.0) -> str:
+    """Return a number with six digits, or all if they are few; 0 if it is nothing beside scale."""
+    if abs(value) < NOTHING * abs(scale) or value == 0:
+        return "0"
+    exact = number_text(value)
+    return exact if len(exact) <= SHORT else f"{float(value):.6g}"
+
+
 class NumberField(QLineEdit):
     """A number; what is not allowed is marked at once, with the reason as tooltip.
 
-    ``allowed`` returns an empty text, or why a value may not be.
+    ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
+    while it is edited; the value keeps them all.
     """
 
     changed = Signal(float)
 
     def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
-        super().__init__(number_text(value))
+        super().__init__(short_text(value))
         self._allowed = allowed or (lambda _: "")
         self._value = float(value)
+        self._scale = 0.0
         self._tip = ""
+        self.setCursorPosition(0)
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
         self.textEdited.connect(self._edited)
@@ -43,6 +61,8 @@ class NumberField(QLineEdit):
     @property
     def problem(self) -> str:
         """Return why the text is not valid, or an empty text."""
+        if self.text() in (number_text(self._value), short_text(self._value, self._scale)):
+            return self._allowed(self._value)
         try:
             # A decimal comma is what many people type; thousands are not separated here.
             value = float(self.text().strip().replace(",", "."))
@@ -57,13 +77,39 @@ class NumberField(QLineEdit):
         self._tip = text
         self._mark(self.problem)
 
+    def set_scale(self, scale: float) -> None:
+        """Take a length beside which the smallest numbers are shown as 0."""
+        if scale != self._scale:
+            self._scale = scale
+            if not self.hasFocus():
+                self._write()
+
     def show_value(self, value: float) -> None:
         """Show a number without telling; what is being typed is left if it means the same."""
         if value == self._value and (self.hasFocus() or not self.problem):
             return
         self._value = float(value)
-        self.setText(number_text(value))
+        self._write()
         self._mark("")
+
+    def _write(self) -> None:
+        """Write the value, the first digits in sight."""
+        exact = self.hasFocus() and not self.isReadOnly()
+        text = number_text(self._value) if exact else short_text(self._value, self._scale)
+        if text != self.text():
+            self.setText(text)
+        if not exact:
+            self.setCursorPosition(0)
+
+    def focusInEvent(self, event) -> None:
+        if not self.problem:
+            self._write()
+        super().focusInEvent(event)
+
+    def focusOutEvent(self, event) -> None:
+        super().focusOutEvent(event)
+        if not self.problem:
+            self._write()
 
     def _edited(self) -> None:
         problem = self.problem
@@ -74,7 +120,7 @@ class NumberField(QLineEdit):
 
     def _tidy(self) -> None:
         if self.problem:
-            self.setText(number_text(self._value))
+            self._write()
             self._mark("")
 
     def _mark(self, problem: str) -> None:
@@ -106,6 +152,8 @@ class VectorField(QWidget):
             self.fields.append(field)
             self._labels.append(label)
         self.count = len(self.fields)
+        self._scale = 0.0
+        self._compare()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     @property
@@ -120,10 +168,22 @@ class VectorField(QWidget):
             label.setVisible(index < count)
             field.setVisible(index < count)
 
+    def set_scale(self, scale: float) -> None:
+        """Take a length, of the mesh, beside which the smallest numbers are shown as 0."""
+        self._scale = scale
+        self._compare()
+
     def show_value(self, values: Sequence[float]) -> None:
         """Show numbers without telling."""
         for field, value in zip(self.fields, values, strict=False):
             field.show_value(value)
+        self._compare()
+
+    def _compare(self) -> None:
+        """Show as 0 what is left of it by rounding beside the other numbers."""
+        scale = max(self._scale, *(abs(field.value) for field in self.fields))
+        for field in self.fields:
+            field.set_scale(scale)
 
     def set_tip(self, text: str) -> None:
         """Explain the field."""

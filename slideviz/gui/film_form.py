@@ -67,9 +67,9 @@ class FilmForm(QWidget):
         form.addRow("Kind", self.kind)
         form.addRow("Size", self.size_choice)
         form.addRow("", self._pixels)
-        form.addRow("Images", self.fps)
-        form.addRow("Between two steps", self.between)
-        form.addRow("Last image stays", self.hold)
+        form.addRow("Frames per second", self.fps)
+        form.addRow("Interpolated frames between steps", self.between)
+        form.addRow("Last frame stays", self.hold)
         for option in (self.white, self.fill):
             option.toggled.connect(self._changed)
             form.addRow("", option)
@@ -91,7 +91,7 @@ class FilmForm(QWidget):
         self.fps, self.hold = QDoubleSpinBox(), QDoubleSpinBox()
         self.between = QSpinBox()
         for box, low, high, value, unit in (
-            (self.fps, 0.5, 50.0, FPS, " a second"),
+            (self.fps, 0.5, 50.0, FPS, ""),
             (self.hold, 0.0, 60.0, Reel().hold, " s"),
         ):
             box.setRange(low, high)
@@ -131,7 +131,7 @@ class FilmForm(QWidget):
             title=True,
             fill=self.fill.isChecked(),
             both=False,
-            letters=1.0,
+            letters=1.25,
         )
 
     def _kind_chosen(self, kind: str) -> None:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import Qt, QTimer
 from qtpy.QtWidgets import (
     QCheckBox,
     QFormLayout,
@@ -75,6 +75,10 @@ class MethodPanel(QWidget):
         layout.addWidget(self.reason)
         self.more = MoreSettings()
         self.more.changed.connect(self._set)
+        self.more.button.toggled.connect(
+            # When its form has been laid out.
+            lambda on: on and QTimer.singleShot(0, self, self._show_more)
+        )
         layout.addWidget(self.more)
         layout.addStretch(1)
         store.listen(lambda _old, new: self.sync(new))
@@ -93,6 +97,12 @@ class MethodPanel(QWidget):
         layout = QVBoxLayout(inside)
         layout.setContentsMargins(6, 6, 6, 4)
         return layout
+
+    def _show_more(self) -> None:
+        """Scroll to the settings that have opened below the others."""
+        self.scroll.widget().adjustSize()
+        bar = self.scroll.verticalScrollBar()
+        bar.setValue(min(self.more.y(), bar.maximum()))
 
     def _make_fields(self) -> None:
         self.method = Choice(
@@ -123,7 +133,7 @@ class MethodPanel(QWidget):
         self.steps.setRange(0, MAX_STEPS)
         self.steps.setSpecialValueText("automatic")
         self.steps.setMinimumHeight(self.sliding.sizeHint().height())
-        self.reduction = QCheckBox("few control nodes")
+        self.reduction = QCheckBox("Use fewer control nodes")
         self.tolerance = NumberField(1e-3, positive)
         self.tolerance_hint = QLabel()
         self.tolerance_hint.setProperty("hint", True)
@@ -194,6 +204,7 @@ class MethodPanel(QWidget):
         for name in ("method", "sliding", "periodic", "periodic_type"):
             getattr(self, name).show_value(getattr(case, name))
         self.axis.show_value(case.axis)
+        self.origin.set_scale(self._extent)
         self.origin.show_value(case.origin)
         if self.steps.value() != case.steps:
             self.steps.blockSignals(True)

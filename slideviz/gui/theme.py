@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QPalette
-from qtpy.QtWidgets import QApplication
+from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.view.look import DARK, LIGHT, Look
 
@@ -21,8 +23,8 @@ _COLOURS = {
         "ButtonText": "#20262e",
         "Highlight": "#2f6fb5",
         "HighlightedText": "#ffffff",
-        "ToolTipBase": "#20262e",
-        "ToolTipText": "#ffffff",
+        "ToolTipBase": "#ffffff",
+        "ToolTipText": "#20262e",
         "PlaceholderText": "#7b8591",
         "Link": "#1f5f9f",
         "Mid": "#c3cad2",
@@ -38,17 +40,19 @@ _COLOURS = {
         "ButtonText": "#e6eaf0",
         "Highlight": "#3d7fc4",
         "HighlightedText": "#ffffff",
-        "ToolTipBase": "#e6eaf0",
-        "ToolTipText": "#1d2126",
+        "ToolTipBase": "#3a424b",
+        "ToolTipText": "#f2f5f8",
         "PlaceholderText": "#8a95a2",
         "Link": "#77b0ea",
         "Mid": "#47505a",
+        "Light": "#4d5763",
         "disabled": "#7d8894",
     },
 }
 
 _SHEET = """
-QDockWidget {{ font-weight: 600; }}
+QDockWidget {{ font-weight: 600; titlebar-close-icon: url("{signs}/close_{name}.svg");
+    titlebar-normal-icon: url("{signs}/float_{name}.svg"); }}
 QDockWidget::title {{ background: {title}; padding: 5px 8px; }}
 QDockWidget > QWidget {{ font-weight: 400; }}
 QToolBar {{ border: none; spacing: 2px; padding: 2px 4px; }}
@@ -58,7 +62,7 @@ QToolButton:checked {{ background: {checked}; border: 1px solid {line}; }}
 QStatusBar {{ border-top: 1px solid {line}; }}
 QStatusBar::item {{ border: none; }}
 QMainWindow::separator {{ width: 5px; height: 5px; background: {window}; }}
-QToolTip {{ padding: 4px; border: none; }}
+QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {tip}; color: {tip_text}; }}
 QListWidget#motions::item {{ padding: 3px 2px; }}
 QLabel[hint="true"] {{ color: {soft}; }}
 QLabel[bad="true"] {{ color: {bad}; }}
@@ -100,6 +104,7 @@ _EXTRA = {
         "banner": "#fdeceb",
         "note": "#eaf2fb",
         "noted": "#8fb3dc",
+        "frame": "#87919c",
     },
     "dark": {
         "title": "#30363e",
@@ -116,8 +121,16 @@ _EXTRA = {
         "banner": "#45282a",
         "note": "#24364a",
         "noted": "#4f76a3",
+        "frame": "#818c98",
     },
 }
+
+
+FRAMED = ("QCheckBox", "QRadioButton", "QLineEdit", "QAbstractSpinBox", "QComboBox", "QTableView")
+"""Widgets whose frames or boxes must stand out from what is around them."""
+
+_OUTLINE = 140
+"""Fusion draws outlines in the colour of windows, darker by so many percent."""
 
 
 def resolved(theme: str) -> str:
@@ -141,7 +154,16 @@ def apply(theme: str) -> Look:
     app = QApplication.instance()
     app.setStyle("Fusion")
     app.setPalette(palette)
-    app.setStyleSheet(_SHEET.format(**_EXTRA[name]))
+    # Tool tips keep a palette of their own, which no change of the application's reaches.
+    QToolTip.setPalette(palette)
+    framed = QPalette(palette)
+    outline = QColor(_EXTRA[name]["frame"]).lighter(_OUTLINE)
+    framed.setColor(QPalette.ColorRole.Window, outline)
+    for kind in FRAMED:
+        app.setPalette(framed, kind)
+    tip = {"tip": colours["ToolTipBase"], "tip_text": colours["ToolTipText"]}
+    signs = {"name": name, "signs": Path(__file__).with_name("dock_signs").as_posix()}
+    app.setStyleSheet(_SHEET.format(**_EXTRA[name], **tip, **signs))
     return DARK if name == "dark" else LIGHT
 
 

@@ -18,7 +18,7 @@ from slideviz.mesh.quality import quality
 from slideviz.view.encode import Pixels, Take, writer
 from slideviz.view.look import PAPER, Look
 from slideviz.view.moved import Zoom
-from slideviz.view.offscreen import font_scale, image_of, offscreen, write_title
+from slideviz.view.offscreen import LETTERS, font_scale, image_of, offscreen, write_title
 from slideviz.view.portrait import Portrait, caption
 from slideviz.view.reel import USUAL, Reel, check_film
 from slideviz.view.state import ColourBy, Frame, Session
@@ -123,7 +123,7 @@ def film_of(
     _check(frames, path, reel, overwrite)
     look: Look = like.look if like is not None else PAPER
     with offscreen(size) as plotter:
-        scene = Scene(plotter, look, font_scale(size))
+        scene = Scene(plotter, look, LETTERS * font_scale(size))
         # The camera looks at what is there when the mesh is opened.
         widest = max(frames, key=lambda frame: frame.mesh.extent)
         scene.open(_showing(session, widest), surfaces)

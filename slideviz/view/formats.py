@@ -24,7 +24,7 @@ class MeshFormat:
 
 
 MESH_FORMATS: dict[str, MeshFormat] = {
-    ".su2": MeshFormat("SU2 mesh, with everything it had", False, "names"),
+    ".su2": MeshFormat("SU2 (keeps all markers and sections)", False, "names"),
     ".vtu": MeshFormat("VTU for ParaView, with quality", True, "names"),
     ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
     ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),

@@ -85,6 +85,9 @@ class GhostLayer:
             flat = surface.facets.shape[1] == 2
             shape = actors.surface_shape(surface, mesh.points, 3 * self.stage.lift(mesh))
             actor = self.stage.add(shape, key, lighting=not flat, pickable=False)
+            if not flat:
+                # Where it is in the same place as a boundary, only that is drawn.
+                actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(4.0, 4.0)
             actor.prop.opacity = opacity + 0.25 if flat else opacity - 0.1
             actor.prop.line_width = 2.5
             self._actors[key] = actor

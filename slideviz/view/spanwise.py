@@ -161,7 +161,7 @@ def spanwise(
     profiles: Sequence[Profile],
     what: Literal["minimum", "mean"] = "minimum",
     fraction: bool = False,
-    unit: str = "mesh unit",
+    unit: str = "mesh units",
     style: Style = PRINT,
 ) -> None:
     """Draw the minimum or mean quality along the span, which is the vertical axis.

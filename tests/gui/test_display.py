@@ -110,7 +110,7 @@ def stator(tmp_path_factory):
 def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     box = panel(shown)
     assert box.copies.isEnabled()
-    assert box.copies.text() == "none"
+    assert box.copies.text() == "0"
     assert box.copies.maximum() == MOST_COPIES
     QTest.keyClick(box.copies, Qt.Key.Key_Up)
     assert view(shown).copies == 1
@@ -121,7 +121,7 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     assert seen.min() >= 0, "the view fits them"
     assert (seen.max(axis=0) <= scene.plotter.window_size).all()
     shown.open(stator)
-    assert box.copies.text() == "none"
+    assert box.copies.text() == "0"
     assert "41" not in box.copies.toolTip()
     assert "8.78049° about z" in box.copies.toolTip()
     box.copies.setValue(box.copies.maximum())
@@ -150,7 +150,7 @@ def test_a_number_of_neighbours_can_be_typed(qtbot):
         ("3", 3),
         ("7 on each side", 7),
         ("all 41 around", 20),
-        ("none", 0),
+        ("0", 0),
         ("99", 20),
     ):
         box.lineEdit().setText(text)

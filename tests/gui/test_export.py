@@ -452,7 +452,7 @@ def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path
 
 def test_formats_for_the_mesh_are_offered(opened, driver, sample_folder):
     flat = dialogs.mesh_filters(opened.session.mesh)
-    assert flat.startswith("SU2 mesh")
+    assert flat.startswith("SU2 (keeps all")
     assert "Nastran" not in flat
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
     assert "Nastran" in dialogs.mesh_filters(driver.session.mesh)

@@ -82,7 +82,7 @@ def test_convergence_and_span_are_drawn_when_there_is_something_to_draw():
     assert all(row.result for row in rows), [row.problem for row in rows]
     drawn = dict(figures(rows, profiler(case, made.mesh)))
     assert set(drawn) == {"histogram_01_steps", "convergence_01_steps", "spanwise_01_steps"}
-    assert drawn["spanwise_01_steps"].axes[0].get_ylabel() == "r [mesh unit]"
+    assert drawn["spanwise_01_steps"].axes[0].get_ylabel() == "r [mesh units]"
     (axes,) = drawn["convergence_01_steps"].axes
     assert [text.get_text() for text in axes.texts] == ["tolerance 0.01"]
     assert axes.get_legend_handles_labels()[1] == ["pseudo sliding"]

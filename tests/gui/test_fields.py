@@ -1,0 +1,90 @@
+"""Fields of numbers: what is shown, and what is kept."""
+
+import pytest
+from qtpy.QtGui import QColor, QFocusEvent, QPalette
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QToolTip
+
+from slideviz.gui import theme
+from slideviz.gui.fields import NumberField, VectorField, short_text
+
+THIRD = 0.005596983152812345
+
+
+@pytest.fixture
+def field(qtbot):
+    made = NumberField(THIRD)
+    qtbot.addWidget(made)
+    return made
+
+
+def test_six_digits_are_shown_and_all_are_kept(field):
+    assert field.text() == "0.00559698"
+    assert field.cursorPosition() == 0
+    assert field.value == THIRD
+    assert not field.problem
+
+
+def test_every_digit_is_there_to_be_edited(field):
+    told = []
+    field.changed.connect(told.append)
+    field.hasFocus = lambda: True
+    field.focusInEvent(QFocusEvent(QFocusEvent.Type.FocusIn))
+    assert field.text() == repr(THIRD)
+    field.hasFocus = lambda: False
+    field.focusOutEvent(QFocusEvent(QFocusEvent.Type.FocusOut))
+    assert field.text() == "0.00559698"
+    assert field.value == THIRD, "looking does not round"
+    assert told == []
+    field.selectAll()
+    QTest.keyClicks(field, "2.5")
+    assert (field.value, told[-1]) == (2.5, 2.5)
+
+
+def test_short_numbers_are_shown_as_they_are():
+    assert short_text(1234567.0) == "1234567"
+    assert short_text(-0.25) == "-0.25"
+    assert short_text(3.7e-13) == "3.7e-13"
+    assert short_text(3.7e-13, scale=0.1) == "0"
+    assert short_text(-0.0) == "0"
+
+
+def test_what_rounding_left_of_zero_is_shown_as_zero(qtbot):
+    fields = VectorField((0.0, 0.0, 0.0))
+    qtbot.addWidget(fields)
+    fields.show_value((0.05, 3.72047013e-13, -0.03))
+    assert [one.text() for one in fields.fields] == ["0.05", "0", "-0.03"]
+    assert fields.value[1] == 3.72047013e-13
+    fields.show_value((0.0, 3.72047013e-13, 0.0))
+    assert fields.fields[1].text() == "3.72047e-13"
+    fields.set_scale(1.0)
+    assert fields.fields[1].text() == "0"
+
+
+def contrast(one: QColor, other: QColor) -> float:
+    """Return the contrast of two colours (WCAG 2.1)."""
+
+    def light(colour: QColor) -> float:
+        parts = [colour.redF(), colour.greenF(), colour.blueF()]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    high, low = sorted((light(one), light(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("name", ["light", "dark"])
+def test_tool_tips_and_boxes_stand_out_in_every_theme(qtbot, name):
+    theme.apply("dark" if name == "light" else "light")
+    theme.apply(name)
+    role = QPalette.ColorRole
+    tip = QToolTip.palette()
+    assert contrast(tip.color(role.ToolTipBase), tip.color(role.ToolTipText)) > 7
+    sheet = QApplication.instance().styleSheet()
+    assert f"background: {tip.color(role.ToolTipBase).name()}" in sheet
+    window = QApplication.palette().color(role.Window)
+    base = QApplication.palette().color(role.Base)
+    for kind in theme.FRAMED:
+        outline = QApplication.palette(kind).color(role.Window).darker(140)
+        assert min(contrast(outline, window), contrast(outline, base)) >= 2.9, kind
+    theme.apply("system")
