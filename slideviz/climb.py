@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
-from slideviz.errors import DeformError
+from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
@@ -263,4 +263,4 @@ def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
         f"others (first: node {node} at {where}) are no control nodes; they still get exactly "
         "their displacement, so this does no harm"
     )
-    return [sentence]
+    return [Note(sentence)]

@@ -25,3 +25,12 @@ class DeformError(SlidevizError):
 
 class Cancelled(SlidevizError):
     """The one who pulls the work asked it to stop; nothing is wrong."""
+
+
+class Note(str):
+    """A sentence about a run that is worth knowing but harmless: nothing need be changed.
+
+    It stands among the warnings of a step; a window can put it where it is in nobody's way.
+    """
+
+    __slots__ = ()

@@ -10,7 +10,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.words import nearest
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Note
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -204,10 +204,11 @@ _APPLIES = {
 """Settings of one method: which, and the key."""
 
 _SLIDES = {
-    ("idw", "ds"): "inverse distance weighting solves no system that nodes could slide in: "
-    "SLIDING_MODE= ds does the same as ps (edges, then surfaces, each put back on its boundary)",
-    ("elastic", "ps"): "in linear elasticity nodes slide by the equations themselves: "
-    "SLIDING_MODE= ps does the same as ds",
+    ("idw", "ds"): "direct sliding acts like pseudo sliding here: inverse distance weighting "
+    "solves no system that nodes could slide in (edges first, then surfaces, each put back on its "
+    "boundary)",
+    ("elastic", "ps"): "pseudo sliding acts like direct sliding here: in linear elasticity nodes "
+    "slide by the equations themselves",
 }
 
 
@@ -222,4 +223,4 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:
         found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
-    return tuple(found)
+    return tuple(Note(text) for text in found)

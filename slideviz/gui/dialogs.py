@@ -28,10 +28,6 @@ from slideviz.gui.faults import details_of
 from slideviz.mesh.model import Mesh
 from slideviz.view.formats import formats_for
 
-_WORTH = {
-    "case": "The case repeats the result exactly.",
-    "mesh": "The mesh of the last step goes to a file of its own.",
-}
 PICTURE_FILTERS = "PNG picture (*.png)"
 CASE_FILTERS = "Case (*.cfg)"
 
@@ -81,19 +77,24 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     Parameters
     ----------
     what : str
-        What is unsaved, in a sentence.
+        The question; what follows after a line break is said in smaller letters.
     can_save : sequence of {"case", "mesh"}
         What can be saved now.
     """
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle("Unsaved changes")
-    box.setText(what)
-    box.setInformativeText(" ".join(_WORTH[name] for name in can_save))
+    question, _, more = what.partition("\n")
+    box.setText(question)
+    box.setInformativeText(more)
+    several = len(can_save) > 1
     buttons = {
-        name: box.addButton(f"Save {name}…", QMessageBox.ButtonRole.AcceptRole) for name in can_save
+        name: box.addButton(
+            f"Save {name}…" if several else "Save…", QMessageBox.ButtonRole.AcceptRole
+        )
+        for name in can_save
     }
-    buttons["discard"] = box.addButton("Discard", QMessageBox.ButtonRole.DestructiveRole)
+    buttons["discard"] = box.addButton("Don’t save", QMessageBox.ButtonRole.DestructiveRole)
     buttons["cancel"] = box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
     box.setEscapeButton(buttons["cancel"])
     box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])

@@ -109,16 +109,21 @@ class Files(QObject):
             session.path, mesh.dim, len(mesh.cells), len(mesh.points), len(mesh.markers),
         )  # fmt: skip
 
-    def may_go_on(self, again: Callable[[], object]) -> bool:
+    def may_go_on(self, again: Callable[[], object], before: str = "opening another mesh") -> bool:
         """Ask about unsaved changes; return whether they may be dropped or were saved.
 
-        ``again`` is called when a mesh was saved, in the background, so that the answer may be
-        another one.
+        Parameters
+        ----------
+        again : callable
+            Is called when a mesh was saved, in the background, so that the answer may be another
+            one.
+        before : str
+            What the changes would be lost by, in words.
         """
         while unsaved := self._unsaved():
-            text = " and ".join(unsaved.values())
             can_save = [name for name in unsaved if name in ("case", "mesh")]
-            answer = dialogs.ask_unsaved(self.window, f"{text[0].upper()}{text[1:]}.", can_save)
+            question = self._question(unsaved, before)
+            answer = dialogs.ask_unsaved(self.window, question, can_save)
             if answer == "discard":
                 return True
             if answer == "mesh":
@@ -132,13 +137,30 @@ class Files(QObject):
         """Return what would be lost, in words, by what it is."""
         session, unsaved = self.window.store.session, {}
         if session.unsaved_case:
-            unsaved["case"] = "the case has changes"
+            source = session.case.source
+            unsaved["case"] = (
+                f"the changes to {source.name}" if source else "roles, motions and method as a case"
+            )
         if session.unsaved_mesh:
             run = session.run_shown
             # While it goes on there is no last step to save.
             name = "mesh" if run.end and not self.window.runner.busy else "run"
-            unsaved[name] = "the deformed mesh has not been saved"
+            unsaved[name] = f"the deformed mesh of run {run.number}"
         return unsaved
+
+    def _question(self, unsaved: dict[str, str], before: str) -> str:
+        """Return what is asked; a second line says what saving is good for."""
+        session = self.window.store.session
+        text = f"Save {' and '.join(unsaved.values())} before {before}?"
+        if "run" in unsaved:
+            lost = "Its steps are lost, for it goes on; cancel it to save what there is."
+            others = {name: words for name, words in unsaved.items() if name != "run"}
+            if not others:
+                return f"Run {session.shown} goes on. Lose its steps?"
+            return f"{self._question(others, before)}\nRun {session.shown} goes on. {lost}"
+        if "case" in unsaved and session.deformed is not None and not session.outdated:
+            text += f"\nThe case repeats run {session.shown} exactly."
+        return text
 
     # Save ------------------------------------------------------------------------------
 

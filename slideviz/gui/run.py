@@ -16,6 +16,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.icons import icon
+from slideviz.view import changes
+from slideviz.view.advice import ended, help_for, inverted_words
 from slideviz.view.changes import is_missing
 from slideviz.view.jobs import Doing
 from slideviz.view.look import Look
@@ -23,6 +25,8 @@ from slideviz.view.state import Session
 from slideviz.view.store import Store
 
 LONG = 100
+SETTINGS = "settings"
+"""What the link stands for that takes the settings of the run that is shown."""
 
 
 class RunPanel(QWidget):
@@ -56,7 +60,7 @@ class RunPanel(QWidget):
         # A long sentence wraps; it must not make all panels on this side wider.
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.setTextFormat(Qt.TextFormat.RichText)
-        self.text.linkActivated.connect(self.place_wanted)
+        self.text.linkActivated.connect(self._link)
         row.addWidget(self.run)
         row.addWidget(self.cancel)
         row.addWidget(self.text, 1)
@@ -83,6 +87,8 @@ class RunPanel(QWidget):
         self.run.setVisible(not self._busy)
         self.bar.setVisible(bool(self._busy))
         self.run.setEnabled(not self._missing)
+        if self._busy or self._missing:
+            self._redden(False)
         if self._busy:
             return
         self.bar.setValue(0)
@@ -99,10 +105,36 @@ class RunPanel(QWidget):
             return
         self.run.setToolTip("Deform the mesh with these settings (Ctrl+R).")
         self.text.setToolTip("")
-        if session.outdated:
+        self._tell_run(session)
+
+    def _tell_run(self, session: Session) -> None:
+        """Tell how the run that is shown ended, or that the panels say something else."""
+        run, bad = session.run_shown, ""
+        if run is None:
+            self.text.setText("Ready.")
+        elif not session.outdated:
+            bad = inverted_words(run)
+            text = html.escape(ended(run))
+            self.text.setText(f"<b>{text}</b>" if bad else text)
+            self.text.setToolTip(help_for(run.case) if bad else "")
+        elif run is session.runs[-1]:
             self.text.setText("Settings changed since the last run.")
         else:
-            self.text.setText(_ended(session))
+            link = f"<a href='{SETTINGS}'>Use its settings</a>"
+            self.text.setText(f"The panels differ from run {run.number}. {link}")
+        self._redden(bool(bad))
+
+    def _redden(self, bad: bool) -> None:
+        if self.text.property("bad") != bad:
+            self.text.setProperty("bad", bad)
+            self.text.style().unpolish(self.text)
+            self.text.style().polish(self.text)
+
+    def _link(self, target: str) -> None:
+        if target == SETTINGS:
+            self.store.change(changes.take_settings, self.store.session.shown)
+        else:
+            self.place_wanted.emit(target)
 
     def take_theme(self, _look: Look, _colour: str) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
@@ -141,13 +173,3 @@ class RunPanel(QWidget):
 def _short(text: str) -> str:
     """Return a text that fits beside the button: a long one without its remedy, a tooltip's."""
     return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."
-
-
-def _ended(session: Session) -> str:
-    """Return how the last run ended, in words."""
-    last = session.frames[-1].step if session.deformed else None
-    if last is None:
-        return "Ready."
-    if last.index < last.total:
-        return f"Stopped after step {last.index} of {last.total}."
-    return "Done."

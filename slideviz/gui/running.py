@@ -12,6 +12,7 @@ from qtpy.QtCore import QObject, Signal
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.worker import JobRunner
 from slideviz.view import changes, jobs
+from slideviz.view.advice import help_for, inverted_words, notes_of, warnings_of
 from slideviz.view.state import Frame
 from slideviz.view.store import Store
 
@@ -123,11 +124,16 @@ class Running(QObject):
             f"{quality.inverted} inverted"
         )
         log.info("done: %s", text)
-        warnings = run.last.step.warnings
+        for note in notes_of(run):
+            log.info("%s", note)
+        warnings = list(warnings_of(run))
         for warning in warnings:
             log.warning("%s", warning)
+        bad = inverted_words(run)
+        if bad:
+            warnings.insert(0, f"{bad}. {help_for(run.case)}")
         if warnings:
-            self.banner.tell("\n".join(warnings))
+            self.banner.tell("\n".join(warnings), calm=not bad)
         self.said.emit(f"Done: {text}")
 
 

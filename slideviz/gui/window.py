@@ -312,7 +312,7 @@ class MainWindow(QMainWindow):
                 self.files.after_save = self.close
                 event.ignore()
                 return
-            if not self.files.may_go_on(self.close):
+            if not self.files.may_go_on(self.close, "closing"):
                 event.ignore()
                 return
             self._closed = True

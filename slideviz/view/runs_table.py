@@ -139,8 +139,12 @@ def brief(run: Run) -> str:
 
 
 def described(run: Run) -> str:
-    """Return all that the table says of a run, a line for each column."""
-    return "\n".join(f"{column.title}: {column.text(run)}" for column in COLUMNS)
+    """Return all that the table says of a run, a line for each column, and what it remarks."""
+    lines = [f"{column.title}: {column.text(run)}" for column in COLUMNS]
+    step = run.last.step if run.last is not None else None
+    if step is not None and step.warnings:
+        lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in step.warnings)]
+    return "\n".join(lines)
 
 
 def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:

@@ -153,7 +153,7 @@ def test_sliding_nodes_stay_in_their_planes_and_do_slide(sliding):
             nodes = mesh.marker(name).nodes
             assert np.all(step.mesh.points[nodes, axis] == place)
             assert np.abs(step.mesh.points[nodes] - mesh.points[nodes]).max() > 1e-3
-    assert any("does the same as ps" in text for text in step.warnings) == (sliding == "ds")
+    assert any("acts like pseudo sliding" in text for text in step.warnings) == (sliding == "ds")
 
 
 def test_nodes_slide_around_a_curved_far_field_and_keep_their_radius():

@@ -46,8 +46,8 @@ def test_settings_that_the_method_does_not_use_are_told():
     assert idle_settings(Case(idw_power=2.0, idw_fixed_weight=2.0)) == (
         "METHOD= rbf does not use IDW_POWER, IDW_FIXED_WEIGHT",
     )
-    assert "does the same as ps" in idle_settings(Case(method="idw", sliding="ds"))[0]
-    assert "does the same as ds" in idle_settings(Case(method="elastic", sliding="ps"))[0]
+    assert "acts like pseudo sliding" in idle_settings(Case(method="idw", sliding="ds"))[0]
+    assert "acts like direct sliding" in idle_settings(Case(method="elastic", sliding="ps"))[0]
 
 
 def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_is_not(

@@ -309,7 +309,7 @@ def test_the_mesh_and_then_the_case_are_saved_before_the_window_closes(
     assert not window.close(), "first the mesh is written"
     qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
     assert [can for _, can in asked] == [("case", "mesh"), ("case",)]
-    assert "mesh has not been saved" in asked[0][0]
+    assert "the deformed mesh of run 1" in asked[0][0]
     assert (tmp_path / "out.cfg").is_file()
     from slideviz.mesh.files import read
 
@@ -335,9 +335,9 @@ def test_cancel_at_the_second_question_keeps_the_window(
 @pytest.mark.parametrize(
     ("can_save", "words"),
     [
-        (("case", "mesh"), ["Save case…", "Save mesh…", "Discard", "Cancel"]),
-        (("mesh",), ["Save mesh…", "Discard", "Cancel"]),
-        ((), ["Discard", "Cancel"]),
+        (("case", "mesh"), ["Save case…", "Save mesh…", "Don’t save", "Cancel"]),
+        (("mesh",), ["Save…", "Don’t save", "Cancel"]),
+        ((), ["Don’t save", "Cancel"]),
     ],
 )
 def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, words):
@@ -347,9 +347,10 @@ def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, word
 
     def look(box):
         seen.append([button.text() for button in box.buttons()])
+        assert (box.text(), box.informativeText()) == ("Save it?", "It is worth it.")
         next(b for b in box.buttons() if b.text() == words[0]).click()
 
     monkeypatch.setattr(QMessageBox, "exec", look)
-    answer = dialogs.ask_unsaved(window, "The case has changes.", can_save)
+    answer = dialogs.ask_unsaved(window, "Save it?\nIt is worth it.", can_save)
     assert sorted(seen[0]) == sorted(words)
     assert answer == (can_save[0] if can_save else "discard")

@@ -1,5 +1,6 @@
 """The window, driven by mouse and keyboard under a virtual screen."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,8 +13,12 @@ from qtpy.QtWidgets import QApplication, QMenu
 
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
+from slideviz.errors import Note
 from slideviz.gui.player import plain, result_parts, step_ms
+from slideviz.mesh.quality import INVERTED
 from slideviz.view import changes, jobs
+from slideviz.view.advice import ended
+from slideviz.view.runs_table import described
 
 
 @pytest.fixture
@@ -686,6 +691,57 @@ def test_changed_settings_are_told(ready):
     assert ready.window.run_panel.text.text() == "Done."
     ready.window.store.change(changes.set_case, steps=4)
     assert "changed" in ready.window.run_panel.text.text()
+    run(ready, 4)
+    ready.window.store.change(changes.show_run, 1)
+    text = ready.window.run_panel.text
+    assert "The panels differ from run 1." in text.text()
+    width = text.sizeHint().width()
+    assert width > 0
+    text.linkActivated.emit("settings")
+    assert (ready.session.case.steps, text.text()) == (1, "Done.")
+
+
+def ended_badly(driver, texts=(), inverted=38):
+    """Let a run end with warnings and inverted cells, without computing one."""
+    run(driver, 1)
+    session = driver.session
+    last = session.runs[-1].last
+    status = last.quality.status.copy()
+    status[:inverted] = INVERTED
+    bad = replace(last.quality, status=status)
+    frame = replace(last, quality=bad, step=replace(last.step, warnings=tuple(texts)))
+    ended = replace(session.runs[-1], frames=(frame,))
+    driver.window.store.put(replace(session, runs=(*session.runs[:-1], ended)))
+    driver.window.running._run_done(None)
+    return ended
+
+
+def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
+    run_ = ended_badly(ready)
+    panel, banner = ready.window.run_panel, ready.window.banner
+    assert "Done: 38 inverted cells" in panel.text.text()
+    assert panel.text.property("bad")
+    assert "more steps" in panel.text.toolTip()
+    assert banner.property("calm") is False
+    assert "38 inverted cells. What may help: " in banner.text.text()
+    assert "inverted" in ended(run_)
+    run(ready, 1)
+    assert panel.text.text() == "Done."
+    assert not panel.text.property("bad")
+    assert not banner.isVisible()
+
+
+def test_what_is_harmless_goes_to_the_log_and_the_tooltip_and_not_over_the_view(ready, caplog):
+    caplog.set_level("INFO")
+    note = Note("24 nodes are no control nodes, so this does no harm")
+    ended_badly(ready, [note], inverted=0)
+    assert not ready.window.banner.isVisible()
+    assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
+    assert "24 nodes are no control nodes" in described(ready.session.runs[-1])
+    ended_badly(ready, [note, "the solver stopped early"], inverted=0)
+    assert ready.window.banner.isVisible()
+    assert ready.window.banner.property("calm")
+    assert ready.window.banner.text.text() == "the solver stopped early"
 
 
 def test_opening_while_running_cancels_the_run(ready, passage_file, answers):
@@ -803,8 +859,21 @@ def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, ans
     answers("ask_save", tmp_path / "a.cfg")
     closed = opened.window.close()
     assert closed == (answer != "cancel")
-    assert "case has changes" in asked[0][0]
+    assert asked[0][0] == "Save roles, motions and method as a case before closing?"
     assert (tmp_path / "a.cfg").exists() == (answer == "case")
+
+
+def test_the_question_promises_the_same_result_only_where_that_is_true(ready, answers):
+    asked = answers("ask_unsaved", "cancel")
+    ready.window.store.change(changes.set_case, sliding="ds")
+    run(ready, 1)
+    ready.window.store.change(changes.saved_mesh)
+    ready.window.close()
+    question = "Save the changes to passage.cfg before closing?"
+    assert asked[-1][:2] == (f"{question}\nThe case repeats run 1 exactly.", ["case"])
+    ready.window.store.change(changes.set_case, steps=7)
+    ready.window.close()
+    assert asked[-1][:2] == (question, ["case"])
 
 
 def test_nothing_is_asked_when_nothing_changed(opened):

@@ -1,0 +1,50 @@
+"""What a run says of itself when it is over."""
+
+from dataclasses import replace
+
+import pytest
+
+from slideviz.case.model import Case
+from slideviz.mesh.quality import INVERTED, quality
+from slideviz.staircase import deform
+from slideviz.view.advice import ended, help_for, inverted_words
+from slideviz.view.state import Frame, Run
+
+
+@pytest.fixture(scope="module")
+def run(passage):
+    """One of two steps."""
+    case = passage.case.change(sliding="none", periodic="none", steps=2)
+    frames = [Frame(s.mesh, quality(s.mesh, passage.mesh), s) for s in deform(case, passage.mesh)]
+    return Run(1, case, tuple(frames), "done")
+
+
+def with_inverted(run, count):
+    status = run.last.quality.status.copy()
+    status[:count] = INVERTED
+    bad = replace(run.last.quality, status=status)
+    return replace(run, frames=(*run.frames[:-1], replace(run.last, quality=bad)))
+
+
+def test_it_tells_the_end_and_the_inverted_cells(run):
+    assert ended(replace(run, frames=())) == "Ready."
+    assert ended(run) == "Done."
+    assert ended(with_inverted(run, 1)) == "Done: 1 inverted cell"
+    assert inverted_words(with_inverted(run, 12)) == "12 inverted cells"
+    stopped = replace(run, frames=run.frames[:1])
+    assert ended(stopped) == "Stopped after step 1 of 2."
+    assert ended(with_inverted(stopped, 3)) == "Stopped after step 1 of 2: 3 inverted cells."
+
+
+@pytest.mark.parametrize(
+    ("case", "words", "not_words"),
+    [
+        (Case(roles={"a": "sliding"}), ("sliding", "more steps"), ("radial",)),
+        (Case(roles={"a": "fixed"}, steps=0), ("smaller motion",), ("sliding", "steps")),
+        (Case(method="elastic", sliding="ds", steps=1), ("radial", "more steps"), ("sliding b",)),
+    ],
+)
+def test_it_offers_what_the_case_has_not_used(case, words, not_words):
+    text = help_for(case)
+    assert all(word in text for word in words)
+    assert not any(word in text for word in not_words)
