@@ -21,6 +21,8 @@ class GhostLayer:
         self.moved: dict[str, FloatArray] = {}
         self._surfaces: dict[str, Surface] = {}
         self._actors: dict[str, Any] = {}
+        # Kept here: a data set that only VTK holds may come back from a mapper without points.
+        self._shapes: dict[str, Any] = {}
         self._session = Session()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -30,7 +32,7 @@ class GhostLayer:
 
     def clear(self) -> None:
         """Forget the mesh."""
-        self.moved, self._surfaces, self._actors = {}, {}, {}
+        self.moved, self._surfaces, self._actors, self._shapes = {}, {}, {}, {}
         self._session = Session()
 
     def shapes(self) -> list[Any]:
@@ -41,6 +43,7 @@ class GhostLayer:
         """Draw where boundaries will go: points (u, d) of the nodes of each."""
         for name in set(self.moved) - set(moved):
             self._actors.pop(f"motion:{name}", None)
+            self._shapes.pop(f"motion:{name}", None)
             self.stage.remove(f"motion:{name}")
         self.moved = dict(moved)
         self._draw_moved(self._session)
@@ -61,7 +64,7 @@ class GhostLayer:
             if surface is None:
                 continue
             actor = self._actor(f"motion:{name}", surface, 0.55)
-            actors.place(actor.mapper.dataset, points, 3 * lift)
+            actors.place(self._shapes[f"motion:{name}"], points, 3 * lift)
             actor.prop.color = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
             actor.prop.line_width = 4.5 if session.clash else 2.5
             actor.visibility = shown and name not in view.hidden
@@ -90,5 +93,5 @@ class GhostLayer:
                 actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(4.0, 4.0)
             actor.prop.opacity = opacity + 0.25 if flat else opacity - 0.1
             actor.prop.line_width = 2.5
-            self._actors[key] = actor
+            self._actors[key], self._shapes[key] = actor, shape
         return self._actors[key]

@@ -51,6 +51,8 @@ class MarkLayer:
         """Forget the mesh."""
         self.cell: int | None = None
         self._drawn: dict[str, Any] = {}
+        # Kept here: a data set that only VTK holds may come back from a mapper without points.
+        self._shapes: dict[str, Any] = {}
 
     def shapes(self) -> list[Any]:
         """Return nothing: the cell is a part of the mesh."""
@@ -70,11 +72,9 @@ class MarkLayer:
             self._place(frame.mesh, cell)
         self.cell = cell
         if FACES in self._drawn:
-            faces = self._drawn[FACES]
-            faces.mapper.dataset.cell_data[VALUES] = np.full(
-                faces.mapper.dataset.n_cells, self.stage.values(new)[cell]
-            )
-            faces.mapper.scalar_visibility = True
+            shape = self._shapes[FACES]
+            shape.cell_data[VALUES] = np.full(shape.n_cells, self.stage.values(new)[cell])
+            self._drawn[FACES].mapper.scalar_visibility = True
         self._open_view(new, cell)
 
     def _add(self, mesh: Mesh, cell: int) -> None:
@@ -89,6 +89,7 @@ class MarkLayer:
         if mesh.dim == 3:
             shapes[FACES] = part_shape(mesh, np.array([cell]))
             shapes[FACES].cell_data[VALUES] = np.zeros(shapes[FACES].n_cells)
+        self._shapes = shapes
         for name, shape in shapes.items():
             actor = self.stage.add(shape, name, lighting=False, pickable=False)
             self._drawn[name] = actor
@@ -104,10 +105,10 @@ class MarkLayer:
     def _place(self, mesh: Mesh, cell: int) -> None:
         """Move the actors to where the cell is now."""
         at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
-        actors.place(self._drawn[OUTLINE].mapper.dataset, at, lift)
-        actors.place(self._drawn[DOT].mapper.dataset, at.mean(axis=0)[None], lift)
-        if FACES in self._drawn:
-            faces = self._drawn[FACES].mapper.dataset
+        actors.place(self._shapes[OUTLINE], at, lift)
+        actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)
+        if FACES in self._shapes:
+            faces = self._shapes[FACES]
             actors.place(faces, mesh.points[faces.point_data["vtkOriginalPointIds"]])
 
     def _open_view(self, session: Session, cell: int) -> None:
