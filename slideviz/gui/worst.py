@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from html import escape
 
 from qtpy.QtCore import QModelIndex, Qt, QTimer
 from qtpy.QtGui import QGuiApplication, QKeySequence, QShortcut
@@ -20,6 +21,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
 from slideviz.gui.worst_table import WorstModel, WorstTable
+from slideviz.mesh.model import FloatArray
 from slideviz.view import changes
 from slideviz.view.inspect import (
     cell_info,
@@ -30,6 +32,7 @@ from slideviz.view.inspect import (
 )
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.store import Store
+from slideviz.view.where import Around, axis_of, coordinates, nearest_boundary
 
 
 class WorstPanel(QWidget):
@@ -91,8 +94,8 @@ class WorstPanel(QWidget):
         return table
 
     def _make_buttons(self) -> QHBoxLayout:
-        self.back = QPushButton("Back")
-        self.back.setToolTip("Look from where you looked before flying to a cell.")
+        self.back = QPushButton("Whole mesh")
+        self.back.setToolTip("Look again at all that was seen before flying to a cell.")
         self.back.clicked.connect(self._go_back)
         self.export = QPushButton("Export CSV…")
         self.export.setToolTip("Write the list with every digit as comma-separated values.")
@@ -127,7 +130,12 @@ class WorstPanel(QWidget):
 
     @staticmethod
     def _key(session: Session) -> tuple[object, ...]:
-        return session.frame, len(session.frames), measure(session.view.colour_by)
+        return (
+            session.frame,
+            len(session.frames),
+            measure(session.view.colour_by),
+            axis_of(session),
+        )
 
     def _fill(self, session: Session) -> None:
         """Make the list of the step that is shown."""
@@ -139,7 +147,7 @@ class WorstPanel(QWidget):
         worst = worst_cells(session.frames, at, what)
         title = f"Quality: {COLOUR_BY[what]} of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
-        self.model.show(worst)
+        self.model.show(worst, axis_of(session))
 
     def _sync_mark(self, session: Session) -> None:
         """Make the marked cell the current row, and tell of it."""
@@ -158,6 +166,7 @@ class WorstPanel(QWidget):
         self.info.setVisible(bool(there))
         if there:
             self.info.setText(info_text(session, cell))
+            self.info.setToolTip(info_text(session, cell, every=True))
 
     def paintEvent(self, event) -> None:
         super().paintEvent(event)
@@ -212,18 +221,35 @@ class WorstPanel(QWidget):
         )
 
 
-def info_text(session: Session, cell: int) -> str:
-    """Return what is told of a cell of the step that is shown, as rich text of few lines."""
+def info_text(session: Session, cell: int, every: bool = False) -> str:
+    """Return what is told of a cell of the step that is shown, as rich text of few lines.
+
+    ``every`` tells every corner and coordinate.
+    """
     info = cell_info(session.frame, cell)
-    names = "x, y, z"[: 3 * len(info.position) - 2]
-    where = ", ".join(f"{value:.5g}" for value in info.position)
     red = " style='color:#e8112d'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
-    jacobians = ", ".join(f"{value:.3g}" for value in info.jacobians)
-    return (
-        f"<b>Cell {cell}</b>, {info.kind}{state}<br>"
-        f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; size {info.size:.4f}&nbsp; "
-        f"skew {info.skew:.4f}<br>"
-        f"{names}: {where}<br>"
-        f"corner Jacobians: {jacobians}"
+    around = axis_of(session)
+    parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"
+    lines = [
+        f"<b>Cell {cell}</b>, {info.kind}{state}",
+        f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
+        _place_text(info.position, around),
+    ]
+    if every and around is not None:
+        lines.append(_place_text(info.position, None))
+    near = nearest_boundary(session.frame.mesh, info.position)
+    if near is not None:
+        lines.append(f"{near[1]:.4g} from {escape(near[0])}, the nearest boundary")
+    ends = f"{info.jacobians.min():.3g} to {info.jacobians.max():.3g}"
+    corners = ", ".join(f"{value:.3g}" for value in info.jacobians)
+    lines.append(f"corner Jacobians: {corners if every else ends}")
+    return "<br>".join(lines)
+
+
+def _place_text(position: FloatArray, around: Around | None) -> str:
+    names, values = coordinates(position[None], around)
+    return "&nbsp; ".join(
+        f"{name.removesuffix(' [°]')} {value:.5g}{'°' if '°' in name else ''}"
+        for name, value in zip(names, values[0], strict=True)
     )

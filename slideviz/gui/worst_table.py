@@ -11,20 +11,23 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from slideviz.view.inspect import WorstCells
 from slideviz.view.look import INVERTED_COLOUR
+from slideviz.view.where import Around, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
-COLUMNS = ("Cell", "Type", "Quality", "Since", "Position")
-CELL, KIND, QUALITY, SINCE, POSITION = range(5)
+COLUMNS = ("Cell", "Quality", "Worse\nsince")
+CELL, QUALITY, SINCE = range(3)
+"""The first columns; the coordinates follow, and the type where there are several."""
+LAST = "Type"
+ARROW = 14
+"""Pixels of the sign of the order in a header."""
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-ALIGNMENT = (_RIGHT, _LEFT, _RIGHT, int(Qt.AlignmentFlag.AlignCenter), _LEFT)
-TIPS = (
-    "Number of the cell, from 0 as in an SU2 file",
-    "Element type",
-    "Quality of the step that is shown",
-    "The step at which the cell was at its worst first",
-    "Mean of its nodes, in the mesh's length unit",
-)
+_MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
+TIPS = {
+    CELL: "Number of the cell, from 0 as in an SU2 file",
+    QUALITY: "Quality of the step that is shown",
+    SINCE: "Worse since step: the first step at which the cell was at its worst",
+}
 
 
 class WorstModel(QAbstractTableModel):
@@ -33,13 +36,24 @@ class WorstModel(QAbstractTableModel):
     def __init__(self) -> None:
         super().__init__()
         self.worst: WorstCells | None = None
+        self.names: tuple[str, ...] = ()
+        self.places = np.empty((0, 0))
+        self._decimals: tuple[int, ...] = ()
+        self._mixed = False
         self.order = np.empty(0, np.int64)
         self._by, self._down = QUALITY, False
 
-    def show(self, worst: WorstCells | None) -> None:
-        """Show another list."""
+    def show(self, worst: WorstCells | None, around: Around | None = None) -> None:
+        """Show another list, with places about an axis, if there is one."""
         self.beginResetModel()
         self.worst = worst
+        if worst is not None:
+            self.names, self.places = coordinates(worst.positions, around)
+            self._decimals = tuple(
+                min(decimals(column), 2) if "°" in name else decimals(column)
+                for name, column in zip(self.names, self.places.T, strict=True)
+            )
+            self._mixed = len(set(worst.kinds)) > 1
         self._arrange()
         self.endResetModel()
 
@@ -58,36 +72,53 @@ class WorstModel(QAbstractTableModel):
         return len(self.order) if parent is None or not parent.isValid() else 0
 
     def columnCount(self, _parent: QModelIndex | None = None) -> int:
-        return len(COLUMNS)
+        return len(self.headers)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Return the words above the columns."""
+        return (*COLUMNS, *self.names, *((LAST,) if self._mixed else ()))
+
+    def _alignment(self, column: int) -> int:
+        if column == SINCE:
+            return _MIDDLE
+        return _LEFT if self.headers[column] == LAST else _RIGHT
 
     def headerData(self, section, orientation, role=Qt.ItemDataRole.DisplayRole):
         if orientation != Qt.Orientation.Horizontal:
             return None
         if role == Qt.ItemDataRole.ToolTipRole:
-            return TIPS[section]
+            place = f"{self.headers[section]} of the mean of its nodes, in mesh units or degrees"
+            return "Element type" if self.headers[section] == LAST else TIPS.get(section, place)
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return ALIGNMENT[section]
-        return COLUMNS[section] if role == Qt.ItemDataRole.DisplayRole else None
+            return self._alignment(section)
+        return self.headers[section] if role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index, role=Qt.ItemDataRole.DisplayRole):
         at = self.order[index.row()]
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(at, index.column())
-        if role == Qt.ItemDataRole.ToolTipRole and index.column() == POSITION:
-            return ", ".join(f"{value:.8g}" for value in self.worst.positions[at])
+        if role == Qt.ItemDataRole.ToolTipRole:
+            where = ", ".join(f"{value:.8g}" for value in self.worst.positions[at])
+            return f"{self.worst.kinds[at]} at {'x, y, z'[: 3 * len(self.names) - 2]} = {where}"
         if role == Qt.ItemDataRole.ForegroundRole and self.worst.inverted[at]:
             return QBrush(QColor(INVERTED_COLOUR)) if index.column() == QUALITY else None
-        return ALIGNMENT[index.column()] if role == Qt.ItemDataRole.TextAlignmentRole else None
+        return (
+            self._alignment(index.column()) if role == Qt.ItemDataRole.TextAlignmentRole else None
+        )
 
     def _text(self, at: int, column: int) -> str:
         worst = self.worst
         if column == QUALITY:
             return "inverted" if worst.inverted[at] else f"{worst.values[at]:.4f}"
-        if column == POSITION:
-            return ", ".join(f"{value:.3g}" for value in worst.positions[at])
-        if column == KIND:
+        if column in (CELL, SINCE):
+            return str((worst.cells if column == CELL else worst.steps)[at])
+        axis = column - len(COLUMNS)
+        if axis == len(self.names):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
-        return str((worst.cells if column == CELL else worst.steps)[at])
+        value, digits = float(self.places[at, axis]), self._decimals[axis]
+        # Without a sign before zeros.
+        return f"{round(value, digits) + 0.0:.{digits}f}" if digits < 8 else f"{value:.3g}"
 
     def sort(self, column: int, order=Qt.SortOrder.AscendingOrder) -> None:
         self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
@@ -103,12 +134,13 @@ class WorstModel(QAbstractTableModel):
         worst = self.worst
         keys = {
             CELL: worst.cells,
-            KIND: np.unique(np.array(worst.kinds), return_inverse=True)[1],
             QUALITY: np.arange(len(worst)),
             SINCE: worst.steps,
-            POSITION: np.lexsort(worst.positions.T[::-1]).argsort(),
+            **dict(enumerate(self.places.T, len(COLUMNS))),
         }
-        key = keys[self._by]
+        key = keys.get(self._by)
+        if key is None:
+            key = np.unique(np.array(worst.kinds), return_inverse=True)[1]
         self.order = np.argsort(-key if self._down else key, kind="stable")
 
 
@@ -123,26 +155,39 @@ class WorstTable(QTableView):
     def __init__(self, model: WorstModel) -> None:
         super().__init__()
         self.setObjectName("worst")
+        self._shared: tuple[str, ...] = ()
         self.setModel(model)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setAlternatingRowColors(True)
         self.setShowGrid(False)
         self.setWordWrap(False)
-        # What does not fit is in the tip, and below the table.
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        letters = self.font()
+        letters.setPointSizeF(0.9 * letters.pointSizeF())
+        self.setFont(letters)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(22)
         self.setToolTip("Click a cell to fly there; again, or Esc, to take the mark away.")
         header = self.horizontalHeader()
         header.setHighlightSections(False)
+        header.setFont(letters)
         header.setStretchLastSection(True)
-        header.setMinimumSectionSize(36)
-        for section, width in ((CELL, 54), (KIND, 40), (QUALITY, 60), (SINCE, 40)):
-            header.resizeSection(section, width)
+        header.setMinimumSectionSize(32)
+        model.modelReset.connect(self._share)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setSortIndicator(QUALITY, Qt.SortOrder.AscendingOrder)
         self.setSortingEnabled(True)
+
+    def _share(self) -> None:
+        """Give every column what its numbers need, when there are others than before."""
+        if self.model().rowCount() and self.model().headers != self._shared:
+            self._shared = self.model().headers
+            metrics, rows = self.fontMetrics(), range(self.model().rowCount())
+            for column, words in enumerate(self._shared):
+                texts = [self.model().index(row, column).data() for row in rows]
+                room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
+                # What Qt would take is more than there is.
+                self.setColumnWidth(column, room + 8 + (ARROW if column == QUALITY else 0))
 
     def keyPressEvent(self, event) -> None:
         before = self.currentIndex().row()

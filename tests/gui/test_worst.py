@@ -1,6 +1,7 @@
 """The list of the worst cells, by itself and with the view beside it."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from qtpy.QtTest import QTest
 from slideviz.case.samples import sample
 from slideviz.gui import plot_canvas, worst
 from slideviz.gui.worst import WorstPanel, info_text
-from slideviz.gui.worst_table import CELL, QUALITY, SINCE
+from slideviz.gui.worst_table import CELL, COLUMNS, QUALITY, SINCE
+from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
-from slideviz.view.inspect import worst_cells
+from slideviz.view.inspect import cell_info, worst_cells
 from slideviz.view.state import Frame
 from slideviz.view.store import Store
+from slideviz.view.where import nearest_boundary
 
 
 def shaken(mesh, size, seed):
@@ -205,8 +208,29 @@ def test_what_is_told_of_a_cell(full):
     text = info_text(session, cell)
     assert f"<b>Cell {cell}</b>, quadrilateral" in text
     assert "inverted" in text
-    assert text.split("corner Jacobians: ")[1].count(",") == 3
-    assert "x, y: " in text
+    assert " to " in text.split("corner Jacobians: ")[1]
+    assert "x " in text.split("<br>")[2]
+    name, far = nearest_boundary(session.frame.mesh, cell_info(session.frame, cell).position)
+    assert f"{far:.4g} from {name}" in text
+    every = info_text(session, cell, every=True)
+    assert every.split("corner Jacobians: ")[1].count(",") == 3
+    assert full.model.headers == (*COLUMNS, "x", "y")
+
+
+def test_places_of_a_wheel_are_told_about_its_axis(full):
+    session = full.store.session
+    first, second = session.mesh.marker_names[:2]
+    pair = Pair(
+        first, second, "rotational", np.zeros(2), 0.3, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0),
+        np.zeros((0, 2), np.int64), 0.0,
+    )  # fmt: skip
+    case = replace(session.case, roles=dict.fromkeys((first, second), "periodic"))
+    full.store.put(replace(session, case=case, pairs=(pair,)))
+    assert full.model.headers == (*COLUMNS, "r", "\u03b8 [°]")
+    at = full.model.worst.positions[full.model.order[0]]
+    assert float(full.model.index(0, 3).data()) == pytest.approx(np.hypot(*at), abs=1e-3)
+    text = info_text(full.store.session, cells(full)[0])
+    assert text.split("<br>")[2].startswith("r ")
 
 
 # With the window -----------------------------------------------------------------------
