@@ -9,8 +9,9 @@ from PIL import Image
 
 import slideviz as sv
 from slideviz.case.samples import sample, write_sample
+from slideviz.case.view_keys import MAPS as WINDOW_MAPS
 from slideviz.cli import run
-from slideviz.cli.section_options import COLOURS, cylinder, glued, plane
+from slideviz.cli.section_options import COLOURS, MAPS, cylinder, glued, plane
 from slideviz.view.section_paint import PAINT_BY
 from tests.builders import cube, passage, square
 
@@ -242,3 +243,15 @@ def test_the_help_has_an_example(capsys):
     assert "slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png" in (
         capsys.readouterr().out
     )
+
+
+def test_another_colour_map(folder):
+    assert MAPS == WINDOW_MAPS
+    for name in ("viridis", "gray"):
+        assert call(folder, "cube.su2", "--plane", "z=0.4", "--map", name, out=f"{name}.png") == 0
+    viridis, gray = (
+        np.asarray(Image.open(folder / f"{name}.png").convert("RGB")).astype(int)
+        for name in ("viridis", "gray")
+    )
+    assert np.ptp(viridis, axis=2).max() > 100
+    assert np.ptp(gray, axis=2).max() < 5

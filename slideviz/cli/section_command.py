@@ -33,6 +33,7 @@ def section(arguments: argparse.Namespace) -> int:
     base = read(arguments.reference, zone=arguments.zone) if arguments.reference else None
     found = quality(mesh, reference=base, metric=arguments.metric)
     painted = paint(mesh, found, arguments.color, base)
+    painted = replace(painted, colour_map=arguments.map)
     chosen, matrices = _section_and_passages(arguments, mesh, base, case)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, chosen, matrices)

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
+MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
 COLOURS = ("size-skew", "size", "skew", "displacement")
-"""As of `slideviz.view.section_paint`, which loads too much for a parser."""
+"""As of `slideviz.case.view_keys` and `slideviz.view.section_paint`, which load too much here."""
 
 PLANE_HELP = (
     "normal and a point: nx,ny,nz,x,y,z (2D: nx,ny,x,y); or an axis and a coordinate, as in z=0.5"
@@ -56,6 +57,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add("--reference", type=Path, metavar="UNDEFORMED", help="mesh to compare with")
     add("--color", choices=COLOURS, default="size-skew", help="(default: size-skew)")
     add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
+    add("--map", choices=MAPS, default="viridis", help="colour map (default: viridis)")
     cells = section.add_mutually_exclusive_group()
     cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
     cells.add_argument("--cut", action="store_false", dest="whole", help="cut them (default in 3D)")

@@ -13,6 +13,7 @@ from qtpy.QtWidgets import (
     QLabel,
     QListWidget,
     QListWidgetItem,
+    QMenu,
     QPushButton,
     QSizePolicy,
     QToolButton,
@@ -28,11 +29,18 @@ from slideviz.view import changes
 from slideviz.view.cuts import can_cut
 from slideviz.view.layer_copies import Period
 from slideviz.view.section import Section
-from slideviz.view.section_job import save_section
+from slideviz.view.section_job import Paper, save_section
 from slideviz.view.section_start import first_cylinder, first_plane
 from slideviz.view.state import Session
 
 PICTURES = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
+SIZES = {
+    "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
+    "17 cm wide, a page…": Paper.of_cm(17.0, 10.6),
+    "25 cm wide, a slide…": Paper.of_cm(25.0, 14.0),
+    "1600 × 1000 pixels, for the screen…": Paper((1600, 1000)),
+}
+"""Sizes of pictures, with the words of the menu."""
 HINT = (
     "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells inside."
 )
@@ -47,7 +55,7 @@ class SectionsPanel(QWidget):
         Knows which section is chosen, and shows its handle and its flat view.
     """
 
-    picture_wanted = Signal()
+    picture_wanted = Signal(object)
 
     def __init__(self, cutting: Cutting) -> None:
         super().__init__()
@@ -105,7 +113,12 @@ class SectionsPanel(QWidget):
         self.look, self.picture = QToolButton(), QToolButton()
         self.look.clicked.connect(self.cutting.look_along)
         self.picture.setToolTip("Save a picture of this section (PNG, SVG, PDF)…")
-        self.picture.clicked.connect(self.picture_wanted)
+        self.picture.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.sizes = QMenu(self.picture)
+        for words, paper in SIZES.items():
+            choice = self.sizes.addAction(words)
+            choice.triggered.connect(lambda _=False, paper=paper: self.picture_wanted.emit(paper))
+        self.picture.setMenu(self.sizes)
         self._icons += [(self.look, "along"), (self.picture, "picture")]
         column = QVBoxLayout(self)
         column.setContentsMargins(6, 6, 6, 6)
@@ -227,12 +240,12 @@ class SectionsPanel(QWidget):
 def sections_panel(window: Any) -> SectionsPanel:
     """Return the panel of a window."""
     panel = SectionsPanel(window.cutting)
-    panel.picture_wanted.connect(lambda: save_picture(window))
+    panel.picture_wanted.connect(lambda paper: save_picture(window, paper))
     return panel
 
 
-def save_picture(window: Any) -> None:
-    """Ask for a name and write a picture of the section that is chosen."""
+def save_picture(window: Any, paper: Paper) -> None:
+    """Ask for a name and write a picture of the section that is chosen, as it is shown."""
     session, section = window.store.session, window.cutting.section
     if section is None or session.frame is None or window.runner.busy:
         return
@@ -249,6 +262,7 @@ def save_picture(window: Any) -> None:
         path,
         session,
         section,
+        paper,
     )
 
 

@@ -149,7 +149,7 @@ def draw_distribution(
         axes,
         style,
         **_in_order(axes),
-        loc="upper left",
+        loc="best",
         bbox_to_anchor=(inset, 0.0, 1.0 - inset, 1.0),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from slideviz.errors import CaseError
 from slideviz.view.copies import show_passages
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layer_copies import Period, matrices
+from slideviz.view.runs_table import method_words
 from slideviz.view.section import Section
 from slideviz.view.section_cut import Cutter
 from slideviz.view.section_paint import PAINT_BY, PaintBy, paint
@@ -17,8 +19,26 @@ from slideviz.view.section_picture import SectionStyle, require_picture_name, se
 from slideviz.view.state import COLOUR_BY, Session
 
 
+@dataclass(frozen=True)
+class Paper:
+    """Width and height of a picture in pixels, and pixels per inch where it is for paper."""
+
+    size: tuple[int, int]
+    dpi: float | None = None
+
+    @classmethod
+    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
+        """Return that of a picture so large on paper."""
+        return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
+
+
 def save_section(
-    path: Path, session: Session, section: Section, report: Report, stopped: Stopped
+    path: Path,
+    session: Session,
+    section: Section,
+    paper: Paper,
+    report: Report,
+    stopped: Stopped,
 ) -> Path:
     """Write the picture of a section as the view shows it: step, colours, neighbours.
 
@@ -36,6 +56,7 @@ def save_section(
     word = COLOUR_BY[session.view.colour_by]
     by: PaintBy = next((one for one in PAINT_BY if one == word), "size-skew")
     painted = paint(frame.mesh, frame.quality, by, session.mesh)
+    painted = replace(painted, colour_map=session.view.colour_map)
     if by == word:
         painted = painted.within(*session.colour_range)
     around = matrices(session, Period().of(session) if session.view.copies else None)
@@ -45,6 +66,16 @@ def save_section(
     require_going(stopped)
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
-    style = SectionStyle(edges=session.view.edges, name=name)
+    state = state_words(session)
+    style = SectionStyle(paper.size, session.view.edges, name=name, state=state, dpi=paper.dpi)
     section_picture(pieces, section, painted, path, style)
     return path
+
+
+def state_words(session: Session) -> str:
+    """Return which run and step a session shows, and how it was computed."""
+    run = session.run_shown
+    if run is None or session.view.frame == 0:
+        return "undeformed"
+    step = min(session.view.frame, len(run.frames))
+    return f"run {run.number}, {method_words(run.case)}, step {step}"

@@ -54,12 +54,14 @@ class Layout:
         return 72.0 * self.inches[0] / float(self.high[0] - self.low[0])
 
 
-def inches_of(size: tuple[int, int]) -> tuple[float, float, float]:
+def inches_of(size: tuple[int, int], wanted: float | None = None) -> tuple[float, float, float]:
     """Return width and height in inches, and pixels per inch, of a picture in pixels.
 
-    Small pictures are printed small and large ones in full width, so that letters of 8 points
-    can be read in both.
+    Where none are wanted, small pictures are printed small and large ones in full width, so that
+    letters of 8 points can be read in both.
     """
+    if wanted is not None:
+        return size[0] / wanted, size[1] / wanted, wanted
     width = float(np.clip(size[0] / 200.0, 5.0, 10.0))
     dpi = size[0] / width
     return width, size[1] / dpi, dpi

@@ -10,6 +10,7 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.view.look import COLOUR_MAP
 
 PaintBy = Literal["size-skew", "size", "skew", "displacement"]
 PAINT_BY: tuple[PaintBy, ...] = ("size-skew", "size", "skew", "displacement")
@@ -28,12 +29,15 @@ class Paint:
         Cells that get the colour of inverted ones.
     limits : (float, float)
         What the ends of the colour map stand for.
+    colour_map : str
+        A colour map of matplotlib.
     """
 
     label: PaintBy
     values: FloatArray
     inverted: np.ndarray
     limits: tuple[float, float]
+    colour_map: str = COLOUR_MAP
 
     def within(self, low: float, high: float) -> Paint:
         """Return the same with other limits.

@@ -42,12 +42,18 @@ class SectionStyle:
         Show it in space instead of flat.
     name : str
         What was cut: it stands before the section in words, shortened where there is no room.
+    state : str
+        Which state of it: run, method and step.
+    dpi : float, optional
+        Pixels per inch; left out, letters can be read when the picture is as wide as a page.
     """
 
     size: tuple[int, int] = (1600, 1000)
     edges: bool = True
     in_space: bool = False
     name: str = ""
+    state: str = ""
+    dpi: float | None = None
 
 
 def require_picture_name(file: Path) -> None:
@@ -125,7 +131,7 @@ def draw_section(
         flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
     corners = flat.points[flat.connectivity, :2]
     low, high = corners.min(axis=0), corners.max(axis=0)
-    width, height, dpi = inches_of(style.size)
+    width, height, dpi = inches_of(style.size, style.dpi)
     layout = lay_out((low, high), (width, height), bare=style.in_space)
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
@@ -138,7 +144,8 @@ def draw_section(
     all_ids = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
     ids = drawn[0].cell_ids if 0 in drawn else all_ids
     _bar(figure, layout, paint, bool(paint.inverted[all_ids].any()))
-    _title(figure, layout, (style.name, section.describe()), paint.sentence(ids))
+    words = ", ".join(part for part in (style.state, section.describe()) if part)
+    _title(figure, layout, (style.name, words), paint.sentence(ids))
     return figure, dpi
 
 
@@ -256,8 +263,11 @@ def _title(figure: Any, layout: Layout, first: tuple[str, str], second: str) -> 
         text = figure.text(0.5, top + above / height, "", fontsize=size, ha="center", va="center")
         for shown in _shorter(name):
             text.set_text(f"{shown}: {words}" if shown else words)
-            if text.get_window_extent(renderer).width <= (width - 0.2) * figure.dpi:
+            wide = text.get_window_extent(renderer).width / ((width - 0.2) * figure.dpi)
+            if wide <= 1.0:
                 break
+        else:
+            text.set_fontsize(size / wide)
 
 
 def _shorter(name: str) -> Iterator[str]:

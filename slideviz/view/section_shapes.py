@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR, PAPER
+from slideviz.view.look import INVERTED_COLOUR, PAPER
 from slideviz.view.polygons import Polygons
 from slideviz.view.section_paint import Paint
 
@@ -27,7 +27,7 @@ def colours_of(paint: Paint) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    table = mpl.colormaps[COLOUR_MAP].with_extremes(bad=INVERTED_COLOUR)
+    table = mpl.colormaps[paint.colour_map].with_extremes(bad=INVERTED_COLOUR)
     return ScalarMappable(Normalize(*paint.limits), table)
 
 

@@ -50,7 +50,7 @@ VIEW_WORDS: dict[str, str] = {
     "triad": "axes",
     "perspective": "perspective",
     "sections": "sections",
-    "copies": "neighbouring passages",
+    "copies": "neighbours",
     "hidden": "hidden boundaries",
 }
 """What the menu calls a change of the view, by the field; it says "view" of several at once."""

@@ -188,6 +188,22 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
     assert not panel.flat.isChecked()
 
 
+def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_path, answers):
+    driver.click(panel.add_plane)
+    driver.click(panel.add_cylinder)
+    panel.flat.click()
+    assert window.cutting.flat.scene.section.kind == "cylinder"
+    answers("ask_save", tmp_path / "again.cfg")
+    window.actions_.by_name["save_case"].trigger()
+    assert "cut, unrolled)" in (tmp_path / "again.cfg").read_text()
+    window.store.undo()
+    assert window.cutting.flat is None
+    driver.open(tmp_path / "again.cfg")
+    assert window.cutting.flat.scene.section.kind == "cylinder"
+    assert window.cutting.chosen == 1
+    assert panel.flat.isChecked()
+
+
 def test_the_flat_view_shows_the_step(window, driver, panel):
     driver.click(panel.add_plane)
     panel.flat.click()
@@ -295,16 +311,19 @@ def test_look_along_the_normal(window, driver, panel):
 def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_path):
     driver.click(panel.add_plane)
     asked = answers("ask_save", tmp_path / "cut.svg")
-    driver.click(panel.picture)
+    assert panel.picture.menu() is panel.sizes
+    panel.sizes.actions()[0].trigger()
     driver.settle()
     assert asked
     assert b"<svg" in (tmp_path / "cut.svg").read_bytes()
+    # 8.5 cm are 241 points.
+    assert b'width="240.9' in (tmp_path / "cut.svg").read_bytes()
 
 
 def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers, tmp_path):
     driver.click(panel.add_plane)
     answers("ask_save", tmp_path / "cut.bmp")
-    driver.click(panel.picture)
+    panel.sizes.actions()[-1].trigger()
     driver.settle()
     assert window.banner.isVisible()
     assert not (tmp_path / "cut.bmp").exists()

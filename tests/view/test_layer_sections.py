@@ -1,14 +1,16 @@
 """Sections in the scene and laid flat: which cells are drawn, where, and in which colours."""
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import pyvista as pv
+from PIL import Image
 
 from slideviz.case.samples import sample
 from slideviz.errors import Cancelled, CaseError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, section_start
+from slideviz.view import changes, section_picture, section_start
 from slideviz.view.actors import VALUES
 from slideviz.view.copies import find_period, moved
 from slideviz.view.cuts import KEPT, Cuts
@@ -19,7 +21,7 @@ from slideviz.view.pick import to_display
 from slideviz.view.polygon_actor import plain_colour
 from slideviz.view.scene import Scene
 from slideviz.view.section import Section
-from slideviz.view.section_job import save_section
+from slideviz.view.section_job import Paper, save_section, state_words
 from slideviz.view.state import Frame, Session
 from slideviz.view.surfaces import find_surfaces
 
@@ -387,7 +389,7 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     section = Section("cylinder", radius=0.27)
     told = []
     one, three = tmp_path / "one.svg", tmp_path / "three.svg"
-    going = (told.append, lambda: False)
+    going = (Paper((1600, 1000)), told.append, lambda: False)
     assert save_section(three, session, section, *going) == three
     save_section(one, changes.set_view(session, copies=0), section, *going)
     assert three.stat().st_size > 2 * one.stat().st_size
@@ -397,4 +399,47 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     with pytest.raises(CaseError, match="a section is drawn as"):
         save_section(tmp_path / "one.bmp", session, section, *going)
     with pytest.raises(Cancelled):
-        save_section(one, session, section, told.append, lambda: True)
+        save_section(one, session, section, Paper((1600, 1000)), told.append, lambda: True)
+
+
+def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run_it_is_of(
+    cube, tmp_path, monkeypatch
+):
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    section = Section("plane", (0.5, 0.5, 0.52))
+    assert state_words(session) == "undeformed"
+    moved = cube.with_points(cube.points * (1.0, 1.0, 1.2))
+    session = changes.set_case(session, sliding="ds")
+    for _ in range(2):
+        frames = [Frame(moved, quality(moved, cube))] * 3
+        session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
+    session = changes.set_view(
+        session, colour_by="size", colour_range=(0.2, 0.9), colour_map="cividis"
+    )
+    session = changes.show_frame(session, 2)
+    drawn = []
+    real = section_picture.draw_section
+    monkeypatch.setattr(
+        section_picture, "draw_section", lambda *v: drawn.append(real(*v)) or drawn[-1]
+    )
+    file = tmp_path / "a.png"
+    paper = Paper.of_cm(8.5, 6.4)
+    save_section(file, session, section, paper, lambda _: None, lambda: False)
+    figure, _ = drawn[0]
+    said = [text.get_text() for text in figure.texts]
+    assert "run 2, direct sliding, step 2, plane z = 0.52" in said
+    assert all(text.get_window_extent().x0 >= 0 for text in figure.texts)
+    shapes = figure.axes[0].collections[0]
+    values = session.frame.quality.size[shapes_cells(session, section)]
+    share = np.clip((values - 0.2) / 0.7, 0.0, 1.0)
+    wanted = mpl.colormaps["cividis"](share)
+    found = shapes.get_facecolor()
+    assert np.allclose(np.unique(found, axis=0), np.unique(wanted, axis=0), atol=0.01)
+    with Image.open(file) as image:
+        assert image.size == paper.size == (1004, 756)
+        assert image.info["dpi"] == pytest.approx((300.0, 300.0), abs=0.1)
+
+
+def shapes_cells(session, section):
+    """Return the cells that a section shows."""
+    return Cuts().of(session.frame.mesh, section).cells

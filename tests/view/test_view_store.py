@@ -126,7 +126,7 @@ def test_undo_says_what_of_the_view_it_brings_back(store, clock):
     while store.can_undo:
         said.append(store.can_undo)
         store.undo()
-    assert said == ["neighbouring passages", "colour range", "colour by"]
+    assert said == ["neighbours", "colour range", "colour by"]
 
 
 def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, clock):
