@@ -38,6 +38,9 @@ from slideviz.view.state import COLOUR_BY, ColourBy, Frame, Session
 from slideviz.view.store import Store
 from slideviz.view.ticks import rounded_out
 
+LEAST_SPREAD = 0.05
+"""Part of the quality's 0 to 1 that is shown at least."""
+
 
 class HistogramPanel(QWidget):
     """The values of the step that is shown, of the undeformed mesh and of other runs."""
@@ -231,7 +234,8 @@ class Counts:
         found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
         low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
         if what != "displacement":
-            return (0.0, 1.0) if whole else rounded_out(low, high)
+            # Closer, differences that mean nothing would look large.
+            return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
         return rounded_out(0.0 if whole else low, high)
 
     def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -23,6 +23,9 @@ from slideviz.view import changes
 from slideviz.view.look import Look
 from slideviz.view.state import Session
 from slideviz.view.store import Store
+
+HEIGHT, LEAST_HEIGHT = 300, 210
+"""Pixels that the panel would like, and that its longest form needs."""
 
 
 class MotionPanel(QWidget):
@@ -171,6 +174,13 @@ class MotionPanel(QWidget):
         row = self.list.currentRow()
         self.store.change(changes.move_motion, row, by)
         self.list.setCurrentRow(row + by)
+
+    def sizeHint(self) -> QSize:
+        # Whatever the form shows: else the panel above would jump with every motion.
+        return QSize(super().sizeHint().width(), HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(super().minimumSizeHint().width(), LEAST_HEIGHT)
 
     def keyPressEvent(self, event) -> None:
         if event.key() == Qt.Key.Key_Delete and self.list.hasFocus() and self.remove.isEnabled():
