@@ -100,6 +100,7 @@ def draw_distribution(
         Whether counts are on a logarithmic axis, which shows a few bad cells among many.
     style : Style
     """
+    from matplotlib.patheffects import withStroke
     from matplotlib.ticker import NullLocator
 
     label, metric = words
@@ -125,6 +126,7 @@ def draw_distribution(
     for other in outlines:
         thin = other.series is None
         look = style.series(other.series or 0)
+        seam = (0.9 if thin else style.width) + 1.4
         axes.stairs(
             other.distribution.counts,
             other.distribution.edges,
@@ -132,6 +134,8 @@ def draw_distribution(
             linestyle="solid" if thin else look.dash,
             linewidth=0.9 if thin else style.width,
             label=other.label,
+            # A seam, for bars can have any colour, that of the line too.
+            path_effects=[withStroke(linewidth=seam, foreground=style.look.background)],
         )
     left = low
     if shown.inverted or any(other.distribution.inverted for other in outlines):
