@@ -90,18 +90,28 @@ class Viewing(QWidget):
         self.second_scene.open(changes.seen_beside(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
         self.second_scene.take_camera(self.scene)
-        self.scene.set_legend(False)
+        self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self._rearranged(whole)
+
+    def _swap(self, swapped: bool) -> None:
+        """Let the two views change places where they stand the other way round."""
+        if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
+            return
+        fitted = self._leader.eye.fitted
+        self._place(swapped)
+        self._share_legend(swapped)
+        if fitted:
+            self.fit()
+
+    def _share_legend(self, swapped: bool) -> None:
+        """Draw the legend in the view to the right only."""
+        self.scene.set_legend(swapped)
+        self.second_scene.set_legend(not swapped)
 
     def _place(self, swapped: bool) -> None:
         """Put the second view to the right of the first, or to the left."""
         pair = (self.second, self.view) if swapped else (self.view, self.second)
-        if self._grid.itemAtPosition(1, 0) is not None and (
-            self._grid.itemAtPosition(1, 0).widget() is pair[0]
-            and self._grid.itemAtPosition(1, 1) is not None
-        ):
-            return
         for view in pair:
             self._grid.removeWidget(view)
         for column, view in enumerate(pair):
@@ -117,7 +127,8 @@ class Viewing(QWidget):
     @property
     def _leader(self) -> Scene:
         """Return what is fitted: of two views the one with less room, beside the legend."""
-        return self._scenes()[-1]
+        having = (scene for scene in reversed(self._scenes()) if scene.stage.has_legend)
+        return next(having, self.scene)
 
     def _rearranged(self, whole: bool) -> None:
         """Draw views of another width; who saw the whole mesh still does, who a detail too."""
@@ -191,7 +202,7 @@ class Viewing(QWidget):
         if self.second is None:
             self._make_second(session)
         else:
-            self._place(session.view.swapped)
+            self._swap(session.view.swapped)
             self.second_scene.update(changes.seen_beside(session))
             self.second.render_soon()
 

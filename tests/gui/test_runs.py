@@ -195,6 +195,7 @@ def test_each_title_chooses_what_its_view_shows(ran):
     assert (left.text, right.text) == ("Undeformed mesh", title(ran, 1))
     QApplication.processEvents()
     assert viewing.second.x() < viewing.view.x()
+    assert [one.stage.has_legend for one in viewing._scenes()] == [True, False], "to the right"
     seen = np.asarray(viewing.second_scene.drawn["airfoil"].shape.points)[:, :2]
     nodes = viewing.scene.drawn["airfoil"].surface.nodes
     assert np.allclose(seen, ran.session.mesh.points[nodes])
