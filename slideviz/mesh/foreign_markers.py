@@ -70,7 +70,7 @@ def _by_cell_sets(data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
     """Return the elements in each named set of cells."""
     groups: Groups = {}
     for name, members in data.cell_sets.items():
-        if name.startswith("gmsh:"):
+        if name is not None and name.startswith("gmsh:"):
             continue
         for block in sides:
             # Some readers leave out the blocks at the end, or put None for an empty set.
@@ -128,8 +128,9 @@ def _names(data: meshio.Mesh, dim: int) -> dict[int, list[str]]:
     return found
 
 
-def _add(groups: Groups, name: str, vtk: int, nodes: IntArray) -> None:
-    clean = "".join(c for c in name if c.isprintable()).strip() or "unnamed"
+def _add(groups: Groups, name: str | None, vtk: int, nodes: IntArray) -> None:
+    # Readers give None to a set that its file does not name.
+    clean = "".join(c for c in name or "" if c.isprintable()).strip() or "unnamed"
     groups.setdefault(clean, []).append((vtk, nodes))
 
 
@@ -139,7 +140,7 @@ def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker
     A facet goes to the smallest set that has it, so that a set of all points takes nothing away.
     """
     free = np.ones(len(facets), bool)
-    found = {}
+    found: dict[object, list[tuple[int, IntArray]]] = {}
     for name, members in sorted(data.point_sets.items(), key=lambda item: len(item[1])):
         inside = np.zeros(len(mesh.points), bool)
         inside[np.asarray(members, np.int64)] = True
@@ -148,8 +149,12 @@ def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker
             chosen = free[ids] & inside[nodes].all(axis=1)
             free[ids[chosen]] = False
             parts.append((vtk, nodes[chosen]))
-        found[name] = Marker(name, Cells.from_blocks(parts))
-    return tuple(found[name] for name in data.point_sets if len(found[name].cells))
+        found[name] = [(vtk, nodes) for vtk, nodes in parts if len(nodes)]
+    groups: Groups = {}
+    for name in data.point_sets:
+        for vtk, nodes in found[name]:
+            _add(groups, name, vtk, nodes)
+    return tuple(Marker(name, Cells.from_blocks(parts)) for name, parts in groups.items())
 
 
 def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:

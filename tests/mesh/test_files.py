@@ -464,6 +464,13 @@ def test_a_reader_that_ends_the_process_or_prints(tmp_path, monkeypatch, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_set_without_a_name_is_called_unnamed(tmp_path):
+    mesh = read(save(tmp_path, ABAQUS.replace("NSET=FLOOR", "NSET"), "a.inp"))
+    assert "unnamed" in mesh.marker_names
+    assert "FLOOR" not in mesh.marker_names
+    write(tmp_path / "b.vtu", mesh)
+
+
 @pytest.mark.parametrize(
     ("problem", "message"),
     [
