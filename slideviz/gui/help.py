@@ -32,6 +32,7 @@ MOUSE = (
     ("Wheel", "zoom about the mouse"),
     ("Click", "select the boundary in front"),
     ("Ctrl+Click", "select one more, or one less"),
+    ("Ctrl+Click on a run", "show it beside the one that is shown"),
     ("Right click", "roles of the boundary, hide, isolate"),
     ("Drop a file", "open it"),
 )
@@ -94,7 +95,7 @@ class ShortcutsDialog(QDialog):
         column.addWidget(self.tree)
         for title, rows in shortcut_rows(window):
             self._add(title, rows)
-        self._add("Mouse in the view", [(what, keys, "") for keys, what in MOUSE])
+        self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)

@@ -91,9 +91,11 @@ class Studio:
             return self._pane(self.session, figure, aim)
         gap = max(round(GAP * figure.scale), 1)
         first, second = panes(figure, gap)
-        left = self._pane(self.session, first, aim)
+        swapped = self.session.view.swapped
+        pair = (other, self.session) if swapped else (self.session, other)
+        left = self._pane(pair[0], first, aim)
         # The same camera, so that a length is as long in both.
-        right = self._pane(other, second, aim=False)
+        right = self._pane(pair[1], second, aim=False)
         between = np.repeat(left[:, -1:], gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 

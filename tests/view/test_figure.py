@@ -103,6 +103,9 @@ def test_two_runs_have_the_same_room_and_the_same_scale(studio, session, square)
     first, second = drawn(both[:, :395]), drawn(both[:, 405:])
     assert first[3] - first[2] == pytest.approx(1.05 * (second[3] - second[2]), rel=0.03)
     assert first[1] - first[0] == pytest.approx(2 * (second[1] - second[0]), rel=0.05)
+    studio.session = changes.set_view(studio.session, swapped=True)
+    other = studio.image(replace(PLAIN, size=(800, 300)))
+    assert drawn(other[:, 405:])[3] - drawn(other[:, 405:])[2] > second[3] - second[2]
     studio.session = changes.show_beside(studio.session, changes.UNDEFORMED)
     assert studio.beside.frame is session.first
 
