@@ -7,11 +7,14 @@ import pyvista as pv
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
 from slideviz.view.cuts import Cuts
+from slideviz.view.figure import Figure
+from slideviz.view.figure_vector import draw_vector
 from slideviz.view.flat_scene import FlatScene
 from slideviz.view.look import INVERTED_COLOUR
 from slideviz.view.scene import Scene
 from slideviz.view.section import Section
 from slideviz.view.state import Frame
+from slideviz.view.studio import Studio
 from slideviz.view.surfaces import find_surfaces
 
 
@@ -80,3 +83,17 @@ def test_the_labels_of_the_bar_differ(plotter, session):
     assert at == pytest.approx([0.950, 0.955, 0.960, 0.965])
     assert bar.GetUseCustomLabels()
     assert len({bar.GetLabelFormat() % value for value in at}) == 4
+
+
+def test_so_it_is_in_vector_figures(session):
+    for state, red in ((session, 0), (folded(session), 1)):
+        state = above_all(changes.set_view(state, colour_by="size_skew"))
+        with Studio(state, find_surfaces(state.mesh)) as studio:
+            sheet = draw_vector(studio, Figure((300, 300), legend=False))
+        cells = sheet.axes[0].collections[0]
+        cells.update_scalarmappable()
+        found = cells.get_facecolor()[:, :3]
+        inverted = np.isclose(found, pv.Color(INVERTED_COLOUR).float_rgb).all(axis=1)
+        assert inverted.sum() == red * state.frame.quality.inverted
+        lowest = np.array(LOWEST)
+        assert np.isclose(found[~inverted], lowest, atol=0.01).all()
