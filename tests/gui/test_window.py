@@ -336,6 +336,7 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
     monkeypatch.setattr(clashes, "find_clash", listening)
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
+    opened.click(field)
     field.selectAll()
     QTest.keyClicks(field, "0.123456")
     opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
