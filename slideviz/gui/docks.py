@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QEvent, QObject, Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.boundaries import BoundariesPanel
@@ -24,7 +24,9 @@ from slideviz.gui.worst import WorstPanel
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
-"""Pixels that the panels at the sides need at least, and have at first: the view gets the rest."""
+"""Pixels that the panels at the sides need at least."""
+SIDE = 0.22
+"""Part of the window's width that the panels of a side take, until somebody chooses otherwise."""
 
 
 @dataclass(frozen=True)
@@ -73,11 +75,14 @@ DOCKS: tuple[DockRow, ...] = (
 """Every dock; the panels get the window and take from it what they need."""
 
 
-class Docks:
+class Docks(QObject):
     """The docks of a window, by name in ``by_name``; their panels in ``panels``."""
 
     def __init__(self, window: QMainWindow) -> None:
+        super().__init__(window)
         self.window = window
+        self._widths: dict[str, int] = {}
+        window.installEventFilter(self)
         window.setDockOptions(
             QMainWindow.DockOption.AnimatedDocks | QMainWindow.DockOption.AllowTabbedDocks
         )
@@ -130,12 +135,27 @@ class Docks:
         window = self.window
         heights = {"boundaries": 240, "motion": 330, "run": 90}
         docks = [self.by_name[name] for name in heights]
-        window.resizeDocks(docks[:1], [LEFT_WIDTH], Qt.Orientation.Horizontal)
+        self._share_width()
         window.resizeDocks(docks, list(heights.values()), Qt.Orientation.Vertical)
         right = [self.by_name[row.name] for row in DOCKS if row.area == RIGHT and not row.after]
         if right:
-            window.resizeDocks(right[:1], [RIGHT_WIDTH], Qt.Orientation.Horizontal)
             window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
+
+    def _share_width(self) -> None:
+        """Give both sides their part of the window's width."""
+        part = round(SIDE * self.window.width())
+        self._widths = {"boundaries": max(part, LEFT_WIDTH), "histogram": max(part, RIGHT_WIDTH)}
+        docks = [self.by_name[name] for name in self._widths]
+        self.window.resizeDocks(docks, list(self._widths.values()), Qt.Orientation.Horizontal)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        """Let the sides follow the width of the window, as long as nobody has moved them."""
+        if event.type() == QEvent.Type.Resize and self._widths and self._unmoved():
+            QTimer.singleShot(0, self, self._share_width)
+        return False
+
+    def _unmoved(self) -> bool:
+        return all(abs(self.by_name[at].width() - it) < 4 for at, it in self._widths.items())
 
     def lead_to(self, name: str) -> None:
         """Bring a dock to the front."""

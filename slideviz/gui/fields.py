@@ -81,7 +81,7 @@ class NumberField(QLineEdit):
         """Take a length beside which the smallest numbers are shown as 0."""
         if scale != self._scale:
             self._scale = scale
-            if not self.hasFocus():
+            if not (self.hasFocus() or self.isModified()):
                 self._write()
 
     def show_value(self, value: float) -> None:
@@ -108,6 +108,7 @@ class NumberField(QLineEdit):
 
     def focusOutEvent(self, event) -> None:
         super().focusOutEvent(event)
+        self.setModified(False)
         if not self.problem:
             self._write()
 

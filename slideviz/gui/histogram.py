@@ -144,7 +144,9 @@ class HistogramPanel(QWidget):
         plain = session.frame.values(what, session.mesh)
         bad = session.frame.quality.inverted
         low = "highest" if what == "displacement" else "min"
-        ends = plain.max() if what == "displacement" else plain.min()
+        # Of a node: the values of cells are means of theirs.
+        shifts = session.frame.mesh.points - session.mesh.points
+        ends = np.linalg.norm(shifts, axis=1).max() if what == "displacement" else plain.min()
         red = " style='color:#e8112d'" if bad else ""
         self.numbers.setText(
             f"{low} <b>{ends:.4g}</b>&nbsp; mean <b>{plain.mean():.4g}</b>&nbsp; "

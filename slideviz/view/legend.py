@@ -14,6 +14,9 @@ from slideviz.view.ticks import tick_format, ticks
 STRIP = 104
 """Pixels at the right edge that are kept free of the mesh, at normal letter size."""
 
+UNITS = {"displacement": "[mesh units]"}
+"""Units of what colour bars show, below its name; the others have none."""
+
 _VTK_FONT_FILE = 4
 
 
@@ -115,8 +118,11 @@ def add_colour_bar(
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
-    # A longer word would be cut off at the edge of the view.
-    set_letters(bar.GetTitleTextProperty(), look, (14 if len(title) < 11 else 13) * font_scale)
+    unit = UNITS.get(title, "")
+    bar.SetTitle(f"{title}\n{unit}" if unit else title)
+    # Longer words would be cut off at the edge of the view.
+    size = (14 if len(title) < 11 else 13) if not unit else 12
+    set_letters(bar.GetTitleTextProperty(), look, size * font_scale)
     set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
     bar.SetBarRatio(0.24)

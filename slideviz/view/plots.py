@@ -41,7 +41,7 @@ LABELS: dict[What, str] = {
     "mean": "mean quality [-]",
     "seconds": "processor time [s]",
     "control_nodes": "control nodes [-]",
-    "max_error": "largest error [mesh unit]",
+    "max_error": "largest error [mesh units]",
 }
 _CROWDED = 300
 """Selections of more cycles than this get a thin line."""
@@ -72,7 +72,7 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
 
 
 def convergence(
-    axes: Axes, runs: Sequence[GreedyRun], unit: str = "mesh unit", style: Style = PRINT
+    axes: Axes, runs: Sequence[GreedyRun], unit: str = "mesh units", style: Style = PRINT
 ) -> None:
     """Draw the error of greedy selections against control nodes, on a logarithmic axis.
 

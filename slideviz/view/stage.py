@@ -12,6 +12,16 @@ from slideviz.view.look import LIGHT, Look
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 
+_EDGE = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
+"""How VTK's shader draws edges; a VTK that writes it otherwise draws all in one colour."""
+_EITHER_EDGE = """float edgeMix = min(emix * edgeOpacity, 0.99);
+  const vec3 luma = vec3(0.30, 0.59, 0.11);
+  vec3 face = ambientColor + diffuseColor / (1.0 - edgeMix);
+  float light = dot(face, luma);
+  vec3 darker = edgeColor * clamp((light - 0.30) / dot(edgeColor, luma), 0.0, 1.0);
+  vec3 line = light < 0.36 ? face + 0.32 : darker;
+  ambientColor = mix(ambientColor, line, edgeMix);"""
+
 
 class Layer(Protocol):
     """A part of the scene that draws one kind of thing.
@@ -74,6 +84,8 @@ class Stage:
             copy_mesh=False,
             **options,
         )
+        # Lines on dark colours are light: one colour would not be seen on both ends of a map.
+        actor.GetShaderProperty().AddFragmentShaderReplacement(_EDGE, False, _EITHER_EDGE, False)
         if valued:
             # The table's own range: pyvista gives each actor that of its data.
             actor.mapper.SetUseLookupTableScalarRange(True)

@@ -76,7 +76,10 @@ def test_it_follows_the_colours_of_the_view(full, qtbot):
     low, high = full.canvas.figure.axes[0].get_xlim()
     assert moved.max() <= high <= 1.3 * moved.max()
     assert low <= moved.min()
-    assert "highest" in full.numbers.text()
+    mesh = full.store.session.mesh
+    shift = np.linalg.norm(full.store.session.frame.mesh.points - mesh.points, axis=1).max()
+    assert shift > moved.max()
+    assert f"highest <b>{shift:.4g}</b>" in full.numbers.text()
 
 
 def good_session(mesh):
