@@ -45,7 +45,7 @@ def _is_power(step: float) -> bool:
     return abs(lead - round(lead)) < 1e-6
 
 
-def rounded_out(low: float, high: float, most: int = 6) -> tuple[float, float]:
+def rounded_out(low: float, high: float, most: int = 12) -> tuple[float, float]:
     """Return the range of round numbers that a range of numbers, low <= high, lies in."""
     if not high > low:
         room = max(abs(low), 1e-12) * 0.01
