@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors
 from slideviz.view.look import CLASH_COLOUR, ROLE_COLOURS
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
+
+STILL = 1e-9
+"""Part of its extent that rounding may move a boundary that stays where it is."""
 
 
 class GhostLayer:
@@ -67,7 +72,10 @@ class GhostLayer:
             actors.place(self._shapes[f"motion:{name}"], points, 3 * lift)
             actor.prop.color = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
             actor.prop.line_width = 4.5 if session.clash else 2.5
-            actor.visibility = shown and name not in view.hidden
+            # In the same place it would be drawn through the boundary, in patches.
+            at = session.mesh.points[surface.nodes]
+            moves = np.abs(points - at).max() > STILL * np.ptp(at, axis=0).max()
+            actor.visibility = bool(shown and moves and name not in view.hidden)
 
     def _draw_undeformed(self, session: Session) -> None:
         shown = session.view.undeformed and session.mesh is not None
@@ -88,9 +96,6 @@ class GhostLayer:
             flat = surface.facets.shape[1] == 2
             shape = actors.surface_shape(surface, mesh.points, 3 * self.stage.lift(mesh))
             actor = self.stage.add(shape, key, lighting=not flat, pickable=False)
-            if not flat:
-                # Where it is in the same place as a boundary, only that is drawn.
-                actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(4.0, 4.0)
             actor.prop.opacity = opacity + 0.25 if flat else opacity - 0.1
             actor.prop.line_width = 2.5
             self._actors[key], self._shapes[key] = actor, shape
