@@ -3,6 +3,8 @@
 SHELL := bash
 BIN := .venv/bin
 PYTEST := $(BIN)/python -m pytest
+# Each core takes tests from the others when it has none left (ARGS=-n0: one after the other).
+PARALLEL := -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all lint format bench shots study clean
@@ -18,10 +20,10 @@ demo: setup ## deform a blade passage into demo/ and open it (WINDOW=no: do not 
 	@tools/demo.sh
 
 test: setup ## fast tests (ARGS="-k name": only some)
-	$(PYTEST) -m "not slow" --ignore=tests/benchmarks $(ARGS)
+	$(PYTEST) $(PARALLEL) -m "not slow" --ignore=tests/benchmarks $(ARGS)
 
 test-all: setup ## all tests, slow reproductions too
-	$(PYTEST) --ignore=tests/benchmarks $(ARGS)
+	$(PYTEST) $(PARALLEL) --ignore=tests/benchmarks $(ARGS)
 
 lint: setup ## style, types, and the direction of imports
 	$(BIN)/ruff check .

@@ -57,7 +57,8 @@ def test_cancel_at_ten_random_moments_of_a_3d_run(driver, case_file):
         ends.append(sound(driver.session).end)
         assert window.run_panel.run.isVisible()
         assert window.run_panel.run.isEnabled()
-        assert not window.banner.isVisible()
+        # A run that was done before the cancel may tell of inverted cells.
+        assert ends[-1] == "done" or not window.banner.isVisible()
     assert "cancelled" in ends
     window.start_run()
     driver.settle()
