@@ -130,7 +130,7 @@ def beside(window: MainWindow, place: Path) -> None:
     window.viewing.look_from("+x")
     settle(window)
     scene, view = window.viewing.second_scene, window.viewing.second
-    scene.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.55)
+    scene.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
 
 
 def dark(window: MainWindow, place: Path) -> None:
