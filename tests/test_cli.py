@@ -304,3 +304,21 @@ def test_meshes_are_shown_in_a_line(square):
     text = repr(mesh)
     assert "2D, 676 points, Cells(620 quadrilateral), markers: LEFT, RIGHT" in text
     assert len(text) < 300
+
+
+def test_the_number_of_steps_has_an_option_and_no_option_is_cut_short(tmp_path, capsys):
+    write_sample("square", tmp_path, size=8)
+    case, out = str(tmp_path / "square.cfg"), tmp_path / "o.su2"
+    report = tmp_path / "r.json"
+    given = ["--steps", "3", "-q", "-o", str(out), "--json", str(report)]
+    assert run(["run", case, *given]) == 0
+    assert json.loads(report.read_text())["steps"] == 3
+    assert run(["run", case, "--steps", "text"]) == 1
+    assert "'text' is not a whole number from 1, or auto" in capsys.readouterr().err
+    assert run(["run", case, "--step", "3"]) == 2
+
+
+def test_a_case_is_told_from_a_mesh(tmp_path, capsys):
+    write_sample("square", tmp_path, size=8)
+    assert run(["info", str(tmp_path / "square.cfg")]) == 1
+    assert "is a case file, not a mesh; name the mesh itself" in capsys.readouterr().err

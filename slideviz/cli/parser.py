@@ -53,8 +53,16 @@ def _base(**options: object) -> argparse.ArgumentParser:
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
         **options,  # type: ignore[arg-type]
     )
+
+
+class _Command(argparse.ArgumentParser):
+    """A command, whose options are written in full: ``--steps`` is not ``--steps-dir``."""
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
 
 
 def _window_parser() -> argparse.ArgumentParser:
@@ -69,7 +77,9 @@ def _window_parser() -> argparse.ArgumentParser:
 def _parser() -> argparse.ArgumentParser:
     parser = _base()
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
-    calls = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    calls = parser.add_subparsers(
+        title="commands", metavar="COMMAND", required=True, parser_class=_Command
+    )
     _add_run(calls)
     _add_info(calls)
     _add_quality(calls)
@@ -102,6 +112,9 @@ def _add_run(calls: argparse._SubParsersAction) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change a key of the case for this run; may be repeated",
+    )
+    run.add_argument(
+        "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
     )
     run.add_argument("--json", type=Path, metavar="FILE", help="report as JSON; - is the terminal")
     run.add_argument(

@@ -86,6 +86,8 @@ def read_case(arguments: argparse.Namespace) -> Case:
         if not sign:
             raise CaseError(f"--set {text!r} is not of the form KEY=VALUE")
         case = set_key(case, key.strip(), value.strip())
+    if getattr(arguments, "step_count", None) is not None:
+        case = set_key(case, "STEPS", arguments.step_count)
     case = case.change(warnings=(*case.warnings, *idle_roles(case)))
     return case.change(zone=arguments.zone) if arguments.zone else case
 

@@ -109,7 +109,7 @@ def plane(text: str) -> Section:
         normal = _AXES[word.strip()]
         (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
         return _section("plane", [at * part for part in normal], normal)
-    values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z, as in 0,0,1,0,0,0.5")
+    values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
     half = len(values) // 2
     return _section("plane", values[half:], values[:half])
 

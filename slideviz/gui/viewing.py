@@ -252,6 +252,11 @@ class Viewing(QWidget):
         self._leader.fit()
         self.render()
 
+    def refit(self) -> None:
+        """Make everything fill the view again, where it did and nobody chose another camera."""
+        if self._leader.eye.fitted:
+            self.fit()
+
     def fly_to(self, cell: int) -> None:
         """Look at a cell of the mesh that is shown; `fly_back` returns."""
         if self._before is None:

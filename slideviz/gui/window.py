@@ -249,6 +249,8 @@ class MainWindow(QMainWindow):
 
     def _job_ended(self) -> None:
         self.run_panel.set_busy("")
+        # The mesh may have moved out of the view.
+        self.viewing.refit()
         self.sync_actions()
 
     def say(self, text: str) -> None:

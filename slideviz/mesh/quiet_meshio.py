@@ -38,6 +38,8 @@ def formats_of(path: Path) -> list[str]:
     for ending in ("".join(suffixes[-2:]), "".join(suffixes[-1:])):
         if ending in table and ending != ".su2":
             return sorted(table[ending], key=lambda name: name != "gmsh")
+    if path.suffix.lower() == ".cfg":
+        raise path_error(path, "is a case file, not a mesh; name the mesh itself")
     raise path_error(
         path,
         f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .vtu, "

@@ -239,8 +239,13 @@ def _is_cross(gid: str) -> bool:
 def _same_height(together: Sequence[Axes]) -> None:
     """Give axes the limits that hold all of them, so that they can be compared."""
     scales = {axes.get_yscale() for axes in together}
+    log = "log" in scales
     for axes in together:
-        axes.set_yscale("log" if "log" in scales else "linear")
+        axes.set_yscale("log" if log else "linear")
+        axes.relim()
+        axes.autoscale_view()
     limits = [axes.get_ylim() for axes in together if axes.lines or axes.patches]
+    low = min((low for low, _ in limits if low > 0.0 or not log), default=None)
+    high = max((high for _, high in limits), default=None)
     for axes in together:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+        axes.set_ylim(low, high)
