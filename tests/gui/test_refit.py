@@ -1,0 +1,24 @@
+"""A mesh that moved is still seen whole, unless the camera was moved by the user."""
+
+import numpy as np
+import pytest
+
+from slideviz.case.model import Translate
+from slideviz.view import changes
+
+
+@pytest.mark.parametrize("zoomed", [False, True])
+def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, zoomed):
+    window = driver.window
+    driver.open(passage_file)
+    window.store.change(changes.set_role, ("airfoil",), "moving")
+    window.store.change(changes.set_case, motions=(Translate("airfoil", (0.0, 0.4)),))
+    window.fit()
+    if zoomed:
+        window.scene.zoom_at(50, 50, 1.7)
+    before = window.scene.eye.place
+    window.start_run()
+    driver.settle()
+    assert window.store.session.deformed is not None
+    assert np.allclose(window.scene.eye.place, before) == zoomed
+    assert zoomed or window.scene.sees_all()
