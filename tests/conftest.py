@@ -1,0 +1,7 @@
+"""What all tests share."""
+
+from hypothesis import settings
+
+# No test fails because a machine was busy for a moment.
+settings.register_profile("slideviz", deadline=None)
+settings.load_profile("slideviz")
