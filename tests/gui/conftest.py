@@ -1,3 +1,4 @@
+import gc
 import os
 import shutil
 
@@ -24,6 +25,16 @@ DIALOGS = (
     "ask_unsaved",
     "ask_overwrite_input",
 )
+
+
+@pytest.fixture(autouse=True)
+def nothing_of_closed_windows():
+    """Collect what closed windows left, as PySide would give their wrappers to new objects.
+
+    The view keeps a QSurface; where Qt puts an action at its address later, Python gets the
+    surface for it.
+    """
+    gc.collect()
 
 
 @pytest.fixture(autouse=True)
