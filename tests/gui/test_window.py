@@ -582,6 +582,7 @@ def test_playing_ends_at_the_last_step(ready):
     ready.qtbot.waitUntil(lambda: not player.playing)
 
 
+@pytest.mark.slow  # waits for real time, which a busy machine does not give
 def test_playing_in_a_loop_begins_again(ready):
     run(ready)
     player = ready.window.player
