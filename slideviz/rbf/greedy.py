@@ -13,7 +13,9 @@ Steps after the first begin with the control nodes of the one before, and have t
 what these lacked (``Problem.lag``), so that the tolerance holds for the whole displacement.
 
 Candidates are sorted by position, and every number depends on one candidate and the order of
-the control nodes alone: neither numbering nor threads change the selection.
+the control nodes alone: neither numbering nor threads change the selection. Where errors are
+equal but for rounding, as on symmetric meshes, the position decides (``pool.favour``), so that
+another processor chooses the same nodes.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.rbf.pool import pool
+from slideviz.rbf.pool import favour, pool
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
 from slideviz.rbf.rows import Rows, blocks
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
@@ -94,6 +96,7 @@ class GreedyFit:
         new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
         self._candidate = np.cumsum(new) - 1
         self._first = np.flatnonzero(new)
+        self._favour = favour(self._problem.coords[rows.nodes[self._first]])
         more = len(rows.nodes) - len(self._barred)
         self._barred = np.concatenate([self._barred, np.zeros(more, bool)])
         with self._watch.phase("select"):
@@ -202,7 +205,8 @@ class GreedyFit:
         """Pick nodes, extend the factor and the weights; tell whether any could be picked."""
         open_ = np.zeros(len(errors), bool)
         open_[self._candidate[~self._barred]] = True
-        count, among = self._pool(np.where(open_, errors, -1.0), residual)
+        favoured = errors * self._favour
+        count, among = self._pool(np.where(open_, favoured, -1.0), residual)
         while len(among):
             rows = np.flatnonzero(np.isin(self._candidate, among) & ~self._barred)
             done = len(self._chosen) / len(self._grown)
@@ -216,7 +220,7 @@ class GreedyFit:
                 return True
             # All of the pool fell to the pivot guard: try the next ones.
             open_[among] = False
-            count, among = self._pool(np.where(open_, errors, -1.0), residual)
+            count, among = self._pool(np.where(open_, favoured, -1.0), residual)
         return False
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
@@ -249,7 +253,9 @@ class GreedyFit:
             schur.append(rest)
         floor = 0.0 if self._settings.pick != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
-        picked, bases = newton(schur, residual, self._candidate[rows], (count, floor))
+        candidate = self._candidate[rows]
+        named = candidate, self._favour[candidate]
+        picked, bases = newton(schur, residual, named, (count, floor))
         diagonal = np.concatenate([np.diag(s) for s in schur])
         self._barred[rows[diagonal <= PIVOT_GUARD]] = True
         turn, start = len(self._chosen) + np.arange(len(picked)), 0

@@ -55,7 +55,7 @@ class Growing:
 def newton(
     schur: list[FloatArray],
     residual: FloatArray,
-    candidate: IntArray,
+    named: tuple[IntArray, FloatArray],
     limits: tuple[int, float],
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the rows picked by the one-node Newton greedy, and the Newton basis of each block.
@@ -66,8 +66,9 @@ def newton(
         What remains of the pool's matrix after the nodes chosen before, block after block.
     residual : (p, m)
         Of all rows of the pool, those of a block together, p the sum of all p_k.
-    candidate : (p,)
-        The node of each row; all rows of a node are picked together.
+    named
+        The node of each row, (p,); all rows of a node are picked together. And the factor of
+        its error, (p,), that decides between equal ones (``pool.favour``).
     limits
         Number of nodes, and the error below which to stop (the first is always taken).
 
@@ -87,11 +88,12 @@ def newton(
     used = [0] * len(schur)
     open_ = pivot > PIVOT_GUARD
     picked: list[int] = []
-    names, group = np.unique(candidate, return_inverse=True)
+    names, first, group = np.unique(named[0], return_index=True, return_inverse=True)
+    favoured = named[1][first]
     for turn in range(count):
         squares = np.where(open_, np.einsum("pm,pm->p", rest, rest), 0.0)
         error = np.sqrt(np.bincount(group, squares, len(names)))
-        best = int(np.argmax(error))
+        best = int(np.argmax(error * favoured))
         if error[best] <= 0 or (turn and error[best] < floor):
             break
         for row in np.flatnonzero((group == best) & open_):

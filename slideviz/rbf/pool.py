@@ -18,6 +18,26 @@ by the number of control nodes, and cheaper than the largest one from the start.
 BLOCK_LIMIT = 128
 """Largest number of nodes picked in a cycle."""
 
+TIE = 1e-4
+"""Errors that differ by less than this part may count as equal: far above their rounding, far
+below what matters for the choice."""
+
+
+def favour(coords: FloatArray) -> FloatArray:
+    """Return a factor for the error of each candidate, (c,), that decides between equal ones.
+
+    From 1 to 1 + TIE, along a direction that no symmetry of a mesh is likely to have.
+
+    Parameters
+    ----------
+    coords : (c, d)
+    """
+    if not len(coords):
+        return np.empty(0)
+    along = coords @ np.array([1.0, 0.6180339887, 0.2360679775])[: coords.shape[1]]
+    low, high = along.min(), along.max()
+    return 1.0 + TIE * (along - low) / max(high - low, 1e-300)
+
 
 def pool(
     errors: FloatArray,
@@ -31,7 +51,7 @@ def pool(
     Parameters
     ----------
     errors : (c,)
-        Of each candidate; negative where it cannot be picked.
+        Of each candidate, times its ``favour``; negative where it cannot be picked.
     vectors : (c, d)
         The errors as vectors in the frame.
     chosen
@@ -61,7 +81,10 @@ def _double(
     errors: FloatArray, vectors: FloatArray, worst: int, tolerance: float
 ) -> tuple[int, IntArray]:
     """Return the worst candidate and the worst one whose error is more than 90° from its."""
-    opposite = np.where(vectors @ vectors[worst] < 0, errors, -1.0)
+    lengths = np.linalg.norm(vectors, axis=1)
+    cosine = vectors @ vectors[worst] / np.maximum(lengths * lengths[worst], 1e-300)
+    # Errors along different axes are perpendicular but for rounding.
+    opposite = np.where(cosine < -TIE, errors, -1.0)
     second = int(np.argmax(opposite))
     if opposite[second] <= tolerance:
         return 1, np.array([worst])

@@ -139,7 +139,7 @@ def test_the_newton_greedy_factorises_what_it_picks():
     systems = [matrix(Basis(2.5), (block, None)) for block in x]
     residual = rng.normal(size=(18, 1))
     candidate = np.tile(np.arange(9), 2)
-    picked, bases = newton(systems, residual, candidate, (4, 0.0))
+    picked, bases = newton(systems, residual, (candidate, np.ones(len(candidate))), (4, 0.0))
     assert len(picked) == 8
     assert sorted(candidate[picked[:2]]) == [candidate[picked[0]]] * 2
     errors = np.hypot(*residual.reshape(2, 9))
