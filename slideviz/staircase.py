@@ -17,6 +17,7 @@ from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.problem import Watch
+from slideviz.rbf.rows import Rows, blocks
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
@@ -136,17 +137,32 @@ def _require_memory(plan: Plan, case: Case) -> None:
         )
     if case.method != "rbf" or plan.reduction is not None:
         return  # nothing is dense; the selection keeps no matrix of all candidates
-    counts, dim, sliding = plan.classes.counts(), plan.coords.shape[1], case.sliding
-    known = counts["moving"] + counts["fixed"]
-    unknowns = known + counts["sliding_edge"] + counts["sliding_surface"]
-    if sliding == "ds":
-        unknowns = dim * known + (dim - 1) * counts["sliding_edge"] + counts["sliding_surface"]
+    sizes = _systems(plan, case)
     _require_free(
-        2.6 * 8 * unknowns**2,
-        f"{unknowns} unknowns need",
+        8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
+        f"{sum(sizes)} unknowns need",
         "give large boundaries far from the motion the role internal, use SLIDING_MODE= ps, "
         "DATA_REDUCTION= YES, or a coarser mesh",
     )
+
+
+def _systems(plan: Plan, case: Case) -> list[int]:
+    """Return the unknowns of the systems whose factors are kept together.
+
+    Direct sliding falls apart into one system for each axis where normals lie along axes, and
+    solves for all boundary nodes again where boundaries are curved.
+    """
+    counts = plan.classes.counts()
+    known = counts["moving"] + counts["fixed"]
+    nodes = known + counts["sliding_edge"] + counts["sliding_surface"]
+    normals = plan.constraints(plan.coords)[1] if case.sliding == "ds" else ()
+    if not len(normals):
+        return [nodes]
+    dim = plan.coords.shape[1]
+    along = np.concatenate([np.eye(dim), normals])
+    block = blocks(Rows(np.arange(len(along)), along, np.zeros((len(along), 1))))
+    each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
+    return [int(n) for n in each if n] + [nodes] * plan.tracks.curved
 
 
 def _require_free(needed: float, what: str, remedy: str) -> None:

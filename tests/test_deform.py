@@ -189,6 +189,16 @@ def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unk
         next(sv.deform(square_case(mesh, sliding=method), mesh))
 
 
+def test_direct_sliding_along_axes_needs_memory_for_one_axis_at_a_time(monkeypatch):
+    mesh = builders.square(6)
+    monkeypatch.setattr(staircase, "_free_memory", lambda: 15_000.0)  # 44 unknowns: 40,000
+    case = square_case(mesh, sliding="ds")
+    last(case, mesh)
+    turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
+    with pytest.raises(DeformError, match="44 unknowns need"):
+        last(case, mesh.with_points(mesh.points @ turn))
+
+
 def test_free_memory_is_a_number_of_bytes():
     assert staircase._free_memory() > 1e7
 
