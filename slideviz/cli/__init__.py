@@ -18,10 +18,12 @@ DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
     from slideviz.cli.parser import parse
+    from slideviz.cli.progress import compiling_told
 
     try:
         arguments = parse(argv)
-        code = int(arguments.command(arguments))
+        with compiling_told(getattr(arguments, "quiet", False)):
+            code = int(arguments.command(arguments))
         sys.stdout.flush()  # here, where a reader that is gone can still be handled
         return code
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2

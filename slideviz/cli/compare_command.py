@@ -67,7 +67,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli import DONE
-    from slideviz.cli.run_command import read_case, tell_compiling
+    from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
     from slideviz.view.compare import warm
     from slideviz.view.compare_table import terminal_head
@@ -82,7 +82,6 @@ def compare(arguments: argparse.Namespace) -> int:
     except OSError as problem:
         raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
     mesh = read(case.mesh_file, zone=case.zone)
-    tell_compiling(arguments.quiet)
     warm({combination.method for combination in wanted})
 
     def say(text: str) -> None:

@@ -57,7 +57,6 @@ def _frames(arguments: argparse.Namespace, case: Case) -> list[Frame]:
     """Return the undeformed mesh and every step, with their quality."""
     from slideviz import deform, quality, read
     from slideviz.cli.progress import Bar
-    from slideviz.cli.run_command import tell_compiling
     from slideviz.errors import CaseError
     from slideviz.view.state import Frame
 
@@ -65,7 +64,6 @@ def _frames(arguments: argparse.Namespace, case: Case) -> list[Frame]:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     mesh = read(case.mesh_file, zone=case.zone)
     frames = [Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))]
-    tell_compiling(arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             found = quality(step.mesh, reference=mesh, metric=case.quality_metric)

@@ -70,7 +70,8 @@ def _window_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
     parser.add_argument("--run", action="store_true", help="deform the case at once")
-    parser.set_defaults(command=commands.window)
+    # Quiet on the terminal: the window itself shows when it compiles.
+    parser.set_defaults(command=commands.window, quiet=True)
     return parser
 
 

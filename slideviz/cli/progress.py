@@ -1,12 +1,16 @@
-"""A progress bar on the terminal; silent when the output is no terminal."""
+"""What is said while one waits: a progress bar on a terminal, and that loops are compiled."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from slideviz.staircase import Progress
+if TYPE_CHECKING:
+    from slideviz.staircase import Progress
 
 _PHASES = {
     "classify": "sorting nodes",
@@ -16,6 +20,33 @@ _PHASES = {
     "project": "sliding",
 }
 _EVERY = 0.1
+_WIPE = "\r\033[K"
+"""Takes a bar away from its line."""
+
+
+@contextmanager
+def compiling_told(quiet: bool) -> Iterator[None]:
+    """Say on stderr when Numba begins to compile, once; never where its cache has everything."""
+    if quiet:
+        yield
+        return
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        told = False
+
+        def on_start(self, _: object) -> None:
+            if not self.told:
+                self.told = True
+                words = "compiling loops that are used for the first time: some seconds, once"
+                wipe = _WIPE if sys.stderr.isatty() else ""
+                print(f"{wipe}slideviz: {words}", file=sys.stderr, flush=True)
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
 
 
 class Bar:
@@ -36,7 +67,7 @@ class Bar:
         trace: TracebackType | None,
     ) -> None:
         if self.enabled:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
+            print(_WIPE, end="", file=sys.stderr, flush=True)
 
     def __call__(self, progress: Progress) -> None:
         """Draw the bar, at most ten times a second."""
@@ -60,4 +91,4 @@ class Bar:
     def _draw(self, done: float, text: str) -> None:
         filled = round(24 * done)
         bar = f"[{'#' * filled}{'.' * (24 - filled)}] {text}"
-        print(f"\r\033[K{bar}", end="", file=sys.stderr, flush=True)
+        print(f"{_WIPE}{bar}", end="", file=sys.stderr, flush=True)

@@ -120,7 +120,6 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as problem:
             raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
-    tell_compiling(arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:
@@ -132,14 +131,6 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
                 steps[-2] = replace(steps[-2], mesh=mesh)
     return steps
-
-
-def tell_compiling(quiet: bool) -> None:
-    """Say that the first run compiles, when this is it."""
-    from slideviz.rbf.compiled import is_cached
-
-    if not (quiet or is_cached()):
-        print("slideviz: first run: compiling the kernels, some seconds, once", file=sys.stderr)
 
 
 def _write_qualities(path: Path, found: Quality) -> None:

@@ -14,7 +14,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import factorial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -246,9 +245,3 @@ def fill_matrix(x, c, across, along, half, scale, kind, out):  # type: ignore[no
                 for k in range(d):
                     dot += across[k, a] * along[k, b]
                 row[b] *= dot
-
-
-def is_cached() -> bool:
-    """Tell whether the loops were compiled before, by this installation or this user."""
-    name = f"compiled.{fill_matrix.__name__}-*.nbi"
-    return any(Path(fill_matrix._cache.cache_path).glob(name))
