@@ -13,6 +13,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.view.copies import find_period, moved, passages, passages_around
+from slideviz.view.layer_chosen import ChosenLayer
 from slideviz.view.layer_mesh import BoundaryLayer, CellLayer
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
@@ -26,6 +27,9 @@ DIRECTIONS = 200
 
 UNENDING = 2
 """Neighbours on each side where all are asked for and a row has no end."""
+
+CELLS, CHOSEN = "", "\n"
+"""What stands for the cells, and for those that are chosen, among the names of boundaries."""
 
 
 class Period:
@@ -77,7 +81,7 @@ def outermost(points: FloatArray) -> FloatArray:
 
 
 class CopyLayer:
-    """Boundaries, or the cells of a 2D mesh, drawn again where the neighbours are.
+    """Boundaries, cells of a 2D mesh, and chosen cells, drawn again where the neighbours are.
 
     The actors of all neighbours share the data of the scene's own shapes, one mapper and one
     property for each shape: a wheel takes the memory of one passage.
@@ -85,13 +89,15 @@ class CopyLayer:
     Parameters
     ----------
     stage : Stage
-    cells, boundaries
+    cells, boundaries, chosen
         The layers whose shapes are drawn again.
     """
 
-    def __init__(self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer) -> None:
+    def __init__(
+        self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, chosen: ChosenLayer
+    ) -> None:
         self.stage = stage
-        self._cells, self._boundaries = cells, boundaries
+        self._cells, self._boundaries, self._chosen = cells, boundaries, chosen
         self._period = Period()
         self._table = pv.LookupTable()
         self._key: tuple[object, ...] = ()
@@ -116,14 +122,17 @@ class CopyLayer:
         """Return the outermost points of every neighbour."""
         if not self._matrices:
             return []
-        every = [np.asarray(shape.points) for shape, _ in self._sources().values()]
+        # Chosen cells are within the others.
+        drawn = [*self._cells.shapes(), *self._boundaries.shapes()]
+        every = [np.asarray(shape.points) for shape in drawn]
         ends = outermost(np.concatenate(every))
         return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Show another state; points and values are those of the mesh itself."""
         pair = self._period.of(new) if new.view.copies else None
-        key = (pair, new.view.copies)
+        # Chosen cells have no actor before some are chosen for the first time.
+        key = (pair, new.view.copies, self._chosen.actor)
         if key != self._key:
             self._key = key
             self._redraw(matrices(new, pair))
@@ -134,7 +143,9 @@ class CopyLayer:
         """Return shape and actor of all that is drawn again, by name."""
         found = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
         if self._cells.shape is not None:
-            found[""] = self._cells.shape, self._cells.actor
+            found[CELLS] = self._cells.shape, self._cells.actor
+        if self._chosen.actor is not None:
+            found[CHOSEN] = self._chosen.shape, self._chosen.actor
         return found
 
     def _redraw(self, wanted: dict[int, FloatArray]) -> None:
@@ -147,7 +158,8 @@ class CopyLayer:
             self._mappers, self._props = {}, {}
             return
         for name, (shape, actor) in self._sources().items():
-            mapper = self._mappers.setdefault(name, self._mapper(shape, actor))
+            mapper = self._mappers.get(name) or self._mapper(shape, actor)
+            self._mappers[name] = mapper
             prop = self._props.setdefault(name, pv.Property())
             made = []
             for number, matrix in wanted.items():
@@ -163,6 +175,8 @@ class CopyLayer:
         mapper.SetScalarModeToUseCellFieldData()
         mapper.SelectColorArray(actor.mapper.GetArrayName())
         mapper.SetLookupTable(self._table)
+        # Set once, or pyvista gives the table, which all share, the range of each new data set.
+        mapper.scalar_range = self._table.scalar_range
         mapper.SetUseLookupTableScalarRange(True)
         return mapper
 
@@ -170,8 +184,10 @@ class CopyLayer:
         """Take the colours of the mesh itself, paler."""
         self._pale_table()
         plain = np.array(pv.Color(self.stage.look.cell).float_rgb)
-        for name, (_, actor) in self._sources().items():
+        for name, (shape, actor) in self._sources().items():
             mapper, prop = self._mappers[name], self._props[name]
+            if mapper.dataset is not shape:  # other cells are chosen
+                mapper.dataset = shape
             mapper.scalar_visibility = actor.mapper.scalar_visibility
             prop.DeepCopy(actor.prop)
             own = np.array(actor.prop.color.float_rgb)

@@ -63,7 +63,7 @@ class Scene:
             self.sections,
             MarkLayer(self.stage, self._boundaries),
             self._ghosts,
-            CopyLayer(self.stage, self._cells, self._boundaries),
+            CopyLayer(self.stage, self._cells, self._boundaries, self._chosen),
             PointLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),

@@ -7,7 +7,16 @@ import pyvista as pv
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
 from slideviz.view import changes
-from slideviz.view.layer_copies import PALER, CopyLayer, Period, matrices, outermost
+from slideviz.view.inspect import middles
+from slideviz.view.layer_chosen import ChosenLayer
+from slideviz.view.layer_copies import (
+    CHOSEN,
+    PALER,
+    CopyLayer,
+    Period,
+    matrices,
+    outermost,
+)
 from slideviz.view.layer_triad import COLOURS, SIZE
 from slideviz.view.look import DARK, LIGHT, ROLE_COLOURS
 from slideviz.view.node_types import NODE_COLOURS
@@ -196,6 +205,47 @@ def test_neighbours_follow_the_step_and_the_colours(scene, row):
     _, green, blue = near(scene, inside, 1).mean(axis=0)
     assert green > blue + 40, "yellow to green, as good cells are"
     assert np.ptp(plain) < 30
+
+
+def test_neighbours_show_the_chosen_cells_only(scene, row):
+    session = opened(scene, row, copies=1, edges=False, triad=False, colour_by="skew")
+    half = float(np.median(session.frame.values("skew")))
+    at = middles(row.mesh, np.arange(len(row.mesh.cells)))
+    shifted = at + Period().of(session).vector
+
+    def yellow(points):
+        """Tell where a picture shows the colour of a value: yellow to green."""
+        picture = image(scene)
+        x, y = (
+            np.rint(to_display(scene.plotter, np.c_[points, np.zeros(len(points))])).astype(int).T
+        )
+        seen = picture[picture.shape[0] - 1 - y, x]
+        return seen[:, 1] > seen[:, 2] + 25
+
+    assert yellow(shifted).mean() > 0.9
+    for threshold in ((0.0, half), (half, 1.0)):
+        scene.update(changes.set_view(session, threshold=threshold))
+        own, copied = yellow(at), yellow(shifted)
+        assert 0.2 < own.mean() < 0.8
+        assert (own == copied).mean() > 0.85
+    scene.update(session)
+    assert yellow(shifted).mean() > 0.9
+
+
+def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
+    session = opened(scene, stator, copies=1, colour_by="size_skew")
+    chosen = next(layer for layer in scene.layers if isinstance(layer, ChosenLayer))
+    for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
+        scene.update(changes.set_view(session, threshold=threshold))
+        actors = scene.plotter.actors
+        copies = [actors[f"copy:{number}:{CHOSEN}"] for number in (-1, 1)]
+        for copy in copies:
+            assert copy.mapper.dataset is chosen.shape, threshold
+            assert bool(copy.visibility) is seen, threshold
+        assert actors["copy:1:BLADE"].prop.opacity < 0.5, "glass, like the boundaries of the mesh"
+    scene.update(changes.set_view(session, threshold=None))
+    assert not scene.plotter.actors[f"copy:1:{CHOSEN}"].visibility
+    assert scene.plotter.actors["copy:1:BLADE"].prop.opacity == 1.0
 
 
 def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
