@@ -12,9 +12,12 @@ def main() -> int:
 
         print(f"slideviz {__version__}")
         return 0
-    from slideviz.cli import run
+    try:
+        from slideviz.cli import run
 
-    return run(sys.argv[1:])
+        return run(sys.argv[1:])
+    except KeyboardInterrupt:  # before `run` could catch it
+        return 130
 
 
 if __name__ == "__main__":

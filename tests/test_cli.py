@@ -143,6 +143,20 @@ def test_quality_against_reference(square, tmp_path, capsys):
     assert "worst cells" in capsys.readouterr().out
 
 
+def test_quality_says_what_it_is_measured_against(square, capsys):
+    assert run(["run", str(square / "square.cfg"), "-q"]) == 0
+    argv = ["quality", str(square / "square_deformed.su2")]
+    assert run(argv) == 0
+    assert (
+        "no reference: relative to itself; give --reference UNDEFORMED" in capsys.readouterr().out
+    )
+    assert run([*argv, "--reference", str(square / "mesh.su2")]) == 0
+    asked = capsys.readouterr().out
+    assert f"reference: {square / 'mesh.su2'}" in asked
+    assert run([*argv, "--case", str(square / "square.cfg")]) == 0
+    assert capsys.readouterr().out == asked
+
+
 def test_sample_lists_and_refuses_unknown(capsys, tmp_path):
     assert run(["sample"]) == 0
     assert "cylindrical" in capsys.readouterr().out

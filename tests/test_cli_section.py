@@ -102,6 +102,45 @@ def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, 
     assert values[found["worst_cell"]] == 0
 
 
+def title_of(folder, monkeypatch, mesh, *options):
+    from slideviz.view import section_picture
+
+    seen = []
+    monkeypatch.setattr(section_picture, "_title", lambda *words: seen.append(words))
+    assert call(folder, mesh, "--plane", "z=0.55", *options) in (0, 3)
+    ((_, _, _, second),) = seen
+    monkeypatch.undo()
+    return second
+
+
+def test_without_a_reference_line_and_picture_say_so(folder, capsys, monkeypatch):
+    none = "no reference: relative to itself"
+    assert title_of(folder, monkeypatch, "folded.su2").endswith(none)
+    assert f"{none}; give --reference UNDEFORMED" in capsys.readouterr().out
+    cube = str(folder / "cube.su2")
+    assert none not in title_of(folder, monkeypatch, "folded.su2", "--reference", cube)
+    out = capsys.readouterr().out
+    assert none not in out
+    assert f"reference: {cube}" in out
+    # The shape of a cell needs no reference.
+    assert none not in title_of(folder, monkeypatch, "folded.su2", "--color", "skew")
+    assert none not in capsys.readouterr().out
+
+
+def test_the_mesh_of_the_case_is_the_reference_where_its_cells_are_the_same(folder, capsys):
+    options = ("folded.su2", "--plane", "z=0.55")
+    _, asked = report(capsys, folder, *options, "--reference", str(folder / "cube.su2"))
+    (folder / "cube.cfg").write_text("MESH_FILENAME= cube.su2\nMARKER_MOVING= (x)\n")
+    _, found = report(capsys, folder, *options, "--case", str(folder / "cube.cfg"))
+    assert found == asked
+    for name in ("square.su2", "nowhere.su2"):
+        (folder / "cube.cfg").write_text(f"MESH_FILENAME= {name}\nMARKER_MOVING= (x)\n")
+        _, found = report(capsys, folder, *options, "--case", str(folder / "cube.cfg"))
+        assert found["reference"] is None
+        assert found["min"] == asked["min"] == 0
+        assert found["mean"] != asked["mean"]
+
+
 def test_a_list_may_begin_with_a_minus_sign(folder, capsys):
     code, found = report(capsys, folder, "cube.su2", "--plane", "-1,0,0,0.4,0,0")
     assert code == 0

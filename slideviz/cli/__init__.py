@@ -17,10 +17,10 @@ DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
-    from slideviz.cli.parser import parse
-    from slideviz.cli.progress import compiling_told
+    try:  # also around the imports, which take long enough to be interrupted
+        from slideviz.cli.parser import parse
+        from slideviz.cli.progress import compiling_told
 
-    try:
         arguments = parse(argv)
         with compiling_told(getattr(arguments, "quiet", False)):
             code = int(arguments.command(arguments))

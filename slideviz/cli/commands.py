@@ -75,9 +75,10 @@ def info(arguments: argparse.Namespace) -> int:
 
 def quality(arguments: argparse.Namespace) -> int:
     """Tell the quality of a mesh, compared with the undeformed one if it is given."""
+    from slideviz import Case, read, write
     from slideviz import quality as rate
-    from slideviz import read, write
     from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.reference import reference_of, words_of
     from slideviz.cli.report import (
         histogram_lines,
         quality_lines,
@@ -87,9 +88,9 @@ def quality(arguments: argparse.Namespace) -> int:
     )
 
     mesh = read(arguments.mesh, zone=arguments.zone)
-    base = read(arguments.reference, zone=arguments.zone) if arguments.reference else None
-    found = rate(mesh, reference=base, metric=arguments.metric)
-    report = quality_report(mesh, found)
+    base = reference_of(arguments, mesh, Case.read(arguments.case) if arguments.case else None)
+    found = rate(mesh, reference=base[1] if base else None, metric=arguments.metric)
+    report = quality_report(mesh, found) | {"reference": str(base[0]) if base else None}
     if arguments.output and arguments.output.suffix.lower() == ".csv":
         _write_csv(arguments.output, found)
     elif arguments.output:
@@ -98,8 +99,8 @@ def quality(arguments: argparse.Namespace) -> int:
     if text is not None:
         print(text, end="")
     else:
-        against = f" against {arguments.reference}" if base else ""
-        print(f"{arguments.mesh}{against}: size-skew, metric {found.metric}")
+        print(f"{arguments.mesh}: size-skew, metric {found.metric}")
+        print(f"  {words_of(base)}")
         print(quality_lines(found))
         print("worst cells:")
         print(table([(w["cell"], w["type"], w["quality"]) for w in report["worst"]]))

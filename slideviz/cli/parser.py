@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from slideviz import __version__
 from slideviz.cli import commands
 from slideviz.cli.compare_command import add_compare
 from slideviz.cli.film_command import add_film, add_zoom, size
+from slideviz.cli.reference import add_reference
 from slideviz.cli.section_options import add_section, glued
 
 COMMANDS = ("run", "info", "quality", "section", "film", "compare", "sample", "keys", "shots")
@@ -63,6 +65,10 @@ class _Command(argparse.ArgumentParser):
 
     def __init__(self, **options: object) -> None:
         super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with code 2 and a sentence, instead of all options."""
+        self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
 
 
 def _window_parser() -> argparse.ArgumentParser:
@@ -142,9 +148,7 @@ def _add_info(calls: argparse._SubParsersAction) -> None:
 def _add_quality(calls: argparse._SubParsersAction) -> None:
     quality = calls.add_parser("quality", help="size-skew quality of a mesh")
     quality.add_argument("mesh", type=Path)
-    quality.add_argument(
-        "--reference", type=Path, metavar="UNDEFORMED", help="mesh to compare cell sizes with"
-    )
+    add_reference(quality, "case that made it: its MESH_FILENAME is the reference")
     quality.add_argument(
         "--metric",
         choices=("knupp", "rbf-slide"),

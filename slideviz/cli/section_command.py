@@ -18,6 +18,7 @@ def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
     from slideviz import Case, quality, read
     from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.reference import NONE, reference_of, words_of
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
     from slideviz.view.copies import show_passages
@@ -30,7 +31,8 @@ def section(arguments: argparse.Namespace) -> int:
     require_picture_name(arguments.output)
     case = Case.read(arguments.case) if arguments.case else None
     mesh = read(arguments.mesh, zone=arguments.zone)
-    base = read(arguments.reference, zone=arguments.zone) if arguments.reference else None
+    known = reference_of(arguments, mesh, case)
+    base = known[1] if known else None
     found = quality(mesh, reference=base, metric=arguments.metric)
     painted = paint(mesh, found, arguments.color, base)
     painted = replace(painted, colour_map=arguments.map)
@@ -47,13 +49,15 @@ def section(arguments: argparse.Namespace) -> int:
     elif painted.label == "displacement":
         painted = painted.up_to(ids)
     name = Path(mesh.name).name
-    style = SectionStyle(arguments.size, arguments.edges, arguments.in_space, name)
+    note = "" if base is not None or painted.label == "skew" else NONE
+    style = SectionStyle(arguments.size, arguments.edges, arguments.in_space, name, note=note)
     section_picture(pieces, chosen, painted, arguments.output, style)
     summary = painted.summary(ids)
     report: dict[str, Any] = {
         "mesh": mesh.name,
         "section": _as_json(chosen),
         "color": painted.label,
+        "reference": str(known[0]) if known else None,
     }
     report |= {"passages": len(pieces), "picture": str(arguments.output), **summary}
     text = save_json(arguments.json, report) if arguments.json else None
@@ -62,13 +66,15 @@ def section(arguments: argparse.Namespace) -> int:
     else:
         print(f"{name}: {chosen.describe()}")
         print(f"  {painted.sentence(ids)}, worst is cell {summary['worst_cell']}")
+        if note or known:
+            print(f"  {words_of(known)}")
         print(f"  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE
 
 
 def _check_usage(arguments: argparse.Namespace) -> None:
     """Leave with code 2 where options contradict each other."""
-    if arguments.color == "displacement" and not arguments.reference:
+    if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
     if arguments.unrolled and arguments.plane:
         arguments.wrong_usage("--unrolled is for a --cylinder; a plane is flat already")

@@ -35,6 +35,7 @@ examples:
 
 def add_section(calls: argparse._SubParsersAction) -> None:
     """Add the command to the parser's."""
+    from slideviz.cli.reference import add_reference
     from slideviz.cli.section_command import section as command
 
     section = calls.add_parser(
@@ -54,7 +55,11 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         help=CYLINDER_HELP,
     )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
-    add("--reference", type=Path, metavar="UNDEFORMED", help="mesh to compare with")
+    add_reference(
+        section,
+        "case that names periodic boundaries and axis; its MESH_FILENAME is the reference "
+        "where it has the same cells",
+    )
     add("--color", choices=COLOURS, default="size-skew", help="(default: size-skew)")
     add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
     add("--map", choices=MAPS, default="viridis", help="colour map (default: viridis)")
@@ -73,7 +78,6 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         default=0,
         help="neighbouring passages to draw on each side, or wheel for all of them",
     )
-    add("--case", type=Path, metavar="CASE", help="case that names periodic boundaries and axis")
     add("--size", type=pixels, metavar="WxH", default=(1600, 1000), help="pixels")
     add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
     add("--metric", choices=("knupp", "rbf-slide"), default="knupp", help="as for quality")

@@ -46,6 +46,8 @@ class SectionStyle:
         Which state of it: run, method and step.
     dpi : float, optional
         Pixels per inch; left out, letters can be read when the picture is as wide as a page.
+    note : str
+        Stands behind the numbers of the title.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -54,6 +56,7 @@ class SectionStyle:
     name: str = ""
     state: str = ""
     dpi: float | None = None
+    note: str = ""
 
 
 def require_picture_name(file: Path) -> None:
@@ -145,7 +148,8 @@ def draw_section(
     ids = drawn[0].cell_ids if 0 in drawn else all_ids
     _bar(figure, layout, paint, bool(paint.inverted[all_ids].any()))
     words = ", ".join(part for part in (style.state, section.describe()) if part)
-    _title(figure, layout, (style.name, words), paint.sentence(ids))
+    numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
+    _title(figure, layout, (style.name, words), numbers)
     return figure, dpi
 
 
@@ -267,7 +271,7 @@ def _title(figure: Any, layout: Layout, first: tuple[str, str], second: str) -> 
             if wide <= 1.0:
                 break
         else:
-            text.set_fontsize(size / wide)
+            text.set_fontsize(0.95 * size / wide)  # small letters are a little wider than that
 
 
 def _shorter(name: str) -> Iterator[str]:
