@@ -6,37 +6,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from slideviz.case.model import Case, Role
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.quality import Quality
+from slideviz.view.results import Frame, Run, cell_displacement
+from slideviz.view.view_state import COLOUR_BY, POINTS, ColourBy, PointsShown, ViewState
 
-if TYPE_CHECKING:
-    from slideviz.staircase import Step
-    from slideviz.view.section import Section
-
-ColourBy = Literal["role", "size_skew", "size", "skew", "displacement"]
-PointsShown = Literal["none", "types", "control"]
-
-COLOUR_BY: dict[ColourBy, str] = {
-    "role": "role",
-    "size_skew": "size-skew",
-    "size": "size",
-    "skew": "skew",
-    "displacement": "displacement",
-}
-"""What the view can be coloured by, and the words for it."""
-
-POINTS: dict[PointsShown, str] = {
-    "none": "none",
-    "types": "boundary nodes by type",
-    "control": "control nodes",
-}
-"""Which nodes the view can draw as points, and the words for it."""
+__all__ = [
+    "COLOUR_BY",
+    "POINTS",
+    "ColourBy",
+    "Frame",
+    "Guess",
+    "PointsShown",
+    "Run",
+    "Session",
+    "ViewState",
+    "cell_displacement",
+    "essence",
+    "round_above",
+]
 
 
 @dataclass(frozen=True)
@@ -45,138 +37,6 @@ class Guess:
 
     role: Role
     reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """The mesh after a step, with its quality; the first frame is the undeformed mesh."""
-
-    mesh: Mesh
-    quality: Quality
-    step: Step | None = None
-
-    def values(self, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
-        """Return the number of every cell, (m,), that ``what`` stands for.
-
-        Quality is in 0 to 1. The displacement of a cell is the mean distance of its nodes from
-        where they are in ``undeformed``, in the mesh's length unit.
-        """
-        if what == "displacement":
-            return cell_displacement(self.mesh, undeformed or self.mesh)
-        if what == "size":
-            return self.quality.size
-        return self.quality.skew if what == "skew" else self.quality.values
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One deformation that was computed, and what it was computed with.
-
-    Attributes
-    ----------
-    number : int
-        From 1, in the order of the starts; never used twice in a session.
-    case : Case
-        The settings.
-    frames : tuple of Frame
-        The steps, without the undeformed mesh.
-    end : {"", "done", "cancelled", "failed"}
-        How it ended; empty while it goes on.
-    saved : bool
-        Whether the mesh of its last step was written.
-    """
-
-    number: int
-    case: Case
-    frames: tuple[Frame, ...] = ()
-    end: Literal["", "done", "cancelled", "failed"] = ""
-    saved: bool = False
-
-    @property
-    def last(self) -> Frame | None:
-        """Return the frame of its last step."""
-        return self.frames[-1] if self.frames else None
-
-    @property
-    def seconds(self) -> float:
-        """Return the seconds that its steps took, without reading and drawing."""
-        return sum(sum(f.step.seconds.values()) for f in self.frames if f.step is not None)
-
-
-@dataclass(frozen=True)
-class ViewState:
-    """How it is looked at.
-
-    Attributes
-    ----------
-    colour_by : {"role", "size_skew", "size", "skew", "displacement"}
-        What the colours say.
-    colour_range : (float, float) or None
-        Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
-        above the largest of all runs for the displacement.
-    colour_map : str
-        A key of `slideviz.view.look.COLOUR_MAPS`.
-    threshold : (float, float) or None
-        Draw only the cells whose value is in this range; None draws all.
-    points : {"none", "types", "control"}
-        Nodes drawn as points.
-    edges : bool
-        Draw the edges of the cells.
-    undeformed : bool
-        Draw the undeformed boundaries as a ghost.
-    motion_ghost : bool
-        Draw where the motions take the moving boundaries.
-    legend : bool
-        Draw the legend or the colour bar.
-    triad : bool
-        Draw the directions of the axes in a corner.
-    perspective : bool
-        Perspective instead of parallel projection (3D only).
-    sections : tuple of Section
-        Planes and cylinders that cut the mesh.
-    copies : int
-        Passages drawn on each side of a periodic mesh; -1 draws all there are.
-    hidden : frozenset of str
-        Boundaries that are not drawn.
-    selected : tuple of str
-        Boundaries that are highlighted.
-    frame : int
-        Which frame is shown, 0 is the undeformed mesh.
-    marked : int or None
-        The cell that is marked, by its number in the mesh.
-    beside : int or None
-        The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
-    swapped : bool
-        Whether the second view stands to the left of the first.
-    ranges : tuple of (str, (float, float))
-        The colour ranges of what else the view was coloured by.
-    """
-
-    colour_by: ColourBy = "role"
-    colour_range: tuple[float, float] | None = None
-    colour_map: str = "viridis"
-    threshold: tuple[float, float] | None = None
-    points: PointsShown = "none"
-    edges: bool = True
-    undeformed: bool = False
-    motion_ghost: bool = True
-    legend: bool = True
-    triad: bool = True
-    perspective: bool = False
-    sections: tuple[Section, ...] = ()
-    copies: int = 0
-    hidden: frozenset[str] = frozenset()
-    selected: tuple[str, ...] = ()
-    frame: int = 0
-    marked: int | None = None
-    beside: int | None = None
-    swapped: bool = False
-    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
-
-    @property
-    def style(self) -> ViewState:
-        """Return it without what passes: the step, what is selected or marked, the second view."""
-        return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,12 +173,3 @@ def essence(case: Case) -> Case:
     """Return the case without what does not change the result: file names, order of roles."""
     roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
     return replace(case, roles=roles, mesh_out=None, source=None, warnings=(), view={})
-
-
-def cell_displacement(mesh: Mesh, undeformed: Mesh) -> FloatArray:
-    """Return the mean distance of the nodes of each cell from where they were, (m,)."""
-    moved = mesh.points - undeformed.points
-    shift = np.sqrt(np.einsum("nd,nd->n", moved, moved))
-    offsets = mesh.cells.offsets
-    total = np.add.reduceat(shift[mesh.cells.connectivity], offsets[:-1])
-    return np.asarray(total / np.diff(offsets))

@@ -16,7 +16,7 @@ from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
 from slideviz.gui.player import plain, result_parts, step_ms
 from slideviz.mesh.quality import INVERTED
-from slideviz.view import changes, jobs
+from slideviz.view import changes, jobs, opening
 from slideviz.view.advice import ended
 from slideviz.view.runs_table import described
 
@@ -487,7 +487,7 @@ def test_all_kernels_can_be_chosen(opened):
 
 
 def test_a_guessed_data_reduction_says_why_until_it_is_changed(opened, monkeypatch):
-    monkeypatch.setattr(changes, "MANY_NODES", 10)
+    monkeypatch.setattr(opening, "MANY_NODES", 10)
     opened.open(opened.session.path)
     method = opened.window.method
     opened.window.docks["method"].raise_()

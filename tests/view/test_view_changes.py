@@ -6,7 +6,7 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Rotate, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
+from slideviz.view import changes, opening
 from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.section import Section
 from slideviz.view.state import Frame, Session, essence
@@ -192,19 +192,19 @@ def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
 def test_a_mesh_with_many_boundary_nodes_opens_with_data_reduction(square, monkeypatch):
     first = Frame(square, quality(square))
     assert changes.open_mesh(first, None).case.reduction is None
-    monkeypatch.setattr(changes, "MANY_NODES", 15)
+    monkeypatch.setattr(opening, "MANY_NODES", 15)
     session = changes.open_mesh(first, None)
     assert session.case.reduction.tolerance == pytest.approx(4e-5)
     assert "16 boundary nodes" in session.reduction_guess
     assert not session.unsaved_case
     assert not changes.set_case(session, reduction=None).reduction_guess
     assert changes.set_case(session, steps=2).reduction_guess
-    monkeypatch.setattr(changes, "MANY_NODES", 16)
+    monkeypatch.setattr(opening, "MANY_NODES", 16)
     assert changes.open_mesh(first, None).case.reduction is None
 
 
 def test_a_case_is_not_given_data_reduction(square, monkeypatch):
-    monkeypatch.setattr(changes, "MANY_NODES", 1)
+    monkeypatch.setattr(opening, "MANY_NODES", 1)
     session = changes.open_mesh(Frame(square, quality(square)), None, case=Case())
     assert session.case.reduction is None
     assert not session.reduction_guess

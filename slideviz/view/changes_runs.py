@@ -1,0 +1,110 @@
+"""Pure functions from one session to the next: its runs, and which of them are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+from slideviz.view.changes_view import set_view, show_frame
+from slideviz.view.state import Frame, Run, Session
+
+UNDEFORMED = 0
+"""Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
+
+
+def start_run(session: Session) -> Session:
+    """Return the session with one more run, of the settings there are, and it shown.
+
+    Runs that were cancelled or failed before their first step go.
+    """
+    kept = tuple(run for run in session.runs if run.frames)
+    number = 1 + max((run.number for run in session.runs), default=0)
+    session = replace(session, runs=(*kept, Run(number, session.case)), shown=number)
+    return show_frame(session, 0)
+
+
+def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
+    """Return the session with steps just computed by the newest run; the last is shown."""
+    newest = session.runs[-1]
+    grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
+    session = replace(session, runs=(*session.runs[:-1], grown))
+    if session.shown != grown.number:
+        return session  # the user looks at another run meanwhile
+    return show_frame(session, len(grown.frames))
+
+
+def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
+    """Return the session with the newest run ended that way, if one was going on."""
+    if not session.runs or session.runs[-1].end:
+        return session
+    ended = replace(session.runs[-1], end=end)
+    return replace(session, runs=(*session.runs[:-1], ended))
+
+
+def show_run(session: Session, number: int) -> Session:
+    """Return the session with the last step of that run shown."""
+    run = session.run(number)
+    if run is None:
+        return session
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, shown=number), beside=beside)
+    return show_frame(session, len(run.frames))
+
+
+def show_beside(session: Session, number: int | None) -> Session:
+    """Return the session with another run in a second view beside the first; None: no such.
+
+    ``UNDEFORMED`` stands for the undeformed mesh.
+    """
+    known = number == UNDEFORMED or session.run(number) is not None
+    if number == session.shown or not known:
+        number = None
+    return set_view(session, beside=number, swapped=False)
+
+
+def remove_run(session: Session, number: int) -> Session:
+    """Return the session without a run; one that goes on stays."""
+    run = session.run(number)
+    if run is None or not run.end:
+        return session
+    rest = tuple(other for other in session.runs if other.number != number)
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, runs=rest), beside=beside)
+    if session.shown != number:
+        return session
+    if not rest:
+        return show_frame(set_view(replace(session, shown=None), beside=None), 0)
+    return show_run(session, rest[-1].number)
+
+
+def take_settings(session: Session, number: int) -> Session:
+    """Return the session with the settings of a run put back: roles, motions, method."""
+    run = session.run(number)
+    if run is None:
+        return session
+    return replace(session, case=run.case, guesses={}, reduction_guess="")
+
+
+def seen_beside(session: Session) -> Session:
+    """Return the session as the second view shows it: the other run, at the matching step."""
+    if session.view.beside == UNDEFORMED:
+        return show_frame(session, 0)
+    run, other = session.run_shown, session.run(session.view.beside)
+    if other is None:
+        return session
+    last = len(run.frames) if run is not None else 0
+    at = session.view.frame
+    # Runs of different numbers of steps: the same part of the displacement.
+    frame = round(at * len(other.frames) / last) if last else 0
+    if at:
+        frame = max(frame, 1)
+    return show_frame(replace(session, shown=other.number), frame)
+
+
+def saved_mesh(session: Session) -> Session:
+    """Return the session with the deformed mesh of the run that is shown on disk."""
+    runs = tuple(
+        replace(run, saved=True) if run.number == session.shown else run for run in session.runs
+    )
+    return replace(session, runs=runs)

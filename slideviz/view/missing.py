@@ -1,0 +1,55 @@
+"""What must be put right before a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from slideviz.case.model import FromFile
+from slideviz.view.state import Session
+
+Place = Literal["open", "boundaries", "motion", "method"]
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What must be put right before a run, in words, and which panel does it."""
+
+    text: str
+    place: Place
+
+
+def is_missing(session: Session) -> tuple[Missing, ...]:
+    """Return what must be put right before a run, most urgent first; empty when ready."""
+    if session.mesh is None:
+        return (Missing("Open a mesh first.", "open"),)
+    case, found = session.case, []
+    moving = case.markers_with("moving")
+    if not moving:
+        found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))
+    given = {motion.marker for motion in case.motions}
+    found += [
+        Missing(f"“{name}” has no motion: add one.", "motion")
+        for name in moving
+        if name not in given and "" not in given
+    ]
+    for motion in case.motions:
+        if isinstance(motion, FromFile) and not motion.path.is_file():
+            text = f"The displacement file {motion.path} does not exist."
+            found.append(Missing(text, "motion"))
+    if case.periodic == "moving" and case.sliding == "none":
+        text = "Moving periodic vertices need sliding: choose pseudo or direct."
+        found.append(Missing(text, "method"))
+    if not found:
+        found = [Missing(text, "boundaries") for text in _problems(session)]
+    if not found and session.clash:
+        found = [Missing(session.clash, "motion")]
+    return tuple(found)
+
+
+def _problems(session: Session) -> list[str]:
+    """Return what the case itself finds wrong with the mesh."""
+    from slideviz.case.motion import check_case
+
+    assert session.mesh is not None
+    return [str(problem) for problem in check_case(session.case, session.mesh)]
