@@ -10,6 +10,7 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QSplitter
 
 from slideviz.gui.handle import PlaneHandle
+from slideviz.gui.handle_flat import FlatHandle
 from slideviz.gui.unrolled import FlatView
 from slideviz.gui.viewing import Viewing
 from slideviz.view import changes
@@ -30,7 +31,7 @@ class Cutting(QSplitter):
     chosen : int or None
         The place of the section in the list of the view.
     wants_handle : bool
-        Whether the chosen section gets a handle, if it is a plane.
+        Whether the chosen section gets a handle, if it is a plane, or in 2D.
     handle, flat
         Both, None while nobody wants them.
     look : Look
@@ -47,7 +48,7 @@ class Cutting(QSplitter):
         self._multi_samples = multi_samples
         self.chosen: int | None = None
         self.wants_handle = False
-        self.handle: PlaneHandle | None = None
+        self.handle: PlaneHandle | FlatHandle | None = None
         self.flat: FlatView | None = None
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
@@ -74,7 +75,7 @@ class Cutting(QSplitter):
             self._sync()
 
     def want_handle(self, wanted: bool) -> None:
-        """Show the handle of a plane that is chosen, or do not."""
+        """Show the handle of the section that is chosen, or do not."""
         self.wants_handle = wanted
         self._sync()
 
@@ -116,12 +117,14 @@ class Cutting(QSplitter):
 
     def _sync_handle(self, session: Session, section: Section | None) -> None:
         mesh = session.mesh
-        usable = section is not None and section.kind == "plane" and section.shown
-        if not (self.wants_handle and usable) or mesh is None or mesh.dim == 2:
-            if self.handle is not None:
-                self.handle.close()
-                self.handle = None
-                self.viewing.view.render_soon()
+        flat = mesh is not None and mesh.dim == 2
+        usable = section is not None and section.shown and can_cut(mesh, section)
+        if not (self.wants_handle and usable and (flat or section.kind == "plane")):
+            self._drop_handle()
+            return
+        assert mesh is not None
+        if flat:
+            self._show_flat_handle(section)
             return
         if self.handle is None:
             self.handle = PlaneHandle(self.viewing.view, self._dragged, self.store.hold)
@@ -130,6 +133,23 @@ class Cutting(QSplitter):
         box = np.stack([low - room, high + room], axis=1).ravel()
         self.handle.show(section, tuple(box.tolist()), self.look)
         self.viewing.view.render_soon()
+
+    def _show_flat_handle(self, section: Section) -> None:
+        viewing, stage = self.viewing, self.viewing.scene.stage
+        if self.handle is None:
+            self.handle = FlatHandle(viewing.view, stage.strip, self._replaced, self.store.hold)
+        self.handle.show(section, stage.lift(self.store.session.mesh), self.look)
+        viewing.view.render_soon()
+
+    def _drop_handle(self) -> None:
+        if self.handle is not None:
+            self.handle.close()
+            self.handle = None
+            self.viewing.view.render_soon()
+
+    def _replaced(self, section: Section) -> None:
+        if self.section is not None and section != self.section:
+            self.store.change(changes.replace_section, self.chosen, section)
 
     def _dragged(self, origin: Triple, normal: Triple) -> None:
         section = self.section
@@ -185,9 +205,7 @@ class Cutting(QSplitter):
 
     def close_views(self) -> None:
         """Give the graphics back, before those of the 3D view."""
-        if self.handle is not None:
-            self.handle.close()
-            self.handle = None
+        self._drop_handle()
         if self.flat is not None:
             self.flat.close_view()
             self.flat = None

@@ -53,7 +53,6 @@ class SectionEditor(QWidget):
         self.direction.set_tip("Any length but zero.")
         self.direction.changed.connect(self._direction_typed)
         self.centre = VectorField()
-        self.centre.set_tip("A point of the axis, in the mesh's length unit.")
         self.centre.changed.connect(self._centre_typed)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setRange(0, STEPS)
@@ -103,25 +102,33 @@ class SectionEditor(QWidget):
             return
         if mesh is not self._mesh:
             self._mesh, self._points = mesh, section_start.cell_points(mesh)
-        cylinder = section.kind == "cylinder"
+        cylinder, flat = section.kind == "cylinder", mesh.dim == 2
         word = _axis_of(section)
         if other:
             self._free = False
         self._free = self._free or word == FREE
-        self.axis_name.setText("Axis" if cylinder else "Normal")
+        # The axis of a circle cannot be another.
+        self.axis.setVisible(not (cylinder and flat))
+        self.axis_name.setText("" if cylinder and flat else "Axis" if cylinder else "Normal")
         self.place_name.setText("Radius" if cylinder else "Position")
         self.axis.setToolTip("Direction of the axis." if cylinder else "Direction of the normal.")
+        shape = "line" if flat else "plane"
         self.number.set_tip(
             "The radius, in the mesh's length unit."
             if cylinder
-            else "The plane's distance from the origin along its normal, in the mesh's length unit."
+            else f"How far the {shape} is from 0 along its normal, in the mesh's length unit."
         )
         self.axis.show_value(FREE if self._free else word)
-        flat = mesh.dim == 2
         self.direction.set_count(mesh.dim)
+        self.centre.set_count(mesh.dim)
+        point = "The middle of the circle" if flat else "A point of the axis"
+        self.centre.set_tip(f"{point}, in the mesh's length unit.")
         self.direction.show_value(section.direction)
         self.centre.show_value(section.origin)
-        for widget, shown in ((self.direction, self._free), (self.centre, cylinder)):
+        for widget, shown in (
+            (self.direction, self._free and not (cylinder and flat)),
+            (self.centre, cylinder),
+        ):
             self.form.setRowVisible(widget, shown)
         with QSignalBlocker(self.whole):
             self.whole.setChecked(section.whole)
@@ -176,7 +183,7 @@ class SectionEditor(QWidget):
             self.direction.fields[0].setToolTip("A direction is needed: not all may be 0.")
 
     def _centre_typed(self, values: tuple[float, ...]) -> None:
-        self._tell(origin=values)
+        self._tell(origin=(*values, 0.0)[:3])
 
     def _position_typed(self, value: float) -> None:
         if self._section is not None:

@@ -41,9 +41,14 @@ SIZES = {
     "1600 × 1000 pixels, for the screen…": Paper((1600, 1000)),
 }
 """Sizes of pictures, with the words of the menu."""
-HINT = (
-    "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells inside."
-)
+HINTS = {
+    3: "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells "
+    "inside.",
+    2: "Lay a line or a circle through the mesh to see the cells on it, and their quality along "
+    "it.",
+}
+NAMES = {3: ("Plane", "Cylinder"), 2: ("Line", "Circle")}
+"""What sections are called, by the dimensions of the mesh."""
 
 
 class SectionsPanel(QWidget):
@@ -73,10 +78,8 @@ class SectionsPanel(QWidget):
     # Parts -----------------------------------------------------------------------------
 
     def _make_list(self) -> None:
-        self.add_plane = QPushButton("Plane")
-        self.add_plane.setToolTip("Add a plane through the middle of the mesh.")
+        self.add_plane, self.add_cylinder = (QPushButton(word) for word in NAMES[3])
         self.add_plane.clicked.connect(self._add_plane)
-        self.add_cylinder = QPushButton("Cylinder")
         self.add_cylinder.clicked.connect(self._add_cylinder)
         self.remove = QToolButton()
         self.remove.setToolTip("Remove the section (Delete)")
@@ -97,7 +100,7 @@ class SectionsPanel(QWidget):
         delete = QShortcut(QKeySequence(QKeySequence.StandardKey.Delete), self.list)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
         delete.activated.connect(self._remove)
-        self.hint = QLabel(HINT)
+        self.hint = QLabel(HINTS[3])
         self.hint.setWordWrap(True)
         self.hint.setProperty("hint", True)
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
@@ -107,7 +110,6 @@ class SectionsPanel(QWidget):
         self.editor.changed.connect(self._replace)
         self.editor.held.connect(self.store.hold)
         self.handle, self.flat = QCheckBox("Handle"), QCheckBox("Flat view")
-        self.handle.setToolTip("Drag the plane in the view: its face moves it, the arrow turns it.")
         self.handle.clicked.connect(self.cutting.want_handle)
         self.flat.clicked.connect(self.cutting.want_flat)
         self.look, self.picture = QToolButton(), QToolButton()
@@ -152,10 +154,14 @@ class SectionsPanel(QWidget):
         """Show the sections of a session."""
         mesh, sections = session.mesh, session.view.sections
         flat = mesh is not None and mesh.dim == 2
-        self.add_plane.setEnabled(mesh is not None)
-        self.add_cylinder.setEnabled(mesh is not None and not flat)
+        dim = 2 if flat else 3
+        self.hint.setText(HINTS[dim])
+        for button, word in zip((self.add_plane, self.add_cylinder), NAMES[dim], strict=True):
+            button.setText(word)
+            button.setEnabled(mesh is not None)
+        self.add_plane.setToolTip(f"Add a {NAMES[dim][0].lower()} through the middle of the mesh.")
         self.add_cylinder.setToolTip(
-            "A cylinder needs a 3D mesh."
+            "Add a circle around what moves, or about the axis of the period."
             if flat
             else "Add a cylinder about the axis of the machine."
         )
@@ -179,7 +185,8 @@ class SectionsPanel(QWidget):
                 self.list.addItem(QListWidgetItem())
             for row, section in enumerate(sections):
                 item = self.list.item(row)
-                text = section.name or section.describe()
+                dim = session.mesh.dim if session.mesh is not None else 3
+                text = section.name or section.describe(dim)
                 text = text if can_cut(session.mesh, section) else f"{text} (needs a 3D mesh)"
                 state = Qt.CheckState.Checked if section.shown else Qt.CheckState.Unchecked
                 if item.text() != text:
@@ -193,7 +200,14 @@ class SectionsPanel(QWidget):
 
     def _sync_tools(self, chosen: Section | None, flat: bool) -> None:
         plane = chosen is None or chosen.kind == "plane"
-        self.handle.setVisible(plane and not flat)
+        self.handle.setVisible(plane or flat)
+        self.handle.setToolTip(
+            "Drag the plane in the view: its face moves it, the arrow turns it."
+            if not flat
+            else "Drag the line in the view: itself or its middle moves it, its ends turn it."
+            if plane
+            else "Drag the circle in the view: its middle moves it, itself changes the radius."
+        )
         self.handle.setEnabled(chosen is not None and chosen.shown)
         self.handle.setChecked(self.cutting.wants_handle)
         self.flat.setText("Flat view" if plane else "Unrolled")

@@ -10,7 +10,7 @@ from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
 from slideviz.view.section_cut import Cutter
 
-KEPT = 8
+KEPT = 24
 """Cuts of one frame that are remembered: a slider leaves many behind that nobody asks for."""
 
 
@@ -24,7 +24,7 @@ class Cuts:
         self._cells: Cells | None = None
         self._cutter: Cutter | None = None
         self._points: FloatArray | None = None
-        self._found: dict[Section, Polygons] = {}
+        self._found: dict[tuple[Section, bytes], Polygons] = {}
 
     def cutter(self, mesh: Mesh) -> Cutter:
         """Return what cuts the cells of a mesh; the steps of a deformation share it."""
@@ -36,19 +36,19 @@ class Cuts:
     def of(self, mesh: Mesh, section: Section, matrix: FloatArray | None = None) -> Polygons:
         """Return what a section shows of a mesh, or of its image under a matrix (4, 4)."""
         cutter = self.cutter(mesh)
-        if matrix is not None:
-            return cutter.show(moved(mesh.points, matrix), section)
         if self._points is not mesh.points:
             self._points = mesh.points
             self._found.clear()
-        key = replace(section, name="", shown=True, flat=False)
+        one = replace(section, name="", shown=True, flat=False)
+        key = one, b"" if matrix is None else matrix.tobytes()
         if key not in self._found:
             while len(self._found) >= KEPT:
                 self._found.pop(next(iter(self._found)))
-            self._found[key] = cutter.show(mesh.points, section)
+            points = mesh.points if matrix is None else moved(mesh.points, matrix)
+            self._found[key] = cutter.show(points, section)
         return self._found[key]
 
 
 def can_cut(mesh: Mesh | None, section: Section) -> bool:
-    """Tell whether a section can cut a mesh at all: a cylinder needs a 3D one."""
-    return mesh is not None and (mesh.dim == 3 or section.kind == "plane")
+    """Tell whether a section can cut a mesh at all (see `Section.can_cut`)."""
+    return mesh is not None and section.can_cut(mesh.dim)

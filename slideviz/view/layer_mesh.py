@@ -15,6 +15,9 @@ from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 
+FADED = 0.3
+"""Opacity of a 2D mesh while sections show the cells on them."""
+
 
 def recoloured(old: Session | None, new: Session) -> bool:
     """Tell whether cells have other values than before."""
@@ -76,7 +79,7 @@ class CellLayer:
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.look.cell
         inside = looks_inside(new)
-        self.actor.prop.opacity = 0.12 if inside else 1.0
+        self.actor.prop.opacity = 0.12 if inside else FADED if is_faded(new) else 1.0
         self.stage.edges(self.actor.prop, new.view.edges and not inside)
 
 
@@ -185,6 +188,13 @@ def looks_inside(session: Session) -> bool:
     if session.mesh is None or session.mesh.dim == 2:
         return False
     return view.threshold is not None or any(section.shown for section in view.sections)
+
+
+def is_faded(session: Session) -> bool:
+    """Tell whether sections show cells of a 2D mesh, so that the others must step back."""
+    if session.mesh is None or session.mesh.dim == 3:
+        return False
+    return any(section.shown and section.can_cut(2) for section in session.view.sections)
 
 
 def seen_from_outside(session: Session) -> bool:

@@ -6,20 +6,30 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.view.copies import keeps
+from slideviz.view.copies import keeps, moved
+from slideviz.view.cut_lines import CutLines
 from slideviz.view.cuts import Cuts, can_cut
 from slideviz.view.layer_copies import Period, matrices
 from slideviz.view.layer_mesh import recoloured
 from slideviz.view.polygon_actor import PolygonActor, plain_colour
 from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
+from slideviz.view.section_line import box_around
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 from slideviz.view.twins import Twins
 
-NAME = "section:"
+NAME, BAND, RIM = "section:", "band:", "rim:"
+"""What names of actors begin with: of what a section shows, and of what is below it in 2D."""
+WIDTHS = {BAND: 8.0, RIM: 10.0}
+"""Pixels of the line that a cut through a 2D mesh is, in the colours of its cells, and of what
+sets it off: where cells are smaller than pixels, these lines are what is seen."""
+LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
+"""How far these are above the cells of a 2D mesh, as parts of `Stage.lift`."""
 
 
 @dataclass(eq=False)
@@ -48,12 +58,14 @@ class SectionLayer:
     cuts : Cuts
         What was cut, for others that show the same.
     drawn : dict of str to SectionDrawn
-        By the name of the actor: ``section:0`` is the first section of the mesh itself.
+        By the name of the actor: ``section:0`` is the first section of the mesh itself,
+        ``section:0:1`` that of its next passage.
     """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.cuts = Cuts()
+        self._lines = CutLines(stage)
         self.clear()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -64,6 +76,8 @@ class SectionLayer:
         self.drawn: dict[str, SectionDrawn] = {}
         self._period = Period()
         self._twins: dict[str, Twins] = {}
+        self._lines.clear()
+        self._lines_of: tuple[object, ...] = ()
 
     def shapes(self) -> list[Any]:
         """Return nothing: the boundaries are around it anyway."""
@@ -74,7 +88,7 @@ class SectionLayer:
         return [
             (one.actor, one.polygons.cells)
             for name, one in self.drawn.items()
-            if name.count(":") == 1 and len(one.polygons)
+            if name.startswith(NAME) and name.count(":") == 1 and len(one.polygons)
         ]
 
     def update(self, old: Session | None, new: Session) -> None:
@@ -97,6 +111,23 @@ class SectionLayer:
                 twins = self._twins.setdefault(name, Twins(self.stage, base))
                 # The period takes these onto themselves: nothing has to be cut again.
                 twins.show({at: m for at, m in neighbours.items() if keeps(section, m)})
+        if new.frame.mesh.dim == 2:
+            self._draw_lines(new, neighbours)
+
+    def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
+        """Draw the cutting lines of a 2D mesh across all that is drawn of it."""
+        assert session.frame is not None
+        mesh, sections = session.frame.mesh, dict(shown_sections(session))
+        key = (mesh, sections, tuple(neighbours), self.stage.look)
+        if key == self._lines_of:
+            return
+        self._lines_of = key
+        own = mesh.points[self.cuts.cutter(mesh).used]
+        every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
+        boxes = [box_around(points) for points in every]
+        low = np.min([box[0] for box in boxes], axis=0)
+        high = np.max([box[1] for box in boxes], axis=0)
+        self._lines.show(sections, (low, high), self.stage.lift(mesh))
 
     def _neighbours(self, session: Session) -> dict[int, FloatArray]:
         return matrices(session, self._period.of(session) if session.view.copies else None)
@@ -106,10 +137,11 @@ class SectionLayer:
         found: dict[str, tuple[Section, int, FloatArray | None]] = {}
         neighbours = self._neighbours(session)
         for index, section in shown_sections(session):
-            found[f"{NAME}{index}"] = replace(section, name=""), 0, None
-            for number, matrix in neighbours.items():
-                if not keeps(section, matrix):
-                    found[f"{NAME}{index}:{number}"] = replace(section, name=""), number, matrix
+            for kind, wanted in _kinds(section, session).items():
+                found[f"{kind}{index}"] = wanted, 0, None
+                for number, matrix in neighbours.items():
+                    if not keeps(section, matrix):
+                        found[f"{kind}{index}:{number}"] = wanted, number, matrix
         return found
 
     def _draw(
@@ -120,7 +152,8 @@ class SectionLayer:
         again: bool,
     ) -> None:
         section, number, matrix = wanted
-        frame, by_value = session.frame, session.view.colour_by != "role"
+        kind = name[: name.index(":") + 1]
+        frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
         assert frame is not None
         # The view's way to find the period may change with the case, and so the matrix.
         key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes())
@@ -129,31 +162,37 @@ class SectionLayer:
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
             polygons = self.cuts.of(frame.mesh, section, matrix)
-            one.shown.show(polygons, 0.7 * self.stage.lift(frame.mesh))
+            one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
             one.made_of, again = key, True
         if not by_value:
             one.shown.colour(None)
         elif again:
             one.shown.colour(self.stage.values(session))
-        self._style(one.shown, section, session)
+        self._style(kind, one.shown, section, session)
 
-    def _style(self, shown: PolygonActor, section: Section, session: Session) -> None:
+    def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
         prop, look = shown.actor.prop, self.stage.look
-        assert session.mesh is not None
-        if session.mesh.dim == 3:
-            prop.color = plain_colour(look)
-            # A cut has the very colours of the bar; whole cells need shades to be told apart.
-            prop.lighting = section.whole
-            prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
-            self.stage.edges(prop, session.view.edges)
-        elif section.whole:
-            prop.color = look.cell
-            prop.show_edges, prop.edge_color, prop.edge_opacity = True, look.text, 1.0
-            prop.line_width = 2.5
-        else:
-            # A line in the colours of the cells it lies on would not be seen.
-            shown.mapper.scalar_visibility = False
-            prop.color, prop.line_width = look.text, 3.0
+        prop.color = look.text if kind == RIM else plain_colour(look)
+        solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
+        # A cut has the very colours of the bar; whole cells need shades to be told apart.
+        prop.lighting = solid
+        prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
+        self.stage.edges(prop, session.view.edges)
+        if session.mesh is not None and session.mesh.dim == 2:
+            prop.line_width = 1.0 if section.whole else WIDTHS.get(kind, WIDTHS[BAND])
+
+
+def _kinds(section: Section, session: Session) -> dict[str, Section]:
+    """Return what is drawn of a section, by what the names of its actors begin with.
+
+    In 2D whole cells are above a line in their colours, and lines above a wider one.
+    """
+    section = replace(section, name="")
+    found = {NAME: section}
+    if session.mesh is not None and session.mesh.dim == 2:
+        line = replace(section, whole=False)
+        found |= {BAND: line, RIM: line} if section.whole else {RIM: line}
+    return found
 
 
 def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -119,9 +120,18 @@ class Section:
         radii = np.hypot(local[:, 0], local[:, 1])
         return float(radii.min()), float(radii.max())
 
-    def describe(self) -> str:
-        """Return the section in words, for people."""
+    def can_cut(self, dim: int) -> bool:
+        """Tell whether it can cut meshes of 2 or 3 dimensions at all.
+
+        A cylinder meets the plane of a 2D mesh in a circle where its axis is z.
+        """
+        return dim == 3 or self.kind == "plane" or _axis_word(self.direction) == "z"
+
+    def describe(self, dim: int = 3) -> str:
+        """Return the section in words, for people; in 2D it is a line or a circle."""
         where = _axis_word(self.direction)
+        if dim == 2 and (self.kind == "cylinder") == (where == "z"):
+            return self._in_plane(where)
         if self.kind == "cylinder":
             centre = np.asarray(self.origin)
             off_axis = np.linalg.norm(np.cross(centre, self.basis[2]))
@@ -130,6 +140,16 @@ class Section:
         if where in "xyz":
             return f"plane {where} = {self.origin['xyz'.index(where)]:.6g}"
         return f"plane with normal {where} through {_triple(self.origin)}"
+
+    def _in_plane(self, where: str) -> str:
+        """Return in words what it is in the plane of a 2D mesh."""
+        at = _triple(self.origin[:2])
+        if self.kind == "cylinder":
+            return f"circle r = {self.radius:.6g} about {at}"
+        if where in "xyz":
+            return f"line {where} = {self.origin['xyz'.index(where)]:.6g}"
+        slope = float(np.degrees(np.arctan2(-self.direction[0], self.direction[1])))
+        return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
 
 
 def _axis_word(direction: Triple) -> str:
@@ -141,5 +161,5 @@ def _axis_word(direction: Triple) -> str:
     return _triple(direction)
 
 
-def _triple(values: Triple) -> str:
+def _triple(values: Sequence[float]) -> str:
     return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"

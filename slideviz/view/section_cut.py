@@ -73,7 +73,7 @@ class Cutter:
         Raises
         ------
         CaseError
-            A cylinder is to cut a 2D mesh.
+            A cylinder is to cut a 2D mesh, and its axis is not z.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)
@@ -127,8 +127,11 @@ class Cutter:
         return Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
-        if self.dim == 2 and section.kind == "cylinder":
-            raise CaseError("a cylinder section needs a 3D mesh; cut this 2D mesh with a plane")
+        if not section.can_cut(self.dim):
+            raise CaseError(
+                f"{section.describe()}: its axis is not z, so it needs a 3D mesh; a 2D mesh is cut "
+                "by a plane, or in a circle by a cylinder about z"
+            )
         return section.distance(points)
 
     def _corners(self, level: FloatArray) -> tuple[IntArray, IntArray, IntArray]:

@@ -32,15 +32,31 @@ def first_plane(session: Session) -> Section:
 def first_cylinder(session: Session, pair: Pair | None) -> Section:
     """Return a cylinder about the axis of the machine, halfway between the radii of the mesh.
 
-    The axis is that of the period, where it is a rotation; otherwise that of the case.
+    The axis is that of the period, where it is a rotation; otherwise that of the case. In 2D it
+    is a circle, about the middle of what moves where no rotation has an axis in the mesh's plane.
     """
-    assert session.mesh is not None
-    case = session.case
-    turns = pair is not None and pair.kind == "rotational"
-    axis, origin = (pair.axis, pair.origin) if turns and pair else (case.axis, case.origin)
-    section = Section("cylinder", _triple(np.asarray(origin)), _triple(np.asarray(axis)), 1.0)
-    low, high = section.reach(cell_points(session.mesh))
+    mesh, case = session.mesh, session.case
+    assert mesh is not None
+    if pair is not None and pair.kind == "rotational":
+        axis, origin = pair.axis, pair.origin
+    elif mesh.dim == 2:
+        axis, origin = (0.0, 0.0, 1.0), _triple(_middle_of_moving(session))
+    else:
+        axis, origin = case.axis, case.origin
+    at, way = _triple(np.asarray(origin)), _triple(np.asarray(axis))
+    section = Section("cylinder", at, way, 1.0, whole=mesh.dim == 2)
+    low, high = section.reach(cell_points(mesh))
     return replace(section, radius=(low + high) / 2.0 or 1.0)
+
+
+def _middle_of_moving(session: Session) -> FloatArray:
+    """Return the middle (3,) of the box around all moving boundaries; of the mesh without them."""
+    mesh = session.mesh
+    assert mesh is not None
+    names = [name for name in mesh.marker_names if session.role(name) == "moving"]
+    nodes = [mesh.marker(name).nodes for name in names] or [mesh.cells.nodes]
+    points = padded(mesh.points[np.concatenate(nodes)])
+    return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0)
 
 
 def position(section: Section) -> float:

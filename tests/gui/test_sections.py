@@ -14,6 +14,7 @@ from slideviz.gui import dialogs
 from slideviz.gui.cutting import followed
 from slideviz.gui.ruler import Ruler, nice_ticks, tick_text
 from slideviz.view import changes
+from slideviz.view.pick import to_display
 from slideviz.view.section import Section
 
 
@@ -268,11 +269,94 @@ def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, pass
     assert window.cutting.handle is None
     assert window.cutting.flat is None
     assert sections(window) == ()
-    assert not panel.add_cylinder.isEnabled()
+    assert panel.add_plane.text() == "Line"
+    assert panel.add_cylinder.text() == "Circle"
     driver.click(panel.add_plane)
     assert sections(window)[0].whole
-    assert not panel.handle.isVisible()
+    assert panel.list.item(0).text() == sections(window)[0].describe(2)
     assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
+
+
+@pytest.fixture
+def flat_panel(window, driver, passage_file):
+    driver.open(passage_file)
+    window.docks_.lead_to("sections")
+    QApplication.processEvents()
+    return window.docks_.panels["sections"]
+
+
+def drag_in_view(view, start, end):
+    """Drag from one place of the mesh to another, through one between."""
+    for event, share in ((QTest.mousePress, 0.0), (QTest.mouseMove, 0.5), (QTest.mouseMove, 1.0)):
+        at = start + share * (end - start)
+        x, y = to_display(view, np.array([[*at, 0.0]]))[0] / view.devicePixelRatioF()
+        where = QPoint(round(x), round(view.height() - 1 - y))
+        if event is QTest.mouseMove:
+            event(view, where)
+            QApplication.processEvents()
+        else:
+            event(view, Qt.MouseButton.LeftButton, pos=where)
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=where)
+    QApplication.processEvents()
+
+
+def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, flat_panel):
+    driver.click(flat_panel.add_plane)
+    flat_panel.handle.click()
+    window.view.snapshot()
+    camera = window.scene.eye.place
+    (line,) = sections(window)
+    start, shift = np.array(line.origin[:2]), np.array([0.1, 0.05])
+    drag_in_view(window.view, start, start + shift)
+    (moved,) = sections(window)
+    assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
+    assert moved.direction == line.direction
+    end = window.cutting.handle._grips.ends[1]
+    drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
+    (turned,) = sections(window)
+    assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
+    assert turned.origin == pytest.approx(moved.origin, abs=1e-3)
+    # The view stayed where it was, and each drag is undone by itself.
+    assert window.scene.eye.place[:6] == pytest.approx(camera[:6])
+    window.store.undo()
+    assert sections(window) == (moved,)
+    window.store.undo()
+    assert sections(window) == (line,)
+
+
+def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
+    driver.click(flat_panel.add_cylinder)
+    (circle,) = sections(window)
+    assert circle.direction == (0.0, 0.0, 1.0)
+    assert not flat_panel.editor.axis.isVisible()
+    assert flat_panel.editor.centre.value == pytest.approx(circle.origin[:2])
+    flat_panel.handle.click()
+    window.view.snapshot()
+    centre = np.array(circle.origin[:2])
+    drag_in_view(window.view, window.cutting.handle._grips.ends[0], centre + np.array([0.2, 0.0]))
+    assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)
+    assert sections(window)[0].origin == circle.origin
+    driver.type(flat_panel.editor.centre.fields[1], "0.05")
+    assert sections(window)[0].origin[1:] == (0.05, 0.0)
+
+
+def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
+    driver.click(flat_panel.add_plane)
+    flat_panel.handle.click()
+    assert any(name.startswith("handle:") for name in window.view.actors)
+    handle = window.cutting.handle
+    # What is dragged beside it moves the view, as ever.
+    camera = window.scene.eye.place
+    beside = handle._grips.ends[0] + 0.2
+    drag_in_view(window.view, beside, beside + 0.1)
+    assert window.scene.eye.place != camera
+    # Wherever one looks, it is in reach.
+    (x, y, _), half = sections(window)[0].origin, 0.02
+    window.scene.eye.aim((x, y + 0.3, 0.0), half, 1.0)
+    for point in (*handle._grips.ends, *handle._grips.middle):
+        assert abs(point[1] - y - 0.3) < half
+    flat_panel.handle.click()
+    assert not any(name.startswith("handle:") for name in window.view.actors)
 
 
 def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel, monkeypatch):

@@ -1,5 +1,7 @@
 """Sections in the scene and laid flat: which cells are drawn, where, and in which colours."""
 
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -186,22 +188,56 @@ def test_the_cell_under_the_mouse_is_that_of_the_section(scene, cube):
     assert scene.pick_cell(x, y) in crossing(cube, 2, 0.46)
 
 
+LINE = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
+WHOLE = replace(LINE, whole=True)
+
+
 def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
-    section = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
-    session = opened(scene, square, sections=(section,), colour_by="size_skew")
-    shown = scene.sections.drawn["section:0"].shown
-    assert shown.shape.n_lines == 4
-    assert not shown.mapper.scalar_visibility
-    assert shown.actor.prop.color == pv.Color(LIGHT.text)
-    whole = changes.replace_section(
-        session, 0, Section("plane", section.origin, section.direction, whole=True)
-    )
+    session = opened(scene, square, sections=(LINE,), colour_by="size_skew")
+    one = scene.sections.drawn["section:0"]
+    assert one.shown.shape.n_lines == 4
+    assert one.shown.mapper.scalar_visibility
+    wanted = session.first.quality.values[one.polygons.cells]
+    assert np.array_equal(one.shown.shape.cell_data[VALUES], wanted)
+    whole = changes.replace_section(session, 0, WHOLE)
     scene.update(whole)
     assert cells_of(scene).tolist() == crossing(square, 1, 1.5).tolist()
-    assert shown.mapper.scalar_visibility
-    cylinder = Section("cylinder", radius=1.0)
-    scene.update(changes.add_section(whole, cylinder))
-    assert "section:1" not in scene.plotter.actors
+    assert one.shown.mapper.scalar_visibility
+    # Below cells that may be smaller than pixels is a line in their colours.
+    assert scene.sections.drawn["band:0"].shown.shape.n_lines == 4
+    assert len(scene.sections.pickable()) == 1
+
+
+def test_in_2d_the_other_cells_step_back_while_a_section_is_shown(scene, square):
+    session = opened(scene, square, sections=(WHOLE,), colour_by="size_skew")
+    cells = scene.plotter.actors["cells"]
+    assert cells.prop.opacity < 0.5
+    scene.update(changes.replace_section(session, 0, replace(WHOLE, shown=False)))
+    assert cells.prop.opacity == 1.0
+    # One that cannot be drawn leaves them as they are.
+    across = Section("cylinder", direction=(1.0, 0.0, 0.0), radius=1.0)
+    scene.update(changes.replace_section(session, 0, across))
+    assert cells.prop.opacity == 1.0
+    assert "section:0" not in scene.plotter.actors
+
+
+def test_the_cutting_line_goes_on_in_holes_and_beside_the_mesh(scene, square):
+    session = opened(scene, square, sections=(WHOLE,), colour_by="size_skew")
+    left, right = scene.plotter.actors["line:0"].bounds[:2]
+    assert left < 0.0
+    assert right > 4.0
+    assert scene.plotter.actors["line:0"].prop.color == pv.Color(LIGHT.text)
+    circle = Section("cylinder", (2.0, 2.0, 0.0), radius=1.5)
+    scene.update(changes.add_section(session, circle))
+    assert scene.plotter.actors["line:1"].bounds[:4] == pytest.approx((0.5, 3.5, 0.5, 3.5))
+    assert cells_of(scene, "section:1").size > 3
+    later = stepped(session, square.points * (3.0, 1.0))
+    scene.update(later)
+    assert "line:1" not in scene.plotter.actors
+    assert scene.plotter.actors["line:0"].bounds[1] > 12.0
+    scene.update(changes.remove_section(later, 0))
+    kinds = {name.partition(":")[0] for name in scene.plotter.actors}
+    assert kinds.isdisjoint({"section", "band", "rim", "line"})
 
 
 def test_neighbours_show_the_section_too(scene, stator):

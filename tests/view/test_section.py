@@ -185,10 +185,25 @@ def test_a_plane_cuts_a_2d_mesh_in_lines():
     assert set(whole.sizes) <= {3, 4}
 
 
-def test_a_cylinder_needs_a_3d_mesh():
+@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -3)])
+def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
+    mesh = square(12, "mixed", block=False)
+    section = Section("cylinder", (0.5, 0.5, 0.0), direction, 0.3)
+    found = Cutter.of(mesh).cut(mesh.points, section)
+    assert set(found.sizes) == {2}
+    assert np.hypot(*(found.points[:, :2] - 0.5).T) == pytest.approx(0.3)
+    ends = found.points[found.connectivity].reshape(-1, 2, 3)
+    # Chords, a little shorter than the arcs they stand for.
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+    assert 0.98 * 0.6 * np.pi < length < 0.6 * np.pi
+    assert found.cell_ids.tolist() == cut_cells(mesh, section)
+    assert Cutter.of(mesh).crinkle(mesh.points, section).cells.tolist() == cut_cells(mesh, section)
+
+
+def test_in_2d_the_axis_of_a_cylinder_is_z():
     mesh = square(3, block=False)
-    with pytest.raises(CaseError, match="a cylinder section needs a 3D mesh"):
-        Cutter.of(mesh).cut(mesh.points, Section("cylinder", radius=0.5))
+    with pytest.raises(CaseError, match="its axis is not z, so it needs a 3D mesh"):
+        Cutter.of(mesh).cut(mesh.points, Section("cylinder", direction=(1, 0, 0), radius=0.5))
 
 
 def test_a_section_beside_the_mesh_cuts_nothing():
@@ -284,6 +299,22 @@ def test_the_reach_tells_where_a_section_meets_the_mesh():
 )
 def test_a_section_is_described_in_words(section, words):
     assert section.describe() == words
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        (Section("plane", (0.25, 7, 0), (-2, 0, 0)), "line x = 0.25"),
+        (Section("plane", (0.25, 0.5, 0), (-1, 1, 0)), "line at 45° through (0.25, 0.5)"),
+        (Section("plane", (0.25, 0, 0), (1, 1, 0)), "line at -45° through (0.25, 0)"),
+        (Section("cylinder", (0, 1, 0), radius=0.2), "circle r = 0.2 about (0, 1)"),
+        # These do not cut the plane of the mesh in a line or circle.
+        (Section("plane", (0, 0, 0.5)), "plane z = 0.5"),
+        (Section("cylinder", (0, 0, 0), (1, 0, 0), 2), "cylinder r = 2 about x"),
+    ],
+)
+def test_in_2d_sections_are_lines_and_circles(section, words):
+    assert section.describe(2) == words
 
 
 def test_wrong_sections_are_refused():
