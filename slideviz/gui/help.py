@@ -33,6 +33,7 @@ MOUSE = (
     ("Click", "select the boundary in front"),
     ("Ctrl+Click", "select one more, or one less"),
     ("Ctrl+Click on a run", "show it beside the one that is shown"),
+    ("F2 on a run", "give it a name"),
     ("Right click", "roles of the boundary, hide, isolate"),
     ("Drop a file", "open it"),
 )

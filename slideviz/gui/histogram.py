@@ -259,7 +259,8 @@ def draw_histogram(counts: Counts, session: Session, how: tuple[bool, bool], fig
     what, (log, whole) = shown_measure(session), how
     limits = counts.limits(session, whole)
     shown = counts.of(session, session.frame, limits)
-    label = "undeformed" if session.view.frame == 0 else f"run {session.shown}"
+    run = session.run_shown
+    label = "undeformed" if session.view.frame == 0 or run is None else run.label
     words = label, "displacement [mesh units]" if what == "displacement" else _words(what)
     outlines = [
         Outline(name, counts.of(session, frame, limits), series)
@@ -282,7 +283,7 @@ def _others(session: Session) -> Iterator[tuple[str, Frame, int | None]]:
     for run in session.runs:
         # The last step of the run that is shown is what is played to.
         if run.last not in (None, session.frame) and run.number != session.shown:
-            yield f"run {run.number}", run.last, look_of(run)
+            yield run.label, run.last, look_of(run)
 
 
 def shown_measure(session: Session) -> ColourBy:

@@ -277,29 +277,6 @@ def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -
     return FromFile(Path(), marker)
 
 
-def describe(motion: Motion) -> str:
-    """Return a motion in a few words."""
-    if isinstance(motion, Translate):
-        what = f"translate by ({', '.join(f'{v:.4g}' for v in motion.vector)})"
-    elif isinstance(motion, Rotate):
-        what = f"rotate by {motion.angle_deg:.5g}°" + _about(motion.point)
-    elif isinstance(motion, Scale):
-        what = f"scale by {' × '.join(f'{v:.4g}' for v in motion.factors)}" + _about(motion.point)
-    elif isinstance(motion, Radial):
-        parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
-        parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
-        what = f"push radially by {' and '.join(parts)}"
-    else:
-        what = f"displace as in {motion.path.name or '(no file yet)'}"
-    return f"{motion.marker or 'all moving'}: {what}"
-
-
-def _about(point: object) -> str:
-    if point == "centroid":
-        return " about its centroid"
-    return f" about ({', '.join(f'{v:.4g}' for v in point)})"
-
-
 def _above_minus_100(value: float) -> str:
     """Return why a radius cannot change by so many percent."""
     return "" if value > -100.0 else "-100 % or less would fold the boundary"

@@ -18,9 +18,10 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.icons import icon
-from slideviz.gui.motion_editor import KINDS, Axis, MotionEditor, describe, new_motion
+from slideviz.gui.motion_editor import KINDS, Axis, MotionEditor, new_motion
 from slideviz.view import changes
 from slideviz.view.look import Look
+from slideviz.view.motion_words import describe
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 

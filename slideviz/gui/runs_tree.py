@@ -11,6 +11,7 @@ from qtpy.QtGui import QPalette
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
+    QLineEdit,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -21,19 +22,27 @@ from slideviz.view.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)
 NUMBER = Qt.ItemDataRole.UserRole
-WORDS = NUMBER + 1
-"""What a row keeps beside its texts: the number of its run, and the line below."""
+WORDS, NAME = NUMBER + 1, NUMBER + 2
+"""What a row keeps beside its texts: the number of its run, the line below, and its own name."""
 PAD = 4
 TIPS = (
-    "Number and method; below it the settings. A click shows a run; Ctrl+click shows it beside.",
-    "Lowest quality of a cell after the last step; the best of all runs is bold.",
+    "Number, and name (F2) or method; below it what sets it apart. Ctrl+click shows it beside.",
+    "Lowest quality of a cell after the last step; the best of the runs with one motion is bold.",
     "Mean quality of the cells after the last step.",
     "Inverted cells after the last step.",
 )
 
 
 class _FirstLine(QStyledItemDelegate):
-    """Draws a cell in the upper half of its row: the lower half is one line for all columns."""
+    """Draws a cell in the upper half of its row: the lower half is one line for all columns.
+
+    Signals
+    -------
+    renamed(int, str)
+        A run got another name, by its number.
+    """
+
+    renamed = Signal(int, str)
 
     def sizeHint(self, option, index) -> QSize:
         item = QStyleOptionViewItem(option)
@@ -59,6 +68,25 @@ class _FirstLine(QStyledItemDelegate):
         painter.drawText(rect, item.displayAlignment, shown)
         painter.restore()
 
+    def createEditor(self, parent, _option, index) -> QLineEdit | None:
+        if index.column() != RUN:
+            return None
+        editor = QLineEdit(parent)
+        editor.setPlaceholderText(f"Name of run {index.data(NUMBER)}")
+        return editor
+
+    def setEditorData(self, editor, index) -> None:
+        # The row changes while its run goes on; what is being typed stays.
+        if not editor.isModified():
+            editor.setText(index.data(NAME))
+
+    def setModelData(self, editor, _model, index) -> None:
+        self.renamed.emit(index.data(NUMBER), editor.text())
+
+    def updateEditorGeometry(self, editor, option, _index) -> None:
+        width = editor.parentWidget().width() - option.rect.left()
+        editor.setGeometry(option.rect.left(), option.rect.top(), width, option.rect.height())
+
 
 def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
     """Return the colour of letters in a row, chosen or not."""
@@ -75,9 +103,12 @@ class RunTree(QTreeWidget):
     -------
     beside_wanted(int)
         A run was clicked with Ctrl, by its number.
+    renamed(int, str)
+        A run got another name, by its number.
     """
 
     beside_wanted = Signal(int)
+    renamed = Signal(int, str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -92,7 +123,10 @@ class RunTree(QTreeWidget):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.setItemDelegate(_FirstLine(self))
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        first = _FirstLine(self)
+        first.renamed.connect(self.renamed)
+        self.setItemDelegate(first)
         self.setMinimumHeight(80)
         for column, tip in enumerate(TIPS):
             self.headerItem().setToolTip(column, tip)
@@ -105,6 +139,26 @@ class RunTree(QTreeWidget):
             self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
         self.seen_before: tuple[int | None, int, int | None] = (None, 0, None)
         self.session: Callable[[], Session] = Session
+
+    @property
+    def number(self) -> int | None:
+        """Return the number of the run whose row is chosen."""
+        item = self.currentItem()
+        return None if item is None else item.data(RUN, NUMBER)
+
+    def edit_name(self, number: int | None = None) -> None:
+        """Let the name of a run be typed in its row; of that which is chosen."""
+        number = self.number if number is None else number
+        for place in range(self.topLevelItemCount()):
+            item = self.topLevelItem(place)
+            if item.data(RUN, NUMBER) == number:
+                self.editItem(item, RUN)
+
+    def keyPressEvent(self, event) -> None:
+        if event.key() == Qt.Key.Key_F2:
+            self.edit_name()
+            return
+        super().keyPressEvent(event)
 
     def mousePressEvent(self, event) -> None:
         if event.button() == Qt.MouseButton.RightButton:

@@ -78,6 +78,16 @@ def remove_run(session: Session, number: int) -> Session:
     return show_run(session, rest[-1].number)
 
 
+def rename_run(session: Session, number: int, name: str) -> Session:
+    """Return the session with a run called by another name; by none if that is empty."""
+    name = " ".join(name.split())
+    run = session.run(number)
+    if run is None or run.name == name:
+        return session
+    runs = tuple(replace(one, name=name) if one is run else one for one in session.runs)
+    return replace(session, runs=runs)
+
+
 def take_settings(session: Session, number: int) -> Session:
     """Return the session with the settings of a run put back: roles, motions, method."""
     run = session.run(number)

@@ -37,7 +37,7 @@ def step_runs(session: Session) -> list[StepRun]:
         frames = (first, *run.frames)
         found.append(
             StepRun(
-                f"run {run.number}",
+                run.label,
                 np.arange(len(frames)),
                 np.array([frame.quality.min for frame in frames]),
                 np.array([frame.quality.mean for frame in frames]),
@@ -54,7 +54,7 @@ def greedy_run(session: Session) -> GreedyRun | None:
         return None
     cycles = frame.step.history
     return GreedyRun(
-        f"run {run.number}, step {frame.step.index}",
+        f"{run.label}, step {frame.step.index}",
         np.array([cycle.control_nodes for cycle in cycles]),
         np.array([cycle.error for cycle in cycles]),
         np.array([cycle.level for cycle in cycles]),
@@ -101,11 +101,10 @@ class Profiles:
     ) -> Profile:
         case, mesh = session.case, session.mesh
         assert mesh is not None
-        number = None if run is None else run.number
-        key = coordinate, case.axis, case.origin, number
+        label = "undeformed" if run is None else run.label
+        key = coordinate, case.axis, case.origin, label
         kept = self._made.setdefault(frame, {})
         if key not in kept:
-            label = "undeformed" if run is None else f"run {run.number}"
             # In layers of the undeformed mesh, so that layers of cells stay together.
             values = frame.quality.values
             if coordinate == "r":

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from slideviz.view.changes import UNDEFORMED, set_view, show_beside, show_frame, show_run
-from slideviz.view.runs_table import brief, method_words
+from slideviz.view.runs_words import brief, run_words
 from slideviz.view.state import Run, Session
 
 
-def run_title(run: Run) -> str:
-    """Return what a run is called: its number and what sets it apart."""
-    return f"Run {run.number}: {method_words(run.case)} · {brief(run)}"
+def run_title(run: Run, among: Sequence[Run] = ()) -> str:
+    """Return what a run is called: its number and what sets it apart from those of a list."""
+    return f"Run {run.number}: {run_words(run)} · {brief(run, among)}"
 
 
 def choices(session: Session) -> dict[int, str]:
     """Return what a view can show, by the number of the run, and what it is called."""
-    runs = {run.number: run_title(run) for run in session.runs if run.frames}
+    runs = {run.number: run_title(run, session.runs) for run in session.runs if run.frames}
     return {UNDEFORMED: "Undeformed mesh"} | runs
 
 

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from slideviz.staircase import Step
 
 
+LABEL = 20
+"""Letters of the name of a run that a plot has room for."""
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """The mesh after a step, with its quality; the first frame is the undeformed mesh."""
@@ -53,6 +57,8 @@ class Run:
         How it ended; empty while it goes on.
     saved : bool
         Whether the mesh of its last step was written.
+    name : str
+        What the user calls it; empty as long as nobody did.
     """
 
     number: int
@@ -60,6 +66,15 @@ class Run:
     frames: tuple[Frame, ...] = ()
     end: Literal["", "done", "cancelled", "failed"] = ""
     saved: bool = False
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """Return what it is called in a plot: its number, and the begin of its name."""
+        if not self.name:
+            return f"run {self.number}"
+        short = self.name if len(self.name) <= LABEL else f"{self.name[: LABEL - 1].rstrip()}…"
+        return f"{self.number} {short}"
 
     @property
     def last(self) -> Frame | None:

@@ -1,4 +1,4 @@
-"""The runs of a session in words and numbers, as a table for people and for a file."""
+"""The runs of a session as a table for people and for a file, and which of them is best."""
 
 from __future__ import annotations
 
@@ -8,64 +8,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
+from slideviz.view.motion_words import deformation, describe
+from slideviz.view.runs_words import (
+    PERIODIC,
+    control_nodes,
+    end_words,
+    method_words,
+    reduction_words,
+)
 from slideviz.view.state import Run
 
-SLIDING = {"none": "no sliding", "ps": "pseudo sliding", "ds": "direct sliding"}
-OTHER = {"idw": "inverse distance", "elastic": "linear elasticity"}
-PERIODIC = {
-    "none": "not periodic",
-    "periodic": "periodic distance",
-    "fixed": "periodic, fixed vertices",
-    "moving": "periodic, moving vertices",
-}
-USUAL_KERNEL = Case().kernel
-
-
-def method_words(case: Case) -> str:
-    """Return which method a case asks for, in words."""
-    return OTHER.get(case.method, SLIDING[case.sliding])
-
-
-def reduction_words(case: Case) -> str:
-    """Return how control nodes are chosen, in words."""
-    given = case.reduction
-    if given is None or case.method != "rbf":
-        return "all nodes"
-    part = f"{given.relative:g} of the extent" if given.relative else f"{given.tolerance:g}"
-    levels = ", in levels" if given.multilevel else ""
-    most = f", at most {given.max_nodes:,} nodes" if given.max_nodes else ""
-    return f"reduced to {part}{levels}{most}"
-
-
-def steps_words(run: Run) -> str:
-    """Return how many steps a run made, or has made of how many."""
-    made = len(run.frames)
-    step = run.last.step if run.last is not None else None
-    total = step.total if step is not None else run.case.steps
-    auto = ", automatic" if not run.case.steps else ""
-    if run.end == "done" or made == total:
-        return f"{made} step{'' if made == 1 else 's'}{auto}"
-    return f"{made} of {total} steps{auto}" if total else f"{made} steps{auto}"
-
-
-def seconds_words(seconds: float) -> str:
-    """Return a time, as exactly as it matters."""
-    if seconds < 100:
-        return f"{seconds:.3g} s" if seconds >= 0.1 else f"{seconds:.2f} s"
-    return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
-
-
-def end_words(run: Run) -> str:
-    """Return how a run ended, or that it goes on."""
-    return run.end or "running"
-
-
-def _control(run: Run) -> int | None:
-    step = run.last.step if run.last is not None else None
-    return step.control_nodes if step is not None else None
+DIGITS = 4
+QUALITY = f".{DIGITS}f"
+"""How qualities are written for people."""
 
 
 def _of_last(run: Run, name: str) -> float | None:
@@ -93,16 +50,18 @@ class Column:
 
 COLUMNS: tuple[Column, ...] = (
     Column("run", lambda run: run.number),
+    Column("name", lambda run: run.name or None),
+    Column("motion", lambda run: "; ".join(map(describe, run.case.motions)) or None),
     Column("method", lambda run: method_words(run.case)),
     Column("periodicity", lambda run: PERIODIC[run.case.periodic]),
     Column("steps", lambda run: len(run.frames)),
     Column("kernel", lambda run: run.case.kernel),
     Column("support radius / extent", lambda run: run.case.influence_factor, "g"),
     Column("control nodes chosen", lambda run: reduction_words(run.case)),
-    Column("minimum quality", lambda run: _of_last(run, "min"), ".4f"),
-    Column("mean quality", lambda run: _of_last(run, "mean"), ".4f"),
+    Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY),
+    Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY),
     Column("inverted cells", lambda run: _of_last(run, "inverted"), ",d"),
-    Column("control nodes", _control, ",d"),
+    Column("control nodes", control_nodes, ",d"),
     Column("largest error at control", _error, ".3g"),
     Column("seconds", lambda run: run.seconds, ".3f"),
     Column("end", end_words),
@@ -110,37 +69,28 @@ COLUMNS: tuple[Column, ...] = (
 """What a table of runs has; qualities and control nodes are those of the last step."""
 
 
-def best(runs: Sequence[Run]) -> int | None:
-    """Return the number of the run of highest minimum quality; None for less than two."""
-    known = [run for run in runs if run.last is not None]
-    if len(known) < 2:
-        return None
-    return max(known, key=lambda run: run.last.quality.min if run.last else 0.0).number
+def best(runs: Sequence[Run]) -> frozenset[int]:
+    """Return the numbers of the runs of highest minimum quality among those of the same motion.
 
-
-def brief(run: Run) -> str:
-    """Return what sets a run apart, beside its method, in one short line."""
-    case, parts = run.case, []
-    if case.periodic != "none":
-        parts.append(
-            {"moving": "moving vertices", "fixed": "fixed vertices"}.get(case.periodic, "periodic")
-        )
-    parts.append(steps_words(run))
-    if case.kernel != USUAL_KERNEL and case.method == "rbf":
-        parts.append(case.kernel)
-    control = _control(run)
-    if control is not None:
-        parts.append(f"{control:,} nodes")
-    if run.frames:
-        parts.append(seconds_words(run.seconds))
-    if run.end != "done":
-        parts.insert(0, end_words(run))
-    return " · ".join(parts)
+    Runs of different motions cannot be compared; of runs whose minima read alike, all are best,
+    or none where all are.
+    """
+    alike: dict[object, dict[int, float]] = {}
+    for run in runs:
+        if run.last is not None:
+            group = alike.setdefault(deformation(run.case), {})
+            group[run.number] = round(run.last.quality.min, DIGITS)
+    found: set[int] = set()
+    for group in alike.values():
+        if len(set(group.values())) > 1:
+            found |= {number for number, value in group.items() if value == max(group.values())}
+    return frozenset(found)
 
 
 def described(run: Run) -> str:
     """Return all that the table says of a run, a line for each column, and what it remarks."""
-    lines = [f"{column.title}: {column.text(run)}" for column in COLUMNS]
+    told = [column for column in COLUMNS if column.title != "name" or run.name]
+    lines = [f"{column.title}: {column.text(run)}" for column in told]
     step = run.last.step if run.last is not None else None
     if step is not None and step.warnings:
         lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in step.warnings)]

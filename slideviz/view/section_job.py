@@ -11,8 +11,9 @@ from slideviz.errors import CaseError
 from slideviz.view.copies import show_passages
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layer_copies import Period, matrices
-from slideviz.view.runs_table import method_words
+from slideviz.view.runs_words import run_words
 from slideviz.view.section import Section
+from slideviz.view.section_around import surroundings
 from slideviz.view.section_cut import Cutter
 from slideviz.view.section_paint import PAINT_BY, PaintBy, paint
 from slideviz.view.section_picture import SectionStyle, require_picture_name, section_picture
@@ -60,15 +61,15 @@ def save_section(
     if by == word:
         painted = painted.within(*session.colour_range)
     around = matrices(session, Period().of(session) if session.view.copies else None)
-    pieces = show_passages(
-        Cutter.of(frame.mesh), frame.mesh.points, section, {0: np.eye(4)} | around
-    )
+    every = {0: np.eye(4)} | around
+    cutter, points = Cutter.of(frame.mesh), frame.mesh.points
+    pieces = show_passages(cutter, points, section, every)
     require_going(stopped)
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     state = state_words(session)
     style = SectionStyle(paper.size, session.view.edges, name=name, state=state, dpi=paper.dpi)
-    section_picture(pieces, section, painted, path, style)
+    section_picture(pieces, section, painted, path, style, surroundings(cutter, points, every))
     return path
 
 
@@ -78,4 +79,4 @@ def state_words(session: Session) -> str:
     if run is None or session.view.frame == 0:
         return "undeformed"
     step = min(session.view.frame, len(run.frames))
-    return f"run {run.number}, {method_words(run.case)}, step {step}"
+    return f"run {run.number}, {run_words(run)}, step {step}"

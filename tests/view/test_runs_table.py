@@ -6,22 +6,19 @@ from dataclasses import replace
 
 import pytest
 
-from slideviz.case.model import Reduction
+from slideviz.case.model import Reduction, Rotate
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.staircase import deform
 from slideviz.view import changes
-from slideviz.view.runs_table import (
-    COLUMNS,
-    best,
+from slideviz.view.motion_words import describe
+from slideviz.view.runs_table import COLUMNS, best, described, table_text, write_table
+from slideviz.view.runs_words import (
     brief,
-    described,
     method_words,
     reduction_words,
     seconds_words,
     steps_words,
-    table_text,
-    write_table,
 )
 from slideviz.view.state import Frame, Run
 
@@ -56,6 +53,7 @@ def test_the_table_has_settings_and_results_of_every_run(runs):
     found = rows(table_text(runs))
     assert [row["run"] for row in found] == ["1", "2"]
     assert [row["method"] for row in found] == ["pseudo sliding", "direct sliding"]
+    assert {row["motion"] for row in found} == {"; ".join(map(describe, runs[0].case.motions))}
     assert [row["steps"] for row in found] == ["2", "1"]
     assert found[1]["control nodes chosen"] == "reduced to 0.01"
     for row, run in zip(found, runs, strict=True):
@@ -83,7 +81,10 @@ def test_a_run_is_described_in_a_line_and_in_full(runs):
     other = replace(second, case=second.case.change(kernel="gaussian", periodic="none"))
     assert brief(other).startswith("1 step · gaussian · ")
     text = described(second)
-    assert all(f"{column.title}: " in text for column in COLUMNS)
+    assert all(f"{column.title}: " in text for column in COLUMNS if column.title != "name")
+    assert "name" not in text
+    assert "name: stiff" in described(replace(second, name="stiff"))
+    assert "motion: airfoil: rotate by -8° about its centroid; airfoil: translate by" in text
     assert f"minimum quality: {second.last.quality.min:.4f}" in text
 
 
@@ -101,9 +102,19 @@ def test_a_run_that_is_not_done_says_how_far_it_came(runs):
 
 def test_the_best_run_has_the_highest_minimum(runs):
     wanted = max(runs, key=lambda run: run.last.quality.min).number
-    assert best(runs) == best(runs[::-1]) == wanted
-    assert best(runs[:1]) is None
-    assert best([runs[0], Run(3, runs[0].case)]) is None, "one of them has no result"
+    assert best(runs) == best(runs[::-1]) == {wanted}
+    assert best(runs[:1]) == set()
+    assert best([runs[0], Run(3, runs[0].case)]) == set(), "one of them has no result"
+
+
+def test_the_best_is_one_of_the_runs_with_the_same_motion(runs):
+    turned = runs[0].case.change(motions=(Rotate("airfoil", 1.0),))
+    bad, good = sorted(runs, key=lambda run: run.last.quality.min)
+    assert best([bad, replace(good, case=turned)]) == set(), "they cannot be compared"
+    twice = [bad, good, replace(bad, number=3, case=turned), replace(good, number=4, case=turned)]
+    assert best(twice) == {good.number, 4}
+    assert best([good, replace(good, number=7)]) == set(), "neither is better"
+    assert best([bad, good, replace(good, number=7)]) == {good.number, 7}
 
 
 def test_words_of_methods_and_choices(runs):

@@ -1,0 +1,114 @@
+"""Motions in words: each in full, and those of several cases in as few as tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale, Translate
+
+
+def describe(motion: Motion) -> str:
+    """Return a motion in a few words."""
+    return f"{motion.marker or 'all moving'}: {_in_full(motion)}"
+
+
+def _in_full(motion: Motion) -> str:
+    if isinstance(motion, Translate):
+        return f"translate by {vector_words(motion.vector)}"
+    if isinstance(motion, Rotate):
+        return f"rotate by {motion.angle_deg:.5g}°" + _about(motion.point)
+    if isinstance(motion, Scale):
+        return f"scale by {_factors(motion.factors)}" + _about(motion.point)
+    if isinstance(motion, Radial):
+        return f"push radially by {_push(motion)}"
+    return f"displace as in {motion.path.name or '(no file yet)'}"
+
+
+def deformation(case: Case) -> tuple[object, ...]:
+    """Return what a case asks of the boundaries: the same for cases that can be compared."""
+    return frozenset(case.markers_with("moving")), case.motions
+
+
+def motion_labels(cases: Sequence[Case]) -> list[str]:
+    """Return for each case its motions in few words; empty texts where all have the same.
+
+    A boundary is named where several move; points, axes and folders are told where the rest
+    would read alike.
+    """
+    if len({case.motions for case in cases}) < 2:
+        return [""] * len(cases)
+    markers = {motion.marker for case in cases for motion in case.motions} - {""}
+    named = len(markers) > 1
+    labels = [_label(case, named, exact=False) for case in cases]
+    alike: dict[str, set[object]] = {}
+    for label, case in zip(labels, cases, strict=True):
+        alike.setdefault(label, set()).add(case.motions)
+    return [
+        _label(case, named, exact=True) if len(alike[label]) > 1 else label
+        for label, case in zip(labels, cases, strict=True)
+    ]
+
+
+def _label(case: Case, named: bool, exact: bool) -> str:
+    parts = []
+    for motion in case.motions:
+        words = _exactly(motion) if exact else _briefly(motion)
+        parts.append(f"{motion.marker}: {words}" if named and motion.marker else words)
+    return " + ".join(parts) or "no motion"
+
+
+def _briefly(motion: Motion) -> str:
+    """Return what a motion does, without where, in some words."""
+    if isinstance(motion, Translate):
+        moved = [at for at, value in enumerate(motion.vector) if value]
+        if len(moved) == 1:
+            return f"translate {'xyz'[moved[0]]} {motion.vector[moved[0]]:+.4g}"
+        return f"translate {vector_words(motion.vector)}"
+    if isinstance(motion, Rotate):
+        return f"rotate {motion.angle_deg:+.4g}°"
+    if isinstance(motion, Scale):
+        same = len(set(motion.factors)) == 1
+        return f"scale {_factors(motion.factors[:1] if same else motion.factors)}"
+    if isinstance(motion, Radial):
+        return f"radially {_push(motion)}"
+    return motion.path.name or "(no file yet)"
+
+
+def _exactly(motion: Motion) -> str:
+    """Return all that a motion says, with every digit."""
+    if isinstance(motion, FromFile):
+        return str(motion.path)
+    if isinstance(motion, Translate):
+        return f"translate {vector_words(motion.vector, '.15g')}"
+    if isinstance(motion, Scale):
+        return f"scale {_factors(motion.factors, '.15g')}" + _about(motion.point, ".15g")
+    if isinstance(motion, Radial):
+        by = f"× {motion.factor:.15g} {motion.distance:+.15g}"
+        return f"radially {by}" + _about(motion.point, ".15g") + _along(motion.axis)
+    turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point, ".15g")
+    return turned + _along(motion.axis)
+
+
+def vector_words(values: Sequence[float], form: str = ".4g") -> str:
+    """Return a vector in words, its numbers with four digits unless ``form`` says otherwise."""
+    return f"({', '.join(format(value, form) for value in values)})"
+
+
+def _factors(values: Sequence[float], form: str = ".4g") -> str:
+    return " × ".join(format(value, form) for value in values)
+
+
+def _push(motion: Radial) -> str:
+    parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
+    parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
+    return " and ".join(parts)
+
+
+def _about(point: object, form: str = ".4g") -> str:
+    if isinstance(point, tuple):
+        return f" about {vector_words(point, form)}"
+    return " about its centroid"
+
+
+def _along(axis: Sequence[float]) -> str:
+    return "" if tuple(axis) == (0.0, 0.0, 1.0) else f", axis {vector_words(axis, '.15g')}"

@@ -1,0 +1,146 @@
+"""What sets runs apart, in words: motions, roles, settings, names."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.motion_words import describe, motion_labels
+from slideviz.view.panes import choices
+from slideviz.view.runs_words import brief, run_words
+from slideviz.view.state import Frame, Run, Session
+
+BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
+
+
+def runs_of(*cases):
+    return tuple(Run(number, case, end="done") for number, case in enumerate(cases, 1))
+
+
+def moved(*motions):
+    return BASE.change(motions=motions)
+
+
+def words(*cases):
+    runs = runs_of(*cases)
+    return [brief(run, runs) for run in runs]
+
+
+def test_motions_are_told_where_they_differ():
+    turned, shifted = moved(Rotate("blade", 5.0)), moved(Translate("blade", (0.0, 0.05)))
+    assert words(turned, turned) == ["0 steps"] * 2
+    first, second = words(turned, shifted)
+    assert first.startswith("rotate +5° · ")
+    assert second.startswith("translate y +0.05 · ")
+
+
+@pytest.mark.parametrize(
+    ("motion", "label"),
+    [
+        (Translate("blade", (0.1, 0.05)), "translate (0.1, 0.05)"),
+        (Translate("blade", (0.0, 0.0, -2.0)), "translate z -2"),
+        (Rotate("blade", -12.5, (1.0, 2.0)), "rotate -12.5°"),
+        (Scale("blade", (1.1, 1.1)), "scale 1.1"),
+        (Scale("blade", (1.1, 1.0)), "scale 1.1 × 1"),
+        (Radial("blade", 1.03), "radially +3 %"),
+        (Radial("blade", 1.0, -0.2), "radially -0.2"),
+        (FromFile(Path("/far/away/shape.txt"), "blade"), "shape.txt"),
+    ],
+)
+def test_a_motion_in_few_words(motion, label):
+    assert motion_labels([BASE, moved(motion)]) == ["rotate +5°", label]
+
+
+def test_several_motions_are_told_in_their_order():
+    both = moved(Rotate("blade", 5.0), Translate("blade", (0.0, 0.05)))
+    assert motion_labels([both, BASE])[0] == "rotate +5° + translate y +0.05"
+    assert motion_labels([both, moved()])[1] == "no motion"
+
+
+def test_the_boundary_is_named_where_several_move():
+    two = moved(Rotate("blade", 5.0), Translate("flap", (0.0, 0.05)))
+    assert motion_labels([two, BASE]) == [
+        "blade: rotate +5° + flap: translate y +0.05",
+        "blade: rotate +5°",
+    ]
+    whole = moved(FromFile(Path("all.txt")))
+    assert motion_labels([whole, BASE]) == ["all.txt", "rotate +5°"]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (Rotate("blade", 5.0), Rotate("blade", 5.0, (0.0, 1.0))),
+        (Rotate("blade", 5.0), Rotate("blade", 5.0, "centroid", (0.0, 1.0, 0.0))),
+        (Rotate("blade", 5.0), Rotate("blade", 5.000001)),
+        (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0), (0.5, 0.0))),
+        (Scale("blade", (2.0, 2.0)), Scale("blade", (2.0, 2.0000001))),
+        (Radial("blade", 1.03), Radial("blade", 1.03, 0.0, (1.0, 0.0, 0.0))),
+        (Radial("blade", 1.03), Radial("blade", 1.0300001)),
+        (Translate("blade", (0.1, 0.2)), Translate("blade", (0.1, 0.2000001))),
+        (FromFile(Path("a/shape.txt")), FromFile(Path("b/shape.txt"))),
+    ],
+)
+def test_different_motions_never_read_alike(one, other):
+    labels = motion_labels([moved(one), moved(other), moved(Translate("blade", (9.0, 9.0)))])
+    assert len(set(labels)) == 3
+    assert labels[2] == "translate (9, 9)", "no more words than it takes"
+
+
+def test_roles_that_differ_are_told():
+    fixed = BASE.change(roles={"blade": "moving"})
+    assert [text.split(" · ")[0] for text in words(BASE, fixed)] == ["in sliding", "in fixed"]
+
+
+def test_settings_that_differ_come_before_what_all_have():
+    other = BASE.change(periodic="moving", influence_factor=1.5, reduction=Reduction(1e-4))
+    same = BASE.change(periodic="moving")
+    assert words(other, same)[0].startswith("radius × 1.5 · reduced to 0.0001 · moving vertices · ")
+    assert words(other, same)[1].startswith("moving vertices · "), "the usual is not told"
+    more = same.change(steps=7)
+    first, second = (text.split(" · ") for text in words(same, more))
+    assert "step" in first[0]
+    assert "step" in second[0]
+    assert first[1] == second[1] == "moving vertices"
+
+
+def test_settings_of_another_method_are_not_told():
+    elastic = BASE.change(method="elastic", kernel="gaussian", influence_factor=0.5)
+    assert "gaussian" not in words(BASE, elastic)[1]
+    assert "radius" not in words(BASE, elastic)[1]
+
+
+def test_a_run_can_have_a_name_of_its_own():
+    session = Session(runs=runs_of(BASE, BASE))
+    session = changes.rename_run(session, 2, "  stiff \n blade ")
+    plain, named = session.runs
+    assert (named.name, plain.name) == ("stiff blade", "")
+    assert (run_words(named), run_words(plain)) == ("stiff blade", "no sliding")
+    assert brief(named, session.runs).startswith("no sliding · "), "what it is, is told still"
+    assert (named.label, plain.label) == ("2 stiff blade", "run 1")
+    assert replace(named, name="a name of many letters in all").label == "2 a name of many lett…"
+    assert changes.rename_run(session, 2, "stiff blade") is session
+    assert changes.rename_run(session, 9, "nobody") is session
+    assert changes.rename_run(session, 2, "").runs[1].label == "run 2"
+
+
+def test_the_names_of_views_tell_runs_apart(square):
+    session = changes.open_mesh(Frame(square, quality(square)), None)
+    frames = (session.first,)
+    runs = (
+        Run(1, BASE, frames, "done"),
+        Run(2, moved(Rotate("blade", -5.0)), frames, "done", name="back"),
+    )
+    titles = choices(replace(session, runs=runs))
+    assert titles[1].startswith("Run 1: no sliding · rotate +5° · ")
+    assert titles[2].startswith("Run 2: back · no sliding · rotate -5° · ")
+
+
+def test_a_motion_in_full():
+    assert describe(Rotate("blade", 5.0, (1.0, 0.5))) == "blade: rotate by 5° about (1, 0.5)"
+    assert describe(Scale("blade", (2.0, 1.0))) == "blade: scale by 2 × 1 about its centroid"
+    assert describe(FromFile(Path())) == "all moving: displace as in (no file yet)"
+    assert describe(Radial("blade", 1.0, 0.0)) == "blade: push radially by +0"
