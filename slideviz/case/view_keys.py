@@ -8,6 +8,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from slideviz.case.key import VIEW, Key
 from slideviz.case.model import Case
 from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
@@ -24,8 +26,11 @@ FORMS = {"plane": 6, "cylinder": 7}
 FLAT = {"plane": "flat", "cylinder": "unrolled"}
 """What stands at the end of a section that is laid flat beside the view."""
 
-SectionText = tuple[str, tuple[float, ...], bool, bool]
-"""Form, numbers, whether whole cells are shown, and whether it is laid flat."""
+HIDDEN = "hidden"
+"""What stands at the very end of a section that is not drawn."""
+
+SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
+"""Form, numbers, and whether whole cells are shown, it is laid flat, and it is drawn."""
 
 
 def numbers(count: int, allowed: str, rising: bool = False) -> Kind:
@@ -68,34 +73,39 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
     for place, part in enumerate((p for p in text.split(";") if p.strip(" ()")), start=1):
         items = [item.text for item in list_of(part.strip())]
         form = items[0].lower() if items else ""
-        flat = items[-1].lower() == FLAT.get(form)
+        drawn = items[-1].lower() != HIDDEN if items else True
+        if not drawn:
+            items.pop()
+        flat = bool(items) and items[-1].lower() == FLAT.get(form)
         if flat:
             items.pop()
         how = items[-1].lower() if items else ""
         if form not in FORMS or how not in ("whole", "cut"):
             raise CaseError(
                 f"section {place}: {shown(part.strip())} does not begin with plane or cylinder and "
-                f"end with whole or cut, and after that {FLAT.get(form, 'flat')} or nothing"
+                f"end with whole or cut, and after that {FLAT.get(form, 'flat')}, {HIDDEN} or "
+                "nothing"
             )
         values = tuple(number(item) for item in items[1:-1])
         if len(values) != FORMS[form]:
             raise CaseError(
                 f"section {place}: a {form} has {FORMS[form]} numbers, {len(values)} are given"
             )
-        if not any(values[:3] if form == "plane" else values[1:4]):
+        if not np.linalg.norm(values[:3] if form == "plane" else values[1:4]) > 0:
             raise CaseError(f"section {place}: its direction has no length")
         if form == "cylinder" and values[0] <= 0:
             raise CaseError(f"section {place}: the radius {values[0]:g} is not above 0")
-        found.append((form, values, how == "whole", flat))
+        found.append((form, values, how == "whole", flat, drawn))
     return tuple(found)
 
 
 def write_sections(sections: tuple[SectionText, ...]) -> str:
     """Return the value of ``VIEW_SECTIONS`` that ``read_sections`` reads back, without loss."""
     texts = []
-    for form, values, whole_cells, flat in sections:
-        words = (form, *(repr(float(v)) for v in values), "whole" if whole_cells else "cut")
-        texts.append(f"({', '.join((*words, FLAT[form]) if flat else words)})")
+    for form, values, whole_cells, flat, drawn in sections:
+        words = [form, *(repr(float(v)) for v in values), "whole" if whole_cells else "cut"]
+        words += [FLAT[form]] * flat + [HIDDEN] * (not drawn)
+        texts.append(f"({', '.join(words)})")
     return " ; ".join(texts) or "( )"
 
 
@@ -107,6 +117,7 @@ SECTIONS = Kind(
         "(plane, nx, ny, nz, x, y, z, whole | cut): normal and a point",
         "(cylinder, r, ax, ay, az, x, y, z, whole | cut): radius, axis and a point on it",
         "after that flat (plane) or unrolled (cylinder): laid flat beside the view",
+        "at the very end hidden: kept, but not drawn",
     ),
 )
 

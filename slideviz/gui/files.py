@@ -158,9 +158,20 @@ class Files(QObject):
             if not others:
                 return f"Run {session.shown} goes on. Lose its steps?"
             return f"{self._question(others, before)}\nRun {session.shown} goes on. {lost}"
-        if "case" in unsaved and session.deformed is not None and not session.outdated:
-            text += f"\nThe case repeats run {session.shown} exactly."
-        return text
+        more = []
+        shown = session.run_shown
+        if "case" in unsaved and shown and shown.end == "done" and not session.outdated:
+            more.append(f"The case repeats run {shown.number} exactly.")
+        others = [
+            str(r.number) for r in session.runs if r.frames and not r.saved and r is not shown
+        ]
+        if others:
+            several = len(others) > 1
+            more.append(
+                f"The mesh{'es' * several} of run{'s' * several} {', '.join(others)} "
+                f"{'are' if several else 'is'} not saved either."
+            )
+        return "\n".join([text, " ".join(more)]) if more else text
 
     # Save ------------------------------------------------------------------------------
 

@@ -90,10 +90,17 @@ def _plain(view: ViewState) -> dict[str, Any]:
 def _text(section: Section) -> SectionText:
     radius = (section.radius,) if section.kind == "cylinder" else ()
     numbers = (*radius, *section.direction, *section.origin)
-    return section.kind, tuple(float(n) for n in numbers), section.whole, section.flat
+    return (
+        section.kind,
+        tuple(float(n) for n in numbers),
+        section.whole,
+        section.flat,
+        section.shown,
+    )
 
 
 def _section(text: SectionText) -> Section:
-    kind, numbers, whole, flat = text
+    kind, numbers, whole, flat, shown = text
     radius, rest = (numbers[0], numbers[1:]) if kind == "cylinder" else (0.0, numbers)
-    return Section(kind, rest[3:], rest[:3], radius, whole, flat=flat)  # type: ignore[arg-type]
+    origin, direction = rest[3:], rest[:3]
+    return Section(kind, origin, direction, radius, whole, shown=shown, flat=flat)  # type: ignore[arg-type]

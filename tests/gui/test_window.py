@@ -878,6 +878,32 @@ def test_the_question_promises_the_same_result_only_where_that_is_true(ready, an
     assert asked[-1][:2] == (question, ["case"])
 
 
+def test_the_question_names_other_runs_whose_mesh_would_be_lost(ready, answers):
+    asked = answers("ask_unsaved", "cancel")
+    run(ready, 1)
+    run(ready, 2)
+    ready.window.close()
+    assert asked[-1][0].endswith("The mesh of run 1 is not saved either.")
+    ready.window.store.change(changes.show_run, 1)
+    ready.window.store.change(changes.saved_mesh)
+    ready.window.store.change(changes.show_run, 2)
+    ready.window.close()
+    assert "either" not in asked[-1][0]
+
+
+def test_a_run_that_was_cancelled_is_not_what_the_case_gives(ready, answers):
+    asked = answers("ask_unsaved", "cancel")
+    ready.window.store.change(changes.set_case, sliding="ds")
+    run(ready, 1)
+    ready.window.close()
+    assert "repeats run 1 exactly" in asked[-1][0]
+    only = ready.session.runs[0]
+    stopped = replace(only, end="cancelled")
+    ready.window.store.change(lambda session: replace(session, runs=(stopped,)))
+    ready.window.close()
+    assert "repeats" not in asked[-1][0]
+
+
 def test_nothing_is_asked_when_nothing_changed(opened):
     assert opened.window.close()
 

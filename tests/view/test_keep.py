@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,10 +17,16 @@ from slideviz.view.state import COLOUR_BY, POINTS, ViewState
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)
-direction = triple.filter(any)
+direction = triple.filter(lambda v: np.linalg.norm(v) > 0)
 sections = st.one_of(
     st.builds(
-        Section, st.just("plane"), triple, direction, whole=st.booleans(), flat=st.booleans()
+        Section,
+        st.just("plane"),
+        triple,
+        direction,
+        whole=st.booleans(),
+        flat=st.booleans(),
+        shown=st.booleans(),
     ),
     st.builds(
         Section,
@@ -29,6 +36,7 @@ sections = st.one_of(
         st.floats(1e-3, 1e3),
         st.booleans(),
         flat=st.booleans(),
+        shown=st.booleans(),
     ),
 )
 rising = st.none() | st.tuples(st.floats(-5, 0.4), st.floats(0.5, 5))
@@ -77,13 +85,16 @@ def test_hidden_boundaries_of_another_mesh_are_passed_by():
 def test_sections_are_read_as_written():
     text = "(plane, 0, 0, 1, 0, 0, 0.5, whole) ; (cylinder, 0.25, 0, 0, 1, 0, 0, 0, cut)"
     text += "; (cylinder, 0.25, 0, 0, 1, 0, 0, 0, cut, unrolled)"
-    text += "; (plane, 0, 0, 1, 0, 0, 0.5, cut, flat)"
+    text += "; (plane, 0, 0, 1, 0, 0, 0.5, cut, flat) ; (plane, 1, 0, 0, 0, 0, 0, cut, hidden)"
+    text += "; (plane, 1, 0, 0, 0, 0, 0, whole, flat, hidden)"
     found = read_sections(text)
     assert found == (
-        ("plane", (0.0, 0.0, 1.0, 0.0, 0.0, 0.5), True, False),
-        ("cylinder", (0.25, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), False, False),
-        ("cylinder", (0.25, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), False, True),
-        ("plane", (0.0, 0.0, 1.0, 0.0, 0.0, 0.5), False, True),
+        ("plane", (0.0, 0.0, 1.0, 0.0, 0.0, 0.5), True, False, True),
+        ("cylinder", (0.25, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), False, False, True),
+        ("cylinder", (0.25, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), False, True, True),
+        ("plane", (0.0, 0.0, 1.0, 0.0, 0.0, 0.5), False, True, True),
+        ("plane", (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, False, False),
+        ("plane", (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), True, True, False),
     )
     assert read_sections(write_sections(found)) == found
     assert read_sections(write_sections(())) == ()
@@ -93,7 +104,11 @@ def test_sections_are_read_as_written():
     ("key", "value", "message"),
     [
         ("VIEW_SECTIONS", "(sphere, 1, cut)", "does not begin with plane or cylinder"),
-        ("VIEW_SECTIONS", "(plane, 1, 0, 0, 0, 0, 0, cut, unrolled)", "after that flat or nothing"),
+        (
+            "VIEW_SECTIONS",
+            "(plane, 1, 0, 0, 0, 0, 0, cut, unrolled)",
+            "after that flat, hidden or nothing",
+        ),
         ("VIEW_SECTIONS", "(plane, 1, 0, 0, cut)", "a plane has 6 numbers, 3 are given"),
         ("VIEW_SECTIONS", "(plane, 0, 0, 0, 1, 1, 1, cut)", "its direction has no length"),
         ("VIEW_SECTIONS", "(cylinder, 0, 0, 0, 1, 0, 0, 0, cut)", "the radius 0 is not above 0"),
