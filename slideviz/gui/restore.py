@@ -60,9 +60,10 @@ class Restore(QObject):
             return
         found = self.waiting[0]
         more = len(self.waiting) - 1
+        name = found.case.mesh_file.name if found.source is None else found.source.name
         text = (
             f"slideviz did not end properly. Restore the session of {_time_text(found.when)} "
-            f"with {found.case.mesh_file.name}?" + (f" ({more} more)" if more else "")
+            f"with {name}?" + (f" ({more} more)" if more else "")
         )
         answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
         self.banner.ask(text, answers, self._trace, later=self._put_off)
@@ -87,7 +88,7 @@ class Restore(QObject):
         session = restored(opened.session, found.source)
         self.window.show_opened(replace(opened, session=session))
         self.autosave.replace(found)
-        self.window.say("Session restored; steps are computed again by a run")
+        self.window.say("Session restored. Runs are not kept; Run computes them again")
         log.info("restored the session of %s", _time_text(found.when))
 
 
