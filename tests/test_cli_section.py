@@ -106,11 +106,22 @@ def title_of(folder, monkeypatch, mesh, *options):
     from slideviz.view import section_picture
 
     seen = []
-    monkeypatch.setattr(section_picture, "_title", lambda *words: seen.append(words))
+    monkeypatch.setattr(section_picture, "write_title", lambda *words: seen.append(words))
     assert call(folder, mesh, "--plane", "z=0.55", *options) in (0, 3)
     ((_, _, _, second),) = seen
     monkeypatch.undo()
     return second
+
+
+def test_in_2d_a_section_is_a_line_or_a_circle(folder, capsys):
+    assert call(folder, "square.su2", "--plane", "y=0.45", "--cut", out="curve.svg") == 0
+    assert "line y = 0.45" in capsys.readouterr().out
+    code, found = report(capsys, folder, "square.su2", "--cylinder", "0.3,0,0,1,0.5,0.5,0")
+    assert code == 0
+    assert found["section"]["whole"]
+    mesh = sv.read(folder / "square.su2")
+    radii = np.hypot(*(mesh.points - 0.5).T)[mesh.cells.by_type[9][1]]
+    assert found["cells"] == ((radii.min(axis=1) < 0.3) & (radii.max(axis=1) > 0.3)).sum()
 
 
 def test_without_a_reference_line_and_picture_say_so(folder, capsys, monkeypatch):
@@ -217,7 +228,7 @@ def test_displacement_is_coloured_up_to_its_largest(folder, capsys):
         ("cube.su2", ["--plane", "1,1,0,3,0,0"], "by -2.12132 to -0.707107 it would cut it"),
         ("passage.su2", ["--cylinder", "2"], "misses the mesh, which has radii 0.5 to 1 about"),
         ("square.su2", ["--plane", "z=0"], "does not cut this 2D mesh; give a normal in x and y"),
-        ("square.su2", ["--cylinder", "0.5"], "a cylinder section needs a 3D mesh"),
+        ("square.su2", ["--cylinder", "0.5,x"], "its axis is not z, so it needs a 3D mesh"),
         ("cube.su2", ["--plane", "z=0.4", "--range", "1,0"], "the first number must be"),
         ("cube.su2", ["--plane", "z=0.4", "--copies", "wheel"], "makes no whole wheel"),
         ("none.su2", ["--plane", "z=0.4"], "none.su2"),

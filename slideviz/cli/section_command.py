@@ -23,6 +23,7 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.errors import CaseError
     from slideviz.view.copies import show_passages
     from slideviz.view.polygons import joined
+    from slideviz.view.section_around import surroundings
     from slideviz.view.section_cut import Cutter
     from slideviz.view.section_paint import paint
     from slideviz.view.section_picture import SectionStyle, require_picture_name, section_picture
@@ -43,7 +44,7 @@ def section(arguments: argparse.Namespace) -> int:
     ids = pieces[0].cell_ids if len(pieces[0]) else joined(list(pieces.values())).cell_ids
     if not len(ids):
         why = _miss(mesh.points[cutter.used], chosen)
-        raise CaseError(f"{mesh.name}: the {chosen.describe()} {why}")
+        raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
     if arguments.range:
         painted = painted.within(*arguments.range)
     elif painted.label == "displacement":
@@ -51,7 +52,8 @@ def section(arguments: argparse.Namespace) -> int:
     name = Path(mesh.name).name
     note = "" if base is not None or painted.label == "skew" else NONE
     style = SectionStyle(arguments.size, arguments.edges, arguments.in_space, name, note=note)
-    section_picture(pieces, chosen, painted, arguments.output, style)
+    around = surroundings(cutter, mesh.points, matrices)
+    section_picture(pieces, chosen, painted, arguments.output, style, around)
     summary = painted.summary(ids)
     report: dict[str, Any] = {
         "mesh": mesh.name,
@@ -64,7 +66,7 @@ def section(arguments: argparse.Namespace) -> int:
     if text is not None:
         print(text, end="")
     else:
-        print(f"{name}: {chosen.describe()}")
+        print(f"{name}: {chosen.describe(mesh.dim)}")
         print(f"  {painted.sentence(ids)}, worst is cell {summary['worst_cell']}")
         if note or known:
             print(f"  {words_of(known)}")

@@ -25,6 +25,7 @@ CYLINDER_HELP = (
     "radius, then the axis: x, y, z, or its direction ax,ay,az, or direction and a point on it "
     "ax,ay,az,cx,cy,cz; without axis that of the rotational period, else z"
 )
+CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
 EXAMPLES = """\
 examples:
   slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
@@ -65,7 +66,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add("--map", choices=MAPS, default="viridis", help="colour map (default: viridis)")
     cells = section.add_mutually_exclusive_group()
     cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
-    cells.add_argument("--cut", action="store_false", dest="whole", help="cut them (default in 3D)")
+    cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
     view = section.add_mutually_exclusive_group()
     view.add_argument(
         "--unrolled", action="store_true", help="cylinder laid flat to (z, r theta), the default"

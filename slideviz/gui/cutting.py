@@ -9,9 +9,9 @@ import numpy as np
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QSplitter
 
+from slideviz.gui.flats import Flats, beside
 from slideviz.gui.handle import PlaneHandle
 from slideviz.gui.handle_flat import FlatHandle
-from slideviz.gui.unrolled import FlatView
 from slideviz.gui.viewing import Viewing
 from slideviz.view import changes
 from slideviz.view.cuts import can_cut
@@ -32,7 +32,7 @@ class Cutting(QSplitter):
         The place of the section in the list of the view.
     wants_handle : bool
         Whether the chosen section gets a handle, if it is a plane, or in 2D.
-    handle, flat
+    handle, flats
         Both, None while nobody wants them.
     look : Look
         Their colours.
@@ -49,7 +49,8 @@ class Cutting(QSplitter):
         self.chosen: int | None = None
         self.wants_handle = False
         self.handle: PlaneHandle | FlatHandle | None = None
-        self.flat: FlatView | None = None
+        self.flats: Flats | None = None
+        self._compared = False
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
 
@@ -62,6 +63,11 @@ class Cutting(QSplitter):
         if self.chosen is None or self.chosen >= len(sections):
             return None
         return sections[self.chosen]
+
+    @property
+    def flat(self):
+        """Return the flat view of the first view, if there is one; of a 2D mesh the curve."""
+        return None if self.flats is None else self.flats.first
 
     @property
     def is_flat(self) -> bool:
@@ -100,12 +106,14 @@ class Cutting(QSplitter):
 
     def _session_changed(self, old: Session, new: Session) -> None:
         if old.mesh is not new.mesh:
+            # What a 3D mesh needs is of another kind than what a 2D one does.
+            self._drop_flats()
             flat = flat_one(new.view.sections)
             self.chosen = flat if flat is not None else 0 if new.view.sections else None
             self.wants_handle = False
         elif old.view.sections != new.view.sections:
             self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
-        elif self.flat is None and self.handle is None:
+        elif self.flats is None and self.handle is None:
             return
         self._sync()
 
@@ -165,50 +173,55 @@ class Cutting(QSplitter):
         at = flat_one(session.view.sections)
         section = session.view.sections[at] if at is not None else None
         if section is None or session.frame is None or not can_cut(session.mesh, section):
-            self._drop_flat()
+            self._drop_flats()
             return
-        if self.flat is None:
-            self._make_flat()
-        self.flat.show_section(session, section)
+        made = self.flats is None
+        if self.flats is None:
+            self.flats = Flats(self.viewing, self.look, self._multi_samples)
+            self.flats.closed.connect(lambda: self.want_flat(False))
+        compared = beside(session) is not None
+        if made or compared != self._compared:
+            self._compared = compared
+            self._arrange(self.flats)
+        self.flats.show_section(session, section)
 
-    def _make_flat(self) -> None:
-        scene = self.viewing.scene
-        wide = self.width() >= BESIDE_PX
+    def _arrange(self, flats: Flats) -> None:
+        """Put the flat view beside the view where there is room; below two, and so a curve."""
+        whole, mesh = self.viewing.scene.sees_all(), self.store.session.mesh
+        solid = mesh is not None and mesh.dim == 3
+        wide = self.width() >= BESIDE_PX and solid and not self._compared
         self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
-        whole = scene.sees_all()
-        self.flat = FlatView(self.store, scene.sections.cuts, self.look, self._multi_samples)
-        self.flat.closed.connect(lambda: self.want_flat(False))
-        self.addWidget(self.flat)
+        if self.indexOf(flats) < 0:
+            self.addWidget(flats)
         size = self.width() if wide else self.height()
         self.setSizes([size * 11 // 20, size * 9 // 20])
-        self.flat.view.spare_software()
         if whole:
             self.viewing.fit()
 
-    def _drop_flat(self) -> None:
-        flat, self.flat = self.flat, None
-        if flat is None:
+    def _drop_flats(self) -> None:
+        flats, self.flats = self.flats, None
+        if flats is None:
             return
         whole = self.viewing.scene.sees_all()
-        flat.close_view()
-        flat.setParent(None)
-        flat.deleteLater()
+        flats.close_views()
+        flats.setParent(None)
+        flats.deleteLater()
         if whole:
             self.viewing.fit()
 
     def set_look(self, look) -> None:
         """Take other colours."""
         self.look = look
-        if self.flat is not None:
-            self.flat.set_look(look)
+        if self.flats is not None:
+            self.flats.set_look(look)
         self._sync()
 
     def close_views(self) -> None:
         """Give the graphics back, before those of the 3D view."""
         self._drop_handle()
-        if self.flat is not None:
-            self.flat.close_view()
-            self.flat = None
+        if self.flats is not None:
+            self.flats.close_views()
+            self.flats = None
         self.wants_handle = False
 
 

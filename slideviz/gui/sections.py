@@ -210,11 +210,12 @@ class SectionsPanel(QWidget):
         )
         self.handle.setEnabled(chosen is not None and chosen.shown)
         self.handle.setChecked(self.cutting.wants_handle)
-        self.flat.setText("Flat view" if plane else "Unrolled")
+        self.flat.setText("Curve" if flat else "Flat view" if plane else "Unrolled")
         self.flat.setChecked(self.cutting.is_flat)
-        self.flat.setVisible(not flat)
         self.flat.setToolTip(
-            "Show the section along its normal beside the 3D view."
+            "Show the quality of the cells along the section beside the view."
+            if flat
+            else "Show the section along its normal beside the 3D view."
             if plane
             else "Show the cylinder unrolled to axis and r θ beside the 3D view."
         )

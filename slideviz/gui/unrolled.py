@@ -55,6 +55,7 @@ class FlatView(QWidget):
         self.view.set_flat(True)
         self.scene = FlatScene(self.view, cuts, look)
         self.across, self.upright = Ruler(False), Ruler(True)
+        self._partner: FlatView | None = None
         self._fitted: tuple[object, ...] = ()
         self._ranges: tuple[object, ...] = ()
         self._place()
@@ -85,14 +86,20 @@ class FlatView(QWidget):
         self._refit.timeout.connect(self.fit)
         CellHover(self.view, self.scene, store)
         # The camera moves by the mouse too: the rulers follow whatever moves it.
-        self._watching = self.view.camera.AddObserver(
-            "ModifiedEvent", lambda *_: self._sync_rulers()
-        )
+        self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
 
-    def show_section(self, session: Session, section: Section) -> None:
+    def link(self, other: FlatView | None) -> None:
+        """Show from now on what another view shows of its section, and it what this one does."""
+        for one, partner in ((self._partner, None), (self, other), (other, self)):
+            if one is not None:
+                one._partner = partner
+                one.scene.beside = partner.scene if partner is not None else None
+
+    def show_section(self, session: Session, section: Section, called: str = "") -> None:
         """Show a section of the frame that is shown; another one fills the view."""
         self.scene.update(session, section)
-        self.title.set_text(section.describe())
+        words = section.describe()
+        self.title.set_text(f"{called}: {words}" if called else words)
         self.facts.setText(self.scene.summary)
         self.facts.setToolTip(self.scene.summary)
         kind = (session.mesh, section.kind, section.direction, session.view.copies)
@@ -111,9 +118,25 @@ class FlatView(QWidget):
         self._sync_rulers()
         self.view.render()
 
+    def refit(self) -> None:
+        """Make the section fill the view, where nobody has chosen a detail."""
+        if self.scene.ranges() == self._ranges:
+            self.fit()
+
     def _fit(self) -> None:
         self.scene.fit()
-        self._ranges = self.scene.ranges()
+        for one in (self, self._partner):
+            if one is not None:
+                one._ranges = one.scene.ranges()
+
+    def _looked(self) -> None:
+        """Follow the camera, whatever moves it."""
+        self._sync_rulers()
+        partner = self._partner
+        # Drawing moves the near and far planes, which is no movement.
+        if partner is not None and not partner.scene.looks_like(self.scene):
+            partner.scene.take_camera(self.scene)
+            partner.view.render_soon()
 
     def set_look(self, look: Look) -> None:
         """Take other colours."""

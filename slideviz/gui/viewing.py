@@ -10,6 +10,7 @@ from slideviz.gui.boundaries import boundary_menu
 from slideviz.gui.canvas import View3D
 from slideviz.gui.hover import CellHover
 from slideviz.view import changes, jobs
+from slideviz.view.cuts import Cuts
 from slideviz.view.ghosts import Ghosts
 from slideviz.view.look import Look
 from slideviz.view.panes import choices, close_pane, panes
@@ -47,6 +48,8 @@ class Viewing(QWidget):
         self._connect(self.view, self.scene)
         self.second: View3D | None = None
         self.second_scene: Scene | None = None
+        # For whoever shows the same beside it.
+        self.second_cuts = Cuts()
         self._before: tuple[float, ...] | None = None
         self._link: CameraLink | None = None
 
@@ -84,6 +87,7 @@ class Viewing(QWidget):
         self._place(session.view.swapped)
         self.second.setVisible(True)
         self.second_scene = Scene(self.second, self.scene.look)
+        self.second_scene.sections.cuts = self.second_cuts
         self._connect(self.second, self.second_scene)
         self.second.spare_software()
         self.second.set_flat(session.mesh.dim == 2)

@@ -47,11 +47,14 @@ class FlatScene:
         Its cells, flat.
     session : Session
         The state that is shown.
+    beside : FlatScene or None
+        Another scene with the same camera: both are seen whole.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, look: Look = LIGHT) -> None:
         self.stage = Stage(plotter, look)
         self.cuts = cuts
+        self.beside: FlatScene | None = None
         self.section: Section | None = None
         self.polygons: Polygons | None = None
         self._shown = PolygonActor(self.stage, "flat")
@@ -174,10 +177,12 @@ class FlatScene:
 
     def fit(self) -> None:
         """Make everything fill the view."""
-        found = self.bounds()
-        if found is None:
+        scenes = [self] if self.beside is None else [self, self.beside]
+        found = [box for box in (scene.bounds() for scene in scenes) if box is not None]
+        if not found:
             return
-        low, high = found
+        low = np.min([box[0] for box in found], axis=0)
+        high = np.max([box[1] for box in found], axis=0)
         width, height = self.stage.plotter.window_size
         extent = np.maximum(high - low, 1e-300)
         half = max(extent[1], extent[0] * height / max(width, 1)) / 2.0 / FILL
@@ -190,6 +195,20 @@ class FlatScene:
         camera.parallel_projection = True
         camera.parallel_scale = half
         self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def take_camera(self, other: FlatScene) -> None:
+        """Look at what another scene looks at."""
+        camera, theirs = self.stage.plotter.camera, other.stage.plotter.camera
+        camera.parallel_projection = True
+        camera.focal_point, camera.position = theirs.focal_point, theirs.position
+        camera.up, camera.parallel_scale = theirs.up, theirs.parallel_scale
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def looks_like(self, other: FlatScene) -> bool:
+        """Tell whether another scene looks at the same."""
+        cameras = (self.stage.plotter.camera, other.stage.plotter.camera)
+        one, two = ((*c.focal_point, *c.position, *c.up, c.parallel_scale) for c in cameras)
+        return one == two
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
         """Enlarge by ``factor``; the pixel (x, y) from the lower left keeps what it shows."""

@@ -100,6 +100,10 @@ class Cutter:
         """Return the surface of the cells that the section cuts, whole; in 2D the cells."""
         return self.surface(points, self.which_cells(points, section))
 
+    def all_cells(self, points: FloatArray) -> Polygons:
+        """Return the surface of all cells; in 2D the cells."""
+        return self.surface(points, np.concatenate([block.ids for block in self._blocks]))
+
     def show(self, points: FloatArray, section: Section) -> Polygons:
         """Return the cut cells, whole or cut as the section says."""
         return (self.crinkle if section.whole else self.cut)(points, section)

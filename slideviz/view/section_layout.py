@@ -114,6 +114,20 @@ def lay_out(
     )
 
 
+def room_ratio(inches: tuple[float, float]) -> float:
+    """Return width by height of what is left for axes beside an upright colour bar."""
+    width, height = inches
+    return max(width - _LEFT - _BESIDE, 0.1) / max(height - _BOTTOM - _TOP, 0.1)
+
+
+def plot_layout(inches: tuple[float, float]) -> Layout:
+    """Return the layout of a plot, whose axes have no common scale, without a colour bar."""
+    width, height = inches
+    size = (max(width - _LEFT - 2 * _RIGHT, 0.1), max(height - _BOTTOM - _TOP, 0.1))
+    box = _parts((_LEFT, _BOTTOM, *size), inches)
+    return Layout(np.zeros(2), np.ones(2), box, box, size, upright_bar=True)
+
+
 def _aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the box with a margin, and not thinner than one part in ``_THIN``."""
     size = high - low

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -13,17 +13,21 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray
+from slideviz.view.legend import UNITS
 from slideviz.view.look import INVERTED_COLOUR, PAPER
+from slideviz.view.plots_style import PRINT
 from slideviz.view.polygons import Polygons, joined
 from slideviz.view.section import Section
-from slideviz.view.section_layout import Layout, inches_of, lay_out
+from slideviz.view.section_around import draw_around, window
+from slideviz.view.section_curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.view.section_layout import Layout, inches_of, lay_out, plot_layout, room_ratio
 from slideviz.view.section_paint import Paint
 from slideviz.view.section_shapes import colours_of, shapes_of
 from slideviz.view.section_space import in_space
+from slideviz.view.section_title import LETTERS, write_title
 from slideviz.view.unroll import Label, flat_labels, flatten, middle_angle
 
 SUFFIXES = (".png", ".svg", ".pdf")
-_TITLE, _LETTERS = 10.0, 9.0
 _LETTER_WIDTH = 0.075
 """Inches that a letter of a label takes."""
 
@@ -77,8 +81,9 @@ def section_picture(
     paint: Paint,
     file: str | Path,
     style: SectionStyle | None = None,
+    around: Polygons | None = None,
 ) -> None:
-    """Write the picture of a section.
+    """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
 
     Parameters
     ----------
@@ -91,6 +96,8 @@ def section_picture(
     file : str or Path
         Ends with .png, .svg or .pdf.
     style : SectionStyle, optional
+    around : Polygons, optional
+        The other cells of a 2D mesh (see `slideviz.view.section_around.surroundings`).
 
     Raises
     ------
@@ -101,7 +108,7 @@ def section_picture(
 
     target, style = Path(file), style or SectionStyle()
     require_picture_name(target)
-    figure, dpi = draw_section(pieces, section, paint, style)
+    figure, dpi = draw_section(pieces, section, paint, style, around)
     data = BytesIO()
     kind = target.suffix.lower()[1:]
     # Without the date, and with names that are not random, the same section gives the same file.
@@ -113,7 +120,11 @@ def section_picture(
 
 
 def draw_section(
-    pieces: Mapping[int, Polygons], section: Section, paint: Paint, style: SectionStyle
+    pieces: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    style: SectionStyle,
+    around: Polygons | None = None,
 ) -> tuple[Any, float]:
     """Return the matplotlib figure of a section, and its pixels per inch.
 
@@ -128,29 +139,64 @@ def draw_section(
     drawn = {number: piece for number, piece in pieces.items() if len(piece)}
     if not drawn:
         raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
+    width, height, dpi = inches_of(style.size, style.dpi)
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    lines = all(piece.sizes.max() == 2 for piece in drawn.values())
+    if lines:
+        layout = _curve(figure, joined(list(drawn.values())), section, paint)
+    else:
+        layout = _cells(figure, drawn, section, paint, style, around)
+    every = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
+    ids = drawn[0].cell_ids if 0 in drawn else every
+    in_plane = not any(piece.points[:, 2].any() for piece in drawn.values())
+    what = section.describe(2 if in_plane else 3)
+    words = ", ".join(part for part in (style.state, what) if part)
+    numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
+    write_title(figure, layout, (style.name, words), numbers)
+    return figure, dpi
+
+
+def _cells(
+    figure: Any,
+    drawn: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    style: SectionStyle,
+    around: Polygons | None,
+) -> Layout:
+    """Draw polygons, with a colour bar."""
     flat, labels = _flat(drawn, section, style)
     if not section.whole:
         # Nothing is in front of another, but folded cells overlap: show them.
         flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
     corners = flat.points[flat.connectivity, :2]
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    width, height, dpi = inches_of(style.size, style.dpi)
-    layout = lay_out((low, high), (width, height), bare=style.in_space)
-    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    FigureCanvasAgg(figure)
+    box, inches = (corners.min(axis=0), corners.max(axis=0)), figure.get_size_inches()
+    if around is not None:
+        box = window(box, around, room_ratio(inches))
+    layout = lay_out(box, inches, bare=style.in_space)
     axes = figure.add_axes(layout.axes)
+    if around is not None:
+        draw_around(axes, around, section, (layout.low, layout.high))
     shapes = shapes_of(flat, paint, layout.points_per_length, style.edges, lit=style.in_space)
     axes.add_collection(shapes)
     _dress(axes, layout, labels)
     if style.in_space:
         _triad(figure, drawn, section)
-    all_ids = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
-    ids = drawn[0].cell_ids if 0 in drawn else all_ids
-    _bar(figure, layout, paint, bool(paint.inverted[all_ids].any()))
-    words = ", ".join(part for part in (style.state, section.describe()) if part)
-    numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
-    _title(figure, layout, (style.name, words), numbers)
-    return figure, dpi
+    inverted = any(paint.inverted[piece.cells].any() for piece in drawn.values())
+    _bar(figure, layout, paint, inverted)
+    return layout
+
+
+def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layout:
+    """Draw the numbers along a line or circle."""
+    layout = plot_layout(figure.get_size_inches())
+    curve = curve_of(lines, section, paint.values, paint.inverted)
+    labels = position_label(section).full, f"{paint.label} {UNITS.get(paint.label, '[-]')}"
+    colours = Colours(paint.colour_map, paint.limits)
+    style = replace(PRINT, size=LETTERS)
+    draw_curves(figure.add_axes(layout.axes), [CurveRow("", curve)], labels, style, colours)
+    return layout
 
 
 def _flat(
@@ -193,8 +239,8 @@ def _dress(axes: Any, layout: Layout, labels: tuple[Label, Label] | None) -> Non
         (axes.set_xlabel, axes.set_ylabel), labels, layout.inches, strict=True
     ):
         fits = len(label.full) * _LETTER_WIDTH <= inches
-        put(label.full if fits else label.short, fontsize=_LETTERS)
-    axes.tick_params(labelsize=_LETTERS - 1, width=0.6, length=3)
+        put(label.full if fits else label.short, fontsize=LETTERS)
+    axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
     room = (layout.inches[0] / 0.65, layout.inches[1] / 0.4)
     for axis, bins in zip((axes.xaxis, axes.yaxis), room, strict=True):
         number = int(np.clip(bins, 2, 9))
@@ -216,7 +262,7 @@ def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> Non
         # An axis that points at the eye has no length, but its letter needs room all the same.
         beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
         at = (tip + 0.12 * beside) / size
-        figure.text(at[0], at[1], word, fontsize=_LETTERS, ha="center", va="center")
+        figure.text(at[0], at[1], word, fontsize=LETTERS, ha="center", va="center")
 
 
 def _line(ends: FloatArray) -> Any:
@@ -232,8 +278,8 @@ def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
     axes = figure.add_axes(layout.bar)
     direction = "vertical" if layout.upright_bar else "horizontal"
     bar = figure.colorbar(colours_of(paint), cax=axes, orientation=direction)
-    bar.set_label(paint.label, fontsize=_LETTERS)
-    bar.ax.tick_params(labelsize=_LETTERS - 1, width=0.6, length=3)
+    bar.set_label(paint.label, fontsize=LETTERS)
+    bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
     bar.outline.set_linewidth(0.6)
     bar.solids.set_rasterized(False)
     bar.solids.set_edgecolor("face")
@@ -256,27 +302,3 @@ def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
     figure.text(
         at[0], at[1] + side / height / 2, "inverted", fontsize=8, ha="left", va="center_baseline"
     )
-
-
-def _title(figure: Any, layout: Layout, first: tuple[str, str], second: str) -> None:
-    """Write two lines above the axes; the name at the head of the first makes way for the rest."""
-    width, height = figure.get_size_inches()
-    renderer = figure.canvas.get_renderer()
-    top = min(layout.top + 0.16 / height, 1.0 - 0.46 / height)
-    for (name, words), above, size in ((first, 0.22, _TITLE), (("", second), 0.0, _LETTERS)):
-        text = figure.text(0.5, top + above / height, "", fontsize=size, ha="center", va="center")
-        for shown in _shorter(name):
-            text.set_text(f"{shown}: {words}" if shown else words)
-            wide = text.get_window_extent(renderer).width / ((width - 0.2) * figure.dpi)
-            if wide <= 1.0:
-                break
-        else:
-            text.set_fontsize(0.95 * size / wide)  # small letters are a little wider than that
-
-
-def _shorter(name: str) -> Iterator[str]:
-    """Yield a name with more and more of its middle left out, at last nothing."""
-    yield name
-    for kept in range(len(name) // 2 - 1, 3, -1):
-        yield f"{name[:kept]}…{name[-kept:]}"
-    yield ""

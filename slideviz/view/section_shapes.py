@@ -1,4 +1,4 @@
-"""The polygons of a section as a matplotlib collection: colours, light, and width of the lines."""
+"""The polygons of a section as a matplotlib collection: colours, light, and width of the edges."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def colours_of(paint: Paint) -> Any:
 def shapes_of(
     flat: Polygons, paint: Paint, points_per_length: float, edges: bool, lit: bool
 ) -> Any:
-    """Return polygons, or lines, as one collection.
+    """Return polygons as one collection.
 
     Parameters
     ----------
@@ -48,27 +48,23 @@ def shapes_of(
     lit : bool
         Darken what is seen at an angle.
     """
-    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.collections import PolyCollection
 
     rings = np.split(flat.points[flat.connectivity, :2], flat.offsets[1:-1])
     faces = colours_of(paint).to_rgba(paint.shown(flat.cells))
-    shapes: Any
-    if flat.sizes.max() == 2:
-        shapes = LineCollection(rings, linewidths=3.0, colors=faces)
-    else:
-        normal, size = _normals(flat), _sizes(flat)
-        if lit:
-            length = np.linalg.norm(normal, axis=1)
-            facing = np.abs(normal[:, 2]) / np.where(length > 0, length, 1.0)
-            faces[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing)[:, None]
-        thickness = np.abs(normal[:, 2]) / size * points_per_length
-        # Without mesh lines a hair of the own colour hides the gaps between neighbours.
-        shapes = PolyCollection(
-            rings,
-            facecolors=faces,
-            edgecolors=PAPER.edge if edges else faces,
-            linewidths=np.clip(_PART * thickness, _THINNEST, _THICKEST) if edges else 0.15,
-        )
+    normal, size = _normals(flat), _sizes(flat)
+    if lit:
+        length = np.linalg.norm(normal, axis=1)
+        facing = np.abs(normal[:, 2]) / np.where(length > 0, length, 1.0)
+        faces[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing)[:, None]
+    thickness = np.abs(normal[:, 2]) / size * points_per_length
+    # Without mesh lines a hair of the own colour hides the gaps between neighbours.
+    shapes = PolyCollection(
+        rings,
+        facecolors=faces,
+        edgecolors=PAPER.edge if edges else faces,
+        linewidths=np.clip(_PART * thickness, _THINNEST, _THICKEST) if edges else 0.15,
+    )
     shapes.set_joinstyle("round")
     shapes.set_rasterized(len(rings) > MANY)
     return shapes

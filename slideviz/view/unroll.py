@@ -114,7 +114,7 @@ def plane_axes(section: Section) -> Axes:
     if right[np.argmax(np.abs(right))] < 0:
         right = -right
     rows = np.stack([right, up, np.cross(right, up)])
-    return Axes(rows, (_label(right), _label(up)))
+    return Axes(rows, (direction_label(right), direction_label(up)))
 
 
 def flatten(polygons: Polygons, section: Section, near: float | None = None) -> Polygons:
@@ -133,11 +133,11 @@ def flatten(polygons: Polygons, section: Section, near: float | None = None) -> 
 def flat_labels(section: Section) -> tuple[Label, Label]:
     """Return what the first two coordinates of `flatten` are."""
     if section.kind == "cylinder":
-        return _label(section.basis[2]), Label("r θ", "r θ")
+        return direction_label(section.basis[2]), Label("r θ", "r θ")
     return plane_axes(section).labels
 
 
-def _label(direction: FloatArray) -> Label:
+def direction_label(direction: FloatArray) -> Label:
     """Return x, y or z, or the direction; in short x′, y′ or z′ by its largest component."""
     word = "xyz"[int(np.argmax(np.abs(direction)))]
     if direction.max() > 1.0 - 1e-12:

@@ -277,9 +277,103 @@ def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, pass
     assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
 
 
-@pytest.fixture
-def flat_panel(window, driver, passage_file):
+def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.flat.click()
+    window.start_run()
+    driver.settle()
+    flats = window.cutting.flats
+    assert flats.second is None
+    window.store.change(changes.show_beside, changes.UNDEFORMED)
+    driver.qtbot.waitUntil(lambda: flats.second is not None and flats.second.view.isVisible())
+    QApplication.processEvents()
+    first, second = flats.first, flats.second
+    assert first.scene.session.frame is window.store.session.frame
+    assert second.scene.session.frame is window.store.session.first
+    assert first.title.text.startswith("Run 1: plane")
+    assert second.title.text.startswith("Undeformed: plane")
+    assert first.scene.stage.table.scalar_range == second.scene.stage.table.scalar_range
+    for _ in range(5):
+        QApplication.processEvents()
+    # Both are seen whole, at one scale; what moves one camera moves the other.
+    for flat in (first, second):
+        low, high = flat.scene.bounds()
+        across, upright = flat.scene.ranges()
+        assert across[0] < low[0] < high[0] < across[1]
+        assert upright[0] < low[1] < high[1] < upright[1]
+    assert first.scene.looks_like(second.scene)
+    second.view.told.zoomed.emit(QPoint(30, 30), 2.0)
+    assert first.scene.looks_like(second.scene)
+    zoomed = first.scene.ranges()
+    drag(panel.editor.slider, 0.4)
+    assert first.scene.ranges() == second.scene.ranges() == zoomed
+    first.fit()
+    assert first.scene.looks_like(second.scene)
+    # Where the views change places, so do these.
+    assert first.x() < second.x()
+    window.store.change(changes.set_view, swapped=True)
+    driver.qtbot.waitUntil(lambda: second.x() < first.x())
+    window.store.change(changes.show_beside, None)
+    assert flats.second is None
+    assert first.title.text.startswith("plane")
+
+
+def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_panel):
+    driver.click(flat_panel.add_plane)
+    assert flat_panel.flat.text() == "Curve"
+    flat_panel.flat.click()
+    view = window.cutting.flat
+    assert [row.label for row in view.rows] == ["undeformed"]
+    before = view.facts.text()
+    assert "cells cut" in before
+    window.start_run()
+    driver.settle()
+    assert [row.label for row in view.rows] == ["undeformed", "run 1"]
+    assert view.facts.text() != before
+    driver.qtbot.waitUntil(lambda: not view.area.canvas.busy, timeout=20_000)
+    drawn = {line.get_gid() for line in view.area.canvas.figure.axes[0].get_lines()}
+    assert drawn == {"along:undeformed", "along:run 1"}
+    cell = int(view.rows[-1].curve.cells[3])
+    view.area.canvas.picked(float(view.rows[-1].curve.ends[3].mean()))
+    assert window.store.session.view.marked == cell
+    drag(flat_panel.editor.slider, 0.1)
+    assert cell not in view.rows[-1].curve.cells
+    driver.type(flat_panel.editor.number, "77")
+    assert view.rows == ()
+    assert view.area.empty
+    assert view.facts.text() == "it cuts no cell"
+    driver.click(view.title.close_button)
+    assert window.cutting.flat is None
+    assert not flat_panel.flat.isChecked()
+
+
+def test_the_curve_is_saved(window, driver, flat_panel, answers, tmp_path):
+    driver.click(flat_panel.add_cylinder)
+    flat_panel.flat.click()
+    answers("ask_save", tmp_path / "along.svg")
+    driver.click(window.cutting.flat.save_button)
+    assert b"<svg" in (tmp_path / "along.svg").read_bytes()
+
+
+def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
+    window, driver, panel, passage_file, tmp_path, answers
+):
+    driver.click(panel.add_plane)
+    panel.flat.click()
     driver.open(passage_file)
+    driver.click(panel.add_plane)
+    panel.flat.click()
+    answers("ask_save", tmp_path / "again.cfg")
+    window.actions_.by_name["save_case"].trigger()
+    assert window.cutting.flat.objectName() == "curve_view"
+    driver.open(tmp_path / "again.cfg")
+    assert window.cutting.flat.objectName() == "curve_view"
+    assert window.cutting.flat.rows
+
+
+@pytest.fixture
+def flat_panel(window, driver, sample_folder):
+    driver.open(sample_folder / "passage" / "passage.cfg")
     window.docks_.lead_to("sections")
     QApplication.processEvents()
     return window.docks_.panels["sections"]
