@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import csv
+import re
 import signal
 import subprocess
 import sys
 import time
+from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from slideviz.case.samples import write_sample
 from slideviz.cli import run
+from slideviz.errors import DeformError
 
 
 @pytest.fixture
@@ -30,7 +33,7 @@ def table(folder: Path) -> list[dict[str, str]]:
 def test_all_files_are_written_and_the_table_is_printed(square, tmp_path, capsys):
     out = tmp_path / "out"
     argv = ["compare", str(square), "--methods", "none,ps", "--steps", "1,2", "-o", str(out)]
-    assert run(argv) == 0
+    assert run([*argv, "--periodic", "all"]) == 0
     names = {path.name for path in out.iterdir()}
     assert names == {
         "compare.csv",
@@ -45,7 +48,10 @@ def test_all_files_are_written_and_the_table_is_printed(square, tmp_path, capsys
     for row in rows:
         if row["min"]:
             assert f"{float(row['min']):.6f}" in printed
-    assert printed.count("not possible: ") == 2
+    assert "14 combinations" in printed
+    assert printed.count("needs a sliding method") == 1, "said once, before the rows"
+    assert printed.index("needs a sliding method") < printed.index("max error")
+    assert "not possible" not in printed
     assert str(out / "quality_02_steps.png") in printed
 
 
@@ -112,6 +118,50 @@ def test_when_nothing_can_be_computed_the_code_says_so(square, tmp_path, capsys)
     assert run(argv) == 1
     assert "no combination could be computed" in capsys.readouterr().err
     assert [row["problem"] != "" for row in table(out)] == [True] * 3
+
+
+def test_what_fails_later_has_a_line_and_the_reason_once(square, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--methods", "ps", "--periodic", "none", "--steps", "1,2"]
+
+    def through(case, mesh):
+        raise DeformError("the motion puts BLOCK through RIGHT")
+
+    monkeypatch.setattr("slideviz.view.compare.make_plan", through)
+    assert run([*argv, "-o", str(out), "--no-pictures"]) == 1
+    printed = capsys.readouterr().out
+    assert "2 combinations" in printed
+    assert printed.count("not possible [1]") == 2
+    assert printed.count("not possible [1]: ") == 1
+
+
+def test_by_itself_it_takes_the_modes_of_the_case(square, tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["compare", str(square), "--steps", "1", "-o", str(out), "--no-pictures"]
+    assert run([*argv, "--set", "PERIODIC_MODE=fixed"]) == 0
+    assert {(row["method"], row["periodic"]) for row in table(out)} == {
+        *((method, "fixed") for method in ("none", "ps", "ds"))
+    }
+    assert "--periodic takes none, periodic, moving, too" in capsys.readouterr().out
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_the_bar_of_a_row_says_which_and_how_long(square, tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr("slideviz.cli.progress._EVERY", 0.0)
+    argv = ["compare", str(square), "--methods", "ps", "--periodic", "moving", "--steps", "1,3"]
+    assert run([*argv, "-o", str(tmp_path / "out"), "--no-pictures"]) == 0
+    shown = sys.stderr.getvalue()
+    assert "1 of 2: ps, moving, step 1 of 1: " in shown
+    first = re.findall(r"1 of 2: ps, moving, step 1 of 1: [a-z ]+(, about)?", shown)
+    assert set(first) == {""}, "nothing is known yet"
+    assert re.search(r"2 of 2: ps, moving, step 1 of 3: [a-z ]+, about \d+ s left", shown)
 
 
 def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_path, capsys):

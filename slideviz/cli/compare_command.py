@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
@@ -26,18 +26,21 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
     call = calls.add_parser(
         "compare",
         help=about,
-        description=f"Deform {about}. Combinations that cannot be are rows that say why.",
+        description=f"Deform {about}. It says first what it will compute, and what cannot be.",
         epilog="exit codes: 0 compared (also when cells are inverted: the table says it); 1 no "
         "combination could be computed; 130 cancelled, what was finished is in the table",
     )
     call.add_argument("case", type=Path, help="the case file (.cfg)")
     call.add_argument(
-        "--methods", metavar="LIST", help="of none,ps,ds,idw,elastic (default: none,ps,ds)"
+        "--methods",
+        metavar="LIST",
+        help="of none,ps,ds,idw,elastic, or all (default: none,ps,ds)",
     )
     call.add_argument(
         "--periodic",
         metavar="LIST",
-        help="of none,periodic,fixed,moving (default: all if the case has periodic markers)",
+        help="of none,periodic,fixed,moving, or all (default: that of the case; with moving, "
+        "fixed too, for the methods that cannot move)",
     )
     call.add_argument("--steps", metavar="LIST", help="numbers of steps, or auto (default: 1,5,20)")
     call.add_argument(
@@ -69,8 +72,9 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE
     from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
-    from slideviz.view.compare import warm
+    from slideviz.view.compare import METHODS, MODES, warm
     from slideviz.view.compare_table import terminal_head
+    from slideviz.view.compare_wanted import announcement, refused
 
     case = read_case(arguments)
     if case.mesh_file is None:
@@ -82,14 +86,18 @@ def compare(arguments: argparse.Namespace) -> int:
     except OSError as problem:
         raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
     mesh = read(case.mesh_file, zone=case.zone)
-    warm({combination.method for combination in wanted})
+    cannot = refused(case, mesh, wanted)
 
     def say(text: str) -> None:
         if not arguments.quiet:
             print(text, flush=True)
 
+    known = {"methods": tuple(METHODS), "periodic": tuple(MODES)}
+    more = {option: names for option, names in known.items() if getattr(arguments, option) is None}
+    say(f"{arguments.case}, {len(mesh.cells):,} cells: {announcement(wanted, cannot, more)}")
+    warm({one.method for one in wanted if one not in cannot})
     say(terminal_head())
-    rows, files = _computed(arguments, (case, mesh, wanted), folder, say)
+    rows, files = _computed(arguments, (case, mesh, wanted, cannot), folder, say)
     files += _drawn(arguments, case, mesh, rows, folder)
     say("\n".join(map(str, files)))
     if not any(row.result for row in rows):
@@ -107,14 +115,17 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
     """
     from slideviz.case.model import PERIODIC_MODES
     from slideviz.errors import CaseError
-    from slideviz.view.compare import AUTO, METHODS, combinations, wanted_methods, wanted_modes
+    from slideviz.view.compare import AUTO, METHODS
+    from slideviz.view.compare_wanted import combinations, wanted_methods, wanted_modes
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
         text = getattr(arguments, option)
         found = _items(text) if text is not None else list(usual)
+        if found == ["all"]:
+            return list(known)
         for name in found:
             if name not in known:
-                raise CaseError(f"--{option}: {name!r} is not one of {', '.join(known)}")
+                raise CaseError(f"--{option}: {name!r} is not one of {', '.join(known)} (or all)")
         if not found:
             raise CaseError(f"--{option} names none of {', '.join(known)}")
         return found
@@ -140,7 +151,7 @@ def _items(text: str) -> list[str]:
 
 def _computed(
     arguments: argparse.Namespace,
-    asked: tuple[Case, Mesh, Sequence[Combination]],
+    asked: tuple[Case, Mesh, Sequence[Combination], Mapping[Combination, str]],
     folder: Path,
     say: Callable[[str], None],
 ) -> tuple[list[Row], list[Path]]:
@@ -151,20 +162,36 @@ def _computed(
     table, histories = folder / "compare.csv", folder / "convergence.csv"
     files = [table]
     rows: list[Row] = []
-    case, mesh, wanted = asked
+    case, mesh, wanted, cannot = asked
+    told: list[str] = []
+    count = len(wanted) - len(cannot)
     bars: list[Bar] = []
     rows_one_by_one = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
     pulled = bounded(rows_one_by_one, 0 if arguments.no_pictures else KEPT_BYTES)
-    while len(rows) < len(wanted):
-        with Bar(not arguments.quiet) as bar:  # wiped away before the row is printed
+    for tried in wanted:
+        number = 1 + sum(row.combination not in cannot for row in rows)
+        head = f"{number} of {count}: {tried.method}, {tried.periodic}, "
+        # Wiped away before the row is printed.
+        with Bar(not arguments.quiet, head, _expected(rows, tried)) as bar:
             bars.append(bar)
             rows.append(next(pulled))
         save_text(table, csv_text(rows))
         if any(row.result is not None and row.result.history for row in rows):
             save_text(histories, history_text(rows))
             files = [table, histories]
-        say(terminal_line(rows[-1]))
+        if tried not in cannot:  # those were told before
+            say(terminal_line(rows[-1], told))
     return rows, files
+
+
+def _expected(rows: Sequence[Row], tried: Combination) -> float | None:
+    """Return the seconds that a combination may take, by what the same method took before."""
+    known = [row for row in rows if row.result and row.combination.method == tried.method]
+    alike = [row for row in known if row.combination.periodic == tried.periodic] or known
+    if not alike or not tried.steps:
+        return None
+    last = alike[-1].result
+    return last.seconds / last.steps * tried.steps if last else None
 
 
 def _drawn(
@@ -183,7 +210,6 @@ def _drawn(
         for steps in dict.fromkeys(row.combination.steps for row in rows):
             pictures = sheet([row for row in rows if row.combination.steps == steps], mesh)
             if pictures is not None:
-                files += save_figure(
-                    pictures, folder, f"quality_{steps_name(steps)}", DPI, (".png",), tight=True
-                )
+                name = f"quality_{steps_name(steps)}"
+                files += save_figure(pictures, folder, name, DPI, (".png",))
     return files

@@ -50,10 +50,20 @@ def compiling_told(quiet: bool) -> Iterator[None]:
 
 
 class Bar:
-    """``with Bar() as bar: deform(case, mesh, bar)``; wipes itself away at the end."""
+    """``with Bar() as bar: deform(case, mesh, bar)``; wipes itself away at the end.
 
-    def __init__(self, enabled: bool = True) -> None:
+    Parameters
+    ----------
+    enabled : bool
+    head : str
+        Stands before the words of the bar.
+    expected : float, optional
+        Seconds that all of it is likely to take, where that is known; later the steps tell.
+    """
+
+    def __init__(self, enabled: bool = True, head: str = "", expected: float | None = None) -> None:
         self.enabled = enabled and sys.stderr.isatty()
+        self._head, self._expected = head, expected
         self._next = 0.0
         self._start = time.monotonic()
 
@@ -76,12 +86,15 @@ class Bar:
             return
         self._next = now + _EVERY
         done = (progress.step - 1) / progress.total
-        left = ""
+        rest = None
         if progress.step > 1:
             rest = (now - self._start) / done * (1 - done)
-            left = f", about {rest:.0f} s left"
+        elif self._expected is not None:
+            rest = max(self._expected - (now - self._start), 0.0)
+        left = "" if rest is None else f", about {rest:.0f} s left"
         word = _PHASES.get(progress.phase, progress.phase)
-        self._draw(done, f"step {progress.step} of {progress.total}: {word}{left}")
+        steps = f"step {progress.step} of {progress.total}: {word}{left}"
+        self._draw(done, f"{self._head}{steps}")
 
     def count(self, done: int, total: int, what: str) -> None:
         """Draw the bar for ``done`` of ``total`` things."""

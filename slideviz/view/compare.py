@@ -10,12 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import PERIODIC_MODES, SLIDING, Case, PeriodicMode, Translate
+from slideviz.case.model import SLIDING, Case, PeriodicMode, Translate
 from slideviz.case.plan import Plan, make_plan
 from slideviz.case.samples import sample
 from slideviz.climb import Progress, Step
@@ -152,24 +151,6 @@ class _Shared:
     def serves(self, combination: Combination) -> bool:
         """Tell whether the combination differs in the number of steps alone."""
         return replace(combination, steps=self.first.steps) == self.first
-
-
-def combinations(
-    methods: Sequence[str], modes: Sequence[PeriodicMode], steps: Sequence[int]
-) -> tuple[Combination, ...]:
-    """Return all combinations; those that share work follow each other."""
-    return tuple(Combination(*row) for row in product(methods, modes, steps))
-
-
-def wanted_modes(case: Case) -> tuple[PeriodicMode, ...]:
-    """Return the modes worth trying: all of them if the case has periodic markers."""
-    return PERIODIC_MODES if case.markers_with("periodic") else ("none",)
-
-
-def wanted_methods(case: Case) -> tuple[str, ...]:
-    """Return the methods worth trying: those that slide, if the case has boundaries for it."""
-    slides = any(case.markers_with(role) for role in ("sliding", "periodic", "internal"))
-    return ("none", "ps", "ds") if slides else ("none",)
 
 
 def warm(methods: Iterable[str]) -> None:

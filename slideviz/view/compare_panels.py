@@ -1,7 +1,8 @@
 """Panels of a comparison: which rows are drawn together, and with which line.
 
 Where both methods and periodic modes vary, each method has a panel and each mode a line, as in
-the thesis (Figures 5.5, 5.7, 5.8); otherwise there is one panel with a line for each.
+the thesis (Figures 5.5, 5.7, 5.8), or the other way round where there are fewer modes; otherwise
+there is one panel with a line for each.
 """
 
 from __future__ import annotations
@@ -39,27 +40,25 @@ class Panel:
 
 def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
     """Return rows with a result in panels; a line has the same look in each."""
-    methods = list(dict.fromkeys(row.combination.method for row in rows))
-    modes = list(dict.fromkeys(row.combination.periodic for row in rows))
-    by_method = len(modes) == 1
+    asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
     done = [row for row in rows if row.result is not None]
-    if by_method:
-        every = [
-            Line(METHODS[row.combination.method][0], methods.index(row.combination.method), row)
-            for row in done
-        ]
-        return (Panel("", tuple(every)),) if every else ()
-    found = []
-    for method in methods:
-        mine = [row for row in done if row.combination.method == method]
-        lines = [
-            Line(MODES[row.combination.periodic], modes.index(row.combination.periodic), row)
-            for row in mine
-        ]
-        title = METHODS[method][0] if len(methods) > 1 else ""
-        if lines:
-            found.append(Panel(title, tuple(lines)))
-    return tuple(found)
+    methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
+    # What has a line for each; the other has the panels.
+    lined = 0 if modes == 1 or modes < methods else 1
+    other = 1 - lined
+    found: dict[str, list[Line]] = {title: [] for title in asked[other]}
+    for row in done:
+        titles = _titles(row)
+        line = Line(titles[lined], asked[lined].index(titles[lined]), row)
+        found[titles[other]].append(line)
+    several = len(found) > 1
+    made = [Panel(title if several else "", tuple(lines)) for title, lines in found.items()]
+    return tuple(panel for panel in made if panel.lines)
+
+
+def _titles(row: Row) -> tuple[str, str]:
+    """Return what method and mode of a row are called."""
+    return METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
 Profiler = Callable[[Line], Profile]

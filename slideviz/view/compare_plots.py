@@ -27,6 +27,8 @@ WIDTH = 7.0
 """Inches; that of a page's text, at which letters are 8 points or more."""
 
 _MANY = 5000
+_WIDE = 8.0
+"""Times that differ more than so many times need a logarithmic axis."""
 _LAST = ("minimum", "mean")
 _QUIET = replace(PRINT, legend=False)
 
@@ -70,11 +72,8 @@ def save_figure(
     name: str,
     dpi: int = 200,
     suffixes: Sequence[str] = (".png", ".svg"),
-    tight: bool = False,
 ) -> list[Path]:
     """Write a figure as PNG and SVG, each whole or not at all; return the paths.
-
-    ``tight`` leaves out the white rim.
 
     Raises
     ------
@@ -84,8 +83,7 @@ def save_figure(
     paths = []
     for suffix in suffixes:
         data = BytesIO()
-        box = "tight" if tight else None
-        figure.savefig(data, format=suffix[1:], dpi=dpi, bbox_inches=box, pad_inches=0.05)
+        figure.savefig(data, format=suffix[1:], dpi=dpi)
         paths.append(folder / f"{name}{suffix}")
         with atomic_write(paths[-1], CaseError) as file:
             file.write(data.getvalue())
@@ -139,7 +137,8 @@ def _histogram(axes: Axes, lines: Sequence[Line]) -> None:
     ]
     # Many cells: finer, and logarithmic to show the few bad ones.
     many = max((len(run.values) for run in runs), default=0) > _MANY
-    plots.histogram(axes, runs, bins=50 if many else 25, log=many, style=_QUIET)
+    edges = np.linspace(0.0, 1.0, 51 if many else 26)
+    plots.histogram(axes, runs, edges=edges, log=many, style=_QUIET)
 
 
 def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
@@ -200,6 +199,8 @@ def _grid(group: Sequence[Panel], draws: Sequence[_Draw], across: bool = False) 
                 here.set_xlabel("")
     for together in [axes[0]] if across else axes.T:
         _same_height(together)
+    if _seconds in draws:
+        _readable_seconds(list(axes[:, list(draws).index(_seconds)]))
     for inner in axes[0, 1:] if across else ():
         inner.tick_params(labelleft=False)
     _one_legend(figure)
@@ -249,3 +250,22 @@ def _same_height(together: Sequence[Axes]) -> None:
     high = max((high for _, high in limits), default=None)
     for axes in together:
         axes.set_ylim(low, high)
+
+
+def _readable_seconds(together: Sequence[Axes]) -> None:
+    """Let times that differ much be told apart: a logarithmic axis with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    values = np.concatenate([line.get_ydata() for axes in together for line in axes.lines])
+    values = values[values > 0.0]
+    if not len(values) or values.max() < _WIDE * values.min():
+        return
+    low, high = values.min() / 1.5, values.max() * 1.5
+    # Three numbers a decade, and of many decades one.
+    parts = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    for axes in together:
+        axes.set_yscale("log")
+        axes.set_ylim(low, high)
+        axes.yaxis.set_major_locator(LogLocator(subs=parts))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.view.compare import METHODS, MODES, Result, Row
-from slideviz.view.compare_plots import WIDTH
-from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.view.compare_page import WHITE, Image, Page, Place, compose, tile_width
+from slideviz.view.compare_wanted import TITLES, reasons, words_for
 from slideviz.view.offscreen import image_of, offscreen
-from slideviz.view.plots_style import PRINT, SMALLEST
 from slideviz.view.portrait import Portrait
 from slideviz.view.state import Frame
 from slideviz.view.surfaces import padded
@@ -23,28 +20,24 @@ from slideviz.view.surfaces import padded
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Image = NDArray[np.uint8]
-
 DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
-_WHITE = 250
 _OVERSAMPLED = 2
 """Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
 _SMALL = 10
 """Pixels: cells smaller than this, on average, are drawn without edges."""
-_WORDS = 0.42
-"""Inches below a picture for its numbers."""
-_BAR = 1.0
-"""Inches for titles and the colour bar."""
 
 
 def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
     """Return the pictures of rows, a row for each method and a column for each periodic mode.
 
+    Of many methods and few modes it is the other way round, so that the page is not too long.
+    A method or a mode that could not be computed at all has no place; the foot says why.
+
     Parameters
     ----------
     rows : sequence of Row
-        Of one number of steps. Where a row has no result or no mesh, its place says why.
+        Of one number of steps. Where a row has no result or no mesh, its place says so.
     base : Mesh
         The undeformed mesh.
 
@@ -53,27 +46,81 @@ def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
     Figure or None
         None where no row has a mesh.
     """
-    methods = list(dict.fromkeys(row.combination.method for row in rows))
-    modes = list(dict.fromkeys(row.combination.periodic for row in rows))
-    done = {
+    done = [row for row in rows if row.result is not None]
+    kept = {
         id(row.result): (row.result.mesh, row.result.quality)
-        for row in rows
+        for row in done
         if row.result is not None and row.result.mesh is not None
     }
-    if not done:
+    if not kept:
         return None
-    beside, above = [METHODS[name][0] for name in methods], [MODES[name] for name in modes]
+    methods, modes = _axis(rows, done, "method"), _axis(rows, done, "periodic")
     places = {
-        (methods.index(row.combination.method), modes.index(row.combination.periodic)): row
+        (methods[row.combination.method][0], modes[row.combination.periodic][0]): row
         for row in rows
+        if row.combination.method in methods and row.combination.periodic in modes
     }
-    if len(modes) == 1:  # the methods beside each other instead of below
-        beside, above = above, beside
-        places = {at[::-1]: row for at, row in places.items()}
-    images = _images(list(done.values()), base, WIDTH / max(len(above), 2))
-    figure = _composed((beside, above), places, dict(zip(done, images, strict=True)))
-    _colour_bar(figure, any(found.inverted for _, found in done.values()))
-    return figure
+    names = [tuple(name for _, name in axis.values()) for axis in (methods, modes)]
+    if len(modes) == 1 or len(methods) > 2 * len(modes):  # the methods beside each other
+        names, places = names[::-1], {at[::-1]: row for at, row in places.items()}
+    drawn = _images(list(kept.values()), base, tile_width(len(names[0]), len(names[1])))
+    images = dict(zip(kept, drawn, strict=True))
+    inverted = any(found.inverted for _, found in kept.values())
+    return compose(_page((names[0], names[1]), places, rows, images, inverted))
+
+
+def _axis(rows: Sequence[Row], done: Sequence[Row], what: str) -> dict[str, tuple[int, str]]:
+    """Return place and name of each method, or mode, of which there is a result.
+
+    The name is empty where no other was asked for.
+    """
+    words = {name: title for name, (title, _) in METHODS.items()} if what == "method" else MODES
+    asked, shown = (
+        dict.fromkeys(getattr(row.combination, what) for row in group) for group in (rows, done)
+    )
+    left = [name for name in asked if name in shown]
+    return {name: (k, words[name] if len(asked) > 1 else "") for k, name in enumerate(left)}
+
+
+def _page(
+    names: tuple[tuple[str, ...], tuple[str, ...]],
+    places: Mapping[Place, Row],
+    rows: Sequence[Row],
+    images: Mapping[int, Image],
+    inverted: bool,
+) -> Page:
+    """Return what is where on the page, and the notes at its foot."""
+    problems = {row.combination: row.problem for row in rows if row.result is None}
+    every = [row.combination for row in rows]
+    told = list(reasons(problems).items())
+    notes = [
+        f"[{number}] {words_for(some, every, TITLES)}: not possible: {reason}"
+        for number, (reason, some) in enumerate(told, start=1)
+    ]
+    words = {}
+    for at, row in places.items():
+        if row.result is None:
+            number = next(k for k, (_, some) in enumerate(told, 1) if row.combination in some)
+            words[at] = f"not possible [{number}]"
+        elif id(row.result) not in images:
+            words[at] = f"not drawn [{len(told) + 1}]"
+    if any(text.startswith("not drawn") for text in words.values()):
+        notes.append(f"[{len(told) + 1}] {NOT_KEPT}")
+    return Page(
+        rows=names[0],
+        columns=names[1],
+        images={at: images[id(row.result)] for at, row in places.items() if at not in words},
+        numbers={at: _numbers(row.result) for at, row in places.items() if row.result is not None},
+        words=words,
+        notes=tuple(notes),
+        inverted=inverted,
+    )
+
+
+def _numbers(result: Result) -> str:
+    found = result.quality
+    text = f"min {found.min:.3f}, mean {found.mean:.3f}"
+    return f"{text}\n{found.inverted} inverted" if found.inverted else text
 
 
 def _images(results: Sequence[tuple[Mesh, Quality]], base: Mesh, inches: float) -> list[Image]:
@@ -99,7 +146,7 @@ def _images(results: Sequence[tuple[Mesh, Quality]], base: Mesh, inches: float) 
 def _crowded(image: Image, actors: Sequence[Any]) -> bool:
     """Tell whether cells are so small that their edges would hide their colours."""
     cells = sum(actor.mapper.dataset.n_cells for actor in actors)
-    return int((image < _WHITE).any(axis=2).sum()) < cells * _SMALL**2
+    return int((image < WHITE).any(axis=2).sum()) < cells * _SMALL**2
 
 
 def _fit(plotter: Any, meshes: Sequence[Mesh]) -> None:
@@ -109,105 +156,3 @@ def _fit(plotter: Any, meshes: Sequence[Mesh]) -> None:
     plotter.camera.SetWindowCenter(0.0, 0.0)
     plotter.renderer.ResetCameraScreenSpace(np.stack([low, high], axis=1).ravel(), 0.98)
     plotter.renderer.ResetCameraClippingRange()
-
-
-def _drawn(images: Sequence[Image], axis: int) -> slice:
-    """Return where any of the images is not white: rows for axis 0, columns for axis 1."""
-    some = np.zeros(images[0].shape[axis], bool)
-    for image in images:
-        some |= (image < _WHITE).any(axis=(1 - axis, 2))
-    found = np.flatnonzero(some)
-    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, len(some))
-
-
-def _composed(
-    names: tuple[Sequence[str], Sequence[str]],
-    places: Mapping[tuple[int, int], Row],
-    images: Mapping[int, Image],
-) -> Figure:
-    """Return a figure with the pictures in their places."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    shape = len(names[0]), len(names[1])
-    columns = _drawn(list(images.values()), 1)
-    # One scale for all; a row of pictures is only as high as it must be.
-    rows = [
-        _drawn(
-            [
-                images[id(row.result)]
-                for at, row in places.items()
-                if at[0] == k and id(row.result) in images
-            ]
-            or list(images.values()),
-            0,
-        )
-        for k in range(shape[0])
-    ]
-    tile = WIDTH / max(shape[1], 2)
-    inches = 0.94 * tile / (columns.stop - columns.start)  # the rest is between the pictures
-    tall = [inches * (row.stop - row.start) + _WORDS for row in rows]
-    figure = Figure(figsize=(tile * shape[1], sum(tall) + _BAR), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.subplots(*shape, squeeze=False, height_ratios=tall)
-    for at, axes in np.ndenumerate(grid):
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.spines[:].set_visible(False)
-        _name(axes, at, names)
-        row = places.get(at)
-        if row is None:
-            continue
-        if row.result is not None:
-            axes.set_xlabel(_numbers(row.result), fontsize=SMALLEST)
-        if id(row.result) in images:
-            image = images[id(row.result)][rows[at[0]], columns]
-            axes.imshow(image, interpolation="antialiased")
-        else:
-            blank = np.full((rows[at[0]].stop - rows[at[0]].start, columns.stop - columns.start), 1)
-            axes.imshow(blank, cmap="gray", vmin=0, vmax=1)
-            _say(axes, row, max(12, int(tile * 11)))
-    return figure
-
-
-def _say(axes: Any, row: Row, letters: int) -> None:
-    """Write why there is no picture, in lines of so many letters."""
-    words = NOT_KEPT if row.result is not None else f"not possible: {row.problem}"
-    lines = textwrap.fill(textwrap.shorten(words, 150, placeholder=" ..."), letters)
-    place = {"ha": "center", "va": "center", "transform": axes.transAxes}
-    axes.text(0.5, 0.5, lines, fontsize=SMALLEST, **place)
-
-
-def _numbers(result: Result) -> str:
-    found = result.quality
-    text = f"min {found.min:.3f}, mean {found.mean:.3f}"
-    return f"{text}\n{found.inverted} inverted" if found.inverted else text
-
-
-def _name(axes: Any, at: tuple[int, int], names: tuple[Sequence[str], Sequence[str]]) -> None:
-    """Write the name of a column above it, and that of a row beside it."""
-    beside, above = names
-    if at[0] == 0 and len(above) > 1:
-        axes.set_title(above[at[1]], fontsize=PRINT.size)
-    if at[1] == 0 and len(beside) > 1:
-        axes.set_ylabel(beside[at[0]], fontsize=PRINT.size)
-
-
-def _colour_bar(figure: Figure, inverted: bool) -> None:
-    import matplotlib as mpl
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    colours = mpl.colormaps[COLOUR_MAP].with_extremes(under=INVERTED_COLOUR)
-    bar = figure.colorbar(
-        ScalarMappable(Normalize(0.0, 1.0), colours),
-        ax=figure.axes,
-        location="bottom",
-        extend="min" if inverted else "neither",
-        shrink=0.6,
-        aspect=36,
-        pad=0.02,
-    )
-    words = "size-skew quality [-]"
-    bar.set_label(f"inverted cells: red;  {words}" if inverted else words, fontsize=PRINT.size)
-    bar.ax.tick_params(labelsize=SMALLEST)

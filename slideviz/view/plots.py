@@ -43,6 +43,8 @@ LABELS: dict[What, str] = {
     "control_nodes": "control nodes [-]",
     "max_error": "largest error [mesh units]",
 }
+_ROOM = 0.1
+"""Labels of numbers of steps are at least this part of the axis apart."""
 _CROWDED = 300
 """Selections of more cycles than this get a thin line."""
 
@@ -187,9 +189,25 @@ def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
     """Put ticks at the numbers of steps; on a logarithmic axis where they span a decade."""
     from matplotlib.ticker import NullLocator
 
+    places = np.array(steps, np.float64)
     if steps and steps[-1] >= 8 * steps[0] > 0:
         axes.set_xscale("log")
         axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticks(steps, [str(step) for step in steps])
+        places = np.log(places)
+    shown = [steps[k] for k in _apart(places)]
+    axes.set_xticks(shown, [str(step) for step in shown])
     if len(steps) == 1:
         axes.set_xlim(steps[0] - 1, steps[0] + 1)
+
+
+def _apart(places: np.ndarray) -> list[int]:
+    """Return which of rising numbers (n,) have room for a label: the ends, and some between."""
+    last = len(places) - 1
+    if last < 1:
+        return list(range(last + 1))
+    least = _ROOM * (places[last] - places[0])
+    found = [0]
+    for k in range(1, last):
+        if min(places[k] - places[found[-1]], places[last] - places[k]) >= least:
+            found.append(k)
+    return [*found, last]

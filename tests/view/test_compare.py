@@ -15,12 +15,19 @@ from slideviz.view.compare import (
     METHODS,
     Combination,
     bounded,
-    combinations,
     compare,
-    wanted_methods,
-    wanted_modes,
 )
 from slideviz.view.compare_table import csv_text, terminal_head, terminal_line
+from slideviz.view.compare_wanted import (
+    KEYS,
+    announcement,
+    combinations,
+    reasons,
+    refused,
+    wanted_methods,
+    wanted_modes,
+    words_for,
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +54,67 @@ def test_combinations_that_share_a_plan_follow_each_other():
 
 
 def test_what_is_worth_trying_follows_from_the_roles(square):
-    assert wanted_modes(square.case) == ("none", "periodic", "fixed", "moving")
+    assert wanted_modes(square.case) == ("fixed", "moving")
+    for mode in ("none", "periodic", "fixed"):
+        assert wanted_modes(square.case.change(periodic=mode)) == (mode,)
     assert wanted_methods(square.case) == ("none", "ps", "ds")
-    rigid = square.case.change(roles={"BLOCK": "moving"})
+    rigid = square.case.change(roles={"BLOCK": "moving"}, periodic="none")
     assert wanted_modes(rigid) == ("none",)
     assert wanted_methods(rigid) == ("none",)
+
+
+def test_what_contradicts_the_case_is_known_before_anything_is_computed(square, monkeypatch):
+    def never(*_):
+        raise AssertionError("nothing is to be computed")
+
+    monkeypatch.setattr(comparing, "make_plan", never)
+    wanted = combinations(("none", "ps"), ("fixed", "moving"), (1, 4))
+    found = refused(square.case, square.mesh, wanted)
+    assert set(found) == {Combination("none", "moving", n) for n in (1, 4)}
+    assert all("needs a sliding method" in text for text in found.values())
+    text = announcement(wanted, found, {"methods": tuple(METHODS)})
+    first, methods, modes, steps, left_out = text.splitlines()
+    assert first == "6 combinations"
+    assert methods.split("(")[0].split() == ["methods", "none,", "ps"]
+    assert "(--methods takes ds, idw, elastic, too)" in methods
+    assert (modes.split(), steps.split()) == (
+        ["periodic", "fixed,", "moving"],
+        ["steps", "1,", "4"],
+    )
+    assert "method none with periodic moving: PERIODIC_MODE= moving needs" in left_out
+
+
+def test_a_mesh_that_does_not_repeat_is_told_in_words():
+    made = sample("square", 6, "motion")
+    case = made.case.change(roles={"BLOCK": "moving"})
+    wanted = combinations(("none", "ps"), ("none", "fixed", "moving"), (1,))
+    found = refused(case, made.mesh, wanted)
+    assert {(one.method, one.periodic) for one in found} == {
+        *((method, mode) for method in ("none", "ps") for mode in ("fixed", "moving")),
+    }
+    text = announcement(wanted, found, {})
+    assert text.startswith("2 combinations\n")
+    assert "periodic fixed: PERIODIC_MODE= fixed needs MARKER_PERIODIC" in text
+
+
+def test_few_words_name_many_combinations():
+    every = combinations(("none", "ps"), ("none", "fixed", "moving"), (1, 2))
+    assert words_for(every[:1], every, KEYS) == "method none with periodic none"
+    fixed = [one for one in every if one.periodic == "fixed"]
+    assert words_for(fixed, every, KEYS) == "periodic fixed"
+    assert words_for(every[:6], every, KEYS) == "method none"
+    both = [one for one in every if one.method == "none" or one.periodic == "fixed"]
+    assert set(words_for(both, every, KEYS).split("; ")) == {"method none", "periodic fixed"}
+    assert reasons(dict.fromkeys(fixed, "it\n cannot")) == {"it cannot": fixed}
+
+
+def test_a_reason_is_written_once(rows):
+    told = []
+    first, second = [row for row in rows if row.result is None]
+    assert "not possible [1]: PERIODIC_MODE= moving" in terminal_line(first, told)
+    assert terminal_line(second, told).endswith("not possible [1]")
+    other = comparing.Row(second.combination, problem="out of memory")
+    assert terminal_line(other, told).endswith("not possible [2]: out of memory")
 
 
 @pytest.mark.parametrize("method", list(METHODS))
@@ -168,7 +231,7 @@ def test_terminal_lines_stand_in_columns(rows):
     for row in rows:
         line = terminal_line(row)
         if row.result is None:
-            assert "not possible: " in line
+            assert "not possible [1]: " in line
         else:
             assert len(line) == len(head)
             end = head.index(" min") + len(" min")

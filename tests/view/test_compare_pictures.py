@@ -12,11 +12,12 @@ from PIL import Image
 from slideviz.case.model import Reduction, Translate
 from slideviz.case.samples import sample
 from slideviz.errors import CaseError
-from slideviz.view.compare import MODES, combinations, compare
+from slideviz.view.compare import METHODS, MODES, compare
 from slideviz.view.compare_panels import panels, profiler
 from slideviz.view.compare_plots import figures, save_figure, steps_name
 from slideviz.view.compare_sheets import NOT_KEPT, sheet
 from slideviz.view.compare_table import history_text
+from slideviz.view.compare_wanted import combinations
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,38 @@ def test_with_one_mode_the_methods_are_lines(rows):
     assert panel.title == ""
     assert {line.label for line in panel.lines} == {"no sliding", "pseudo sliding"}
     assert panels([row for row in rows if row.result is None]) == ()
+
+
+def test_where_modes_are_fewer_than_methods_they_are_the_panels(rows):
+    group = [row for row in rows if row.combination.periodic != "none"]
+    third = [
+        replace(row, combination=replace(row.combination, method="ds"))
+        for row in group
+        if row.combination.method == "ps"
+    ]
+    fixed, moving = panels([*group, *third])
+    assert (fixed.title, moving.title) == (MODES["fixed"], MODES["moving"])
+    names = [METHODS[name][0] for name in ("none", "ps", "ds")]
+    assert list(dict.fromkeys(line.label for line in fixed.lines)) == names
+    assert {line.label: line.series for line in moving.lines} == {names[1]: 1, names[2]: 2}
+
+
+def test_times_that_differ_much_have_a_logarithmic_axis_with_plain_numbers(rows):
+    def timed(row, seconds):
+        return replace(row, result=replace(row.result, processor_seconds=seconds))
+
+    group = [row for row in rows if row.result and row.combination.method == "ps"]
+    for factor, scale in ((1.2, "linear"), (6.0, "log")):
+        shown = [timed(row, 0.03 * factor**k) for k, row in enumerate(group)]
+        axes = dict(figures(shown, None))["steps"].axes[2]
+        assert axes.get_ylabel().startswith("processor time")
+        assert axes.get_yscale() == scale
+        axes.figure.draw_without_rendering()
+        low, high = axes.get_ylim()
+        ticks = zip(axes.get_yticks(), axes.get_yticklabels(), strict=True)
+        words = [text.get_text() for at, text in ticks if low <= at <= high]
+        assert 3 <= len(words) <= 9
+        assert all(float(word) >= 0 for word in words), "numbers, not powers of ten"
 
 
 def test_figures_show_the_rows(rows, square):
@@ -115,24 +148,83 @@ def test_the_span_follows_from_the_case(name, span, coordinate):
     assert make(line).count.sum() == len(made.mesh.cells)
 
 
+def words_on(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+def overlaps(figure):
+    """Return pairs of words, or of words and a picture, that cover each other."""
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in figure.texts]
+    boxes = [(words, box) for words, box in boxes if words]
+    boxes += [("picture", axes.get_window_extent(renderer)) for axes in figure.axes]
+    return [
+        (first[0], second[0])
+        for k, first in enumerate(boxes)
+        for second in boxes[k + 1 :]
+        if first[1].overlaps(second[1])
+    ]
+
+
 def test_the_sheet_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path):
     group = [row for row in rows if row.combination.steps == 4]
     figure = sheet(group, square.mesh)
     assert figure is not None
-    (path,) = save_figure(figure, tmp_path, "sheet", 100, (".png",), tight=True)
-    words = [text.get_text() for axes in figure.axes for text in axes.texts]
-    assert len(words) == 1
-    assert "not possible" in words[0]
-    numbers = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel().startswith("min")]
-    assert len(numbers) == 5
+    (path,) = save_figure(figure, tmp_path, "sheet", 100, (".png",))
+    words = words_on(figure)
+    assert words.count("not possible [1]") == 1
+    foot = " ".join(words[words.index(next(text for text in words if text.startswith("[1]"))) :])
+    assert foot.startswith(f"[1] no sliding with {MODES['moving']}: not possible: PERIODIC_MODE=")
+    assert foot.endswith("choose PERIODIC_MODE= fixed"), "the reason is there to its end"
+    assert sum(text.startswith("min") for text in words) == 5
     pictures = [axes.images[0].get_array() for axes in figure.axes if axes.images]
-    assert len({picture.shape[:2] for picture in pictures[:3]}) == 1, "one scale"
-    coloured = [picture for picture in pictures if picture.ndim == 3]
-    assert len(coloured) == 5
-    assert all((picture.min(axis=2) < 200).mean() > 0.2 for picture in coloured)
+    assert len(pictures) == 5
+    assert len({picture.shape[:2] for picture in pictures[:2]}) == 1, "one scale"
+    assert all((picture.min(axis=2) < 200).mean() > 0.2 for picture in pictures)
+    assert overlaps(figure) == []
     with Image.open(path) as image:
         assert image.width > 500
     assert sheet([row for row in rows if row.result is None], square.mesh) is None
+
+
+def test_what_cannot_be_at_all_has_no_place_but_a_note(rows, square):
+    long = "the motion puts BLADE through PER1; " * 6 + "the end"
+    group = [
+        replace(row, result=None, problem=long) if row.combination.periodic == "fixed" else row
+        for row in rows
+        if row.combination.steps == 4
+    ]
+    figure = sheet(group, square.mesh)
+    words = words_on(figure)
+    assert MODES["fixed"] not in words
+    assert {MODES["none"], MODES["moving"]} <= set(words)
+    foot = " ".join(words)
+    assert f"[2] no sliding with {MODES['moving']}: not possible: PERIODIC_MODE=" in foot
+    assert f"[1] {MODES['fixed']}: not possible: the motion puts BLADE" in foot
+    assert "the end" in foot
+    assert overlaps(figure) == []
+
+
+def test_many_methods_stand_beside_each_other(rows, square):
+    (row,) = [
+        r
+        for r in rows
+        if r.combination == replace(r.combination, method="ps", periodic="moving", steps=4)
+    ]
+    for modes, rising in ((("moving",), "columns"), (("fixed", "moving"), "columns")):
+        group = [
+            replace(row, combination=replace(row.combination, method=method, periodic=mode))
+            for method in METHODS
+            for mode in modes
+        ]
+        figure = sheet(group, square.mesh)
+        assert overlaps(figure) == [], rising
+        spots = {text.get_text(): text.get_position() for text in figure.texts}
+        heights = {spots[title][1] for title, _ in METHODS.values()}
+        assert len(heights) == 1, "in one line"
+        width, height = figure.get_size_inches()
+        assert height < width
 
 
 def test_a_figure_that_cannot_be_written_is_told(rows, tmp_path):
@@ -163,9 +255,9 @@ def test_a_mesh_that_was_not_kept_leaves_its_numbers_and_the_reason(rows, square
     group = [row for row in rows if row.combination.steps == 4 and row.result]
     first, *others = group
     figure = sheet([replace(first, result=replace(first.result, mesh=None)), *others], square.mesh)
-    words = [" ".join(text.get_text().split()) for axes in figure.axes for text in axes.texts]
-    assert NOT_KEPT in words
-    numbers = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel().startswith("min")]
-    assert len(numbers) == len(group)
+    words = words_on(figure)
+    assert words.count("not drawn [1]") == 1
+    assert f"[1] {NOT_KEPT}" in " ".join(words)
+    assert sum(text.startswith("min") for text in words) == len(group)
     bare = [replace(row, result=replace(row.result, mesh=None)) for row in group]
     assert sheet(bare, square.mesh) is None

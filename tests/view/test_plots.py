@@ -45,11 +45,11 @@ def two_qualities():
 
 
 def test_histogram_counts_inverted_cells_apart(axes):
-    histogram(axes, two_qualities(), bins=10)
+    histogram(axes, two_qualities(), edges=np.linspace(0.0, 1.0, 11))
     first, second = (patch.get_data().values for patch in axes.patches[:2])
     assert first.tolist() == [1, 2, 0, 0, 0, 0, 0, 0, 0, 1]
     assert second.tolist() == [0] * 9 + [2]
-    (stem,) = axes.lines
+    stem, _cap = axes.lines
     assert stem.get_ydata()[1] == 2
     assert all(x < 0 for x in stem.get_xdata())
     assert axes.get_xlim()[0] < stem.get_xdata()[0]
@@ -128,6 +128,19 @@ def test_rows_are_joined_in_order_of_steps_and_inverted_ones_are_crosses(axes):
     assert (cross.get_gid(), cross.get_xdata().tolist()) == ("inverted:ps", [1])
     assert ds.get_xdata().tolist() == [5]
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["1", "5", "20"]
+
+
+@pytest.mark.parametrize("steps", [(1, 2, 3, 4), tuple(range(1, 15)), (5,)])
+def test_labels_of_steps_keep_apart(axes, steps):
+    against_steps(axes, [Outcome("ps", n, 0.5, 0.7, 0, 1.0) for n in steps], "minimum")
+    axes.figure.set_size_inches(2.3, 2.1)
+    axes.figure.draw_without_rendering()
+    labels = axes.get_xticklabels()
+    words = [label.get_text() for label in labels]
+    assert (words[0], words[-1]) == (str(steps[0]), str(steps[-1]))
+    assert len(words) == len(steps) if len(steps) < 5 else len(words) >= 5
+    boxes = [label.get_window_extent() for label in labels]
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def _compare(call: Call, output: Path, quick: bool) -> int:
         return code
     argv = ["compare", str(folder / f"{call.sample}.cfg"), "-o", str(folder)]
     argv += ["--methods", call.methods, "--steps", call.quick_steps if quick else call.steps]
-    argv += ["--periodic", call.periodic] if call.periodic else []
+    argv += ["--periodic", call.periodic]
     argv += [] if call.pictures else ["--no-pictures"]
     argv += [word for text in call.settings for word in ("--set", text)]
     return run(argv)

@@ -29,7 +29,7 @@ class Call:
         Of the sample, and for ``--quick``.
     quick_size : int
     methods, periodic, steps : str
-        Lists, as ``compare`` takes them; empty: what it takes by itself.
+        Lists, as ``compare`` takes them.
     quick_steps : str
         Steps for ``--quick``; empty: the call is left out there.
     settings : tuple of str
@@ -45,7 +45,7 @@ class Call:
     quick_size: int = 25
     variant: str = ""
     methods: str = RBF
-    periodic: str = ""
+    periodic: str = "none,periodic,fixed,moving"
     steps: str = "1,2,5,10,20"
     quick_steps: str = "1,5"
     settings: tuple[str, ...] = ()
