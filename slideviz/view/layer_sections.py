@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.view.copies import keeps, moved
 from slideviz.view.cut_lines import CutLines
 from slideviz.view.cuts import Cuts, can_cut
@@ -17,7 +17,7 @@ from slideviz.view.layer_mesh import recoloured
 from slideviz.view.polygon_actor import PolygonActor, plain_colour
 from slideviz.view.polygons import Polygons
 from slideviz.view.section import Section
-from slideviz.view.section_line import box_around
+from slideviz.view.section_line import Box, box_around
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
@@ -78,6 +78,7 @@ class SectionLayer:
         self._twins: dict[str, Twins] = {}
         self._lines.clear()
         self._lines_of: tuple[object, ...] = ()
+        self._box: tuple[tuple[object, ...], Box] | None = None
 
     def shapes(self) -> list[Any]:
         """Return nothing: the boundaries are around it anyway."""
@@ -122,12 +123,18 @@ class SectionLayer:
         if key == self._lines_of:
             return
         self._lines_of = key
+        if self._box is None or self._box[0] != (mesh, tuple(neighbours)):
+            # Not again for every place that a line is dragged to.
+            self._box = (mesh, tuple(neighbours)), self._find_box(mesh, neighbours)
+        self._lines.show(sections, self._box[1], self.stage.lift(mesh))
+
+    def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
+        """Return the box around a mesh and its neighbours."""
         own = mesh.points[self.cuts.cutter(mesh).used]
         every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
         boxes = [box_around(points) for points in every]
         low = np.min([box[0] for box in boxes], axis=0)
-        high = np.max([box[1] for box in boxes], axis=0)
-        self._lines.show(sections, (low, high), self.stage.lift(mesh))
+        return low, np.max([box[1] for box in boxes], axis=0)
 
     def _neighbours(self, session: Session) -> dict[int, FloatArray]:
         return matrices(session, self._period.of(session) if session.view.copies else None)
