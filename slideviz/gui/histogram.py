@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from qtpy.QtCore import Qt, QTimer
@@ -25,21 +23,16 @@ from slideviz.gui.plot_canvas import (
 from slideviz.gui.plot_image import Draw
 from slideviz.view import changes
 from slideviz.view.actors import shown_values
-from slideviz.view.curves import look_of
-from slideviz.view.distribution import (
-    Distribution,
-    Outline,
-    distribution,
-    draw_distribution,
-    spread,
-)
 from slideviz.view.inspect import ONLY_INVERTED, chosen_cells
-from slideviz.view.state import COLOUR_BY, ColourBy, Frame, Session
+from slideviz.view.session_histogram import (
+    Counts,
+    draw_histogram,
+    first_value,
+    range_words,
+    shown_measure,
+)
+from slideviz.view.state import Frame, Session
 from slideviz.view.store import Store
-from slideviz.view.ticks import rounded_out
-
-LEAST_SPREAD = 0.05
-"""Part of the quality's 0 to 1 that is shown at least."""
 
 
 class HistogramPanel(QWidget):
@@ -112,6 +105,7 @@ class HistogramPanel(QWidget):
             old.view.colour_map == new.view.colour_map,
             old.colour_range == new.colour_range,
             old.view.threshold == new.view.threshold,
+            old.view.beside == new.view.beside,
         )
         if not all(parts):
             self.sync(new)
@@ -213,101 +207,3 @@ class HistogramPanel(QWidget):
         ask_and_write(
             self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
         )
-
-
-class Counts:
-    """The counts of frames, made once as long as a frame is there."""
-
-    def __init__(self) -> None:
-        self._kept: WeakKeyDictionary[Frame, dict[object, Distribution]] = WeakKeyDictionary()
-        self._spreads: WeakKeyDictionary[Frame, dict[ColourBy, Range | None]] = WeakKeyDictionary()
-
-    def limits(self, session: Session, whole: bool) -> Range:
-        """Return round numbers around the values that cells have; or, whole, that they can have.
-
-        They are the same for all steps of a run, so that bars can be compared as it is played.
-        """
-        what = shown_measure(session)
-        shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
-        for frame in shown:
-            kept = self._spreads.setdefault(frame, {})
-            if what not in kept:
-                kept[what] = spread(frame, what, session.mesh)
-        found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
-        low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
-        if what != "displacement":
-            # Closer, differences that mean nothing would look large.
-            return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
-        return rounded_out(0.0 if whole else low, high)
-
-    def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:
-        """Return the counts of a frame of the session between limits."""
-        what = shown_measure(session)
-        kept = self._kept.setdefault(frame, {})
-        if (what, limits) not in kept:
-            kept[what, limits] = distribution(frame, what, limits, session.mesh)
-        return kept[what, limits]
-
-
-def draw_histogram(counts: Counts, session: Session, how: tuple[bool, bool], figure, style) -> None:
-    """Draw the histogram of what a session shows; nothing without a mesh.
-
-    ``how`` is whether counts are logarithmic, and whether all values there can be are shown.
-    """
-    if session.frame is None:
-        return
-    what, (log, whole) = shown_measure(session), how
-    limits = counts.limits(session, whole)
-    shown = counts.of(session, session.frame, limits)
-    run = session.run_shown
-    label = "undeformed" if session.view.frame == 0 or run is None else run.label
-    words = label, "displacement [mesh units]" if what == "displacement" else _words(what)
-    outlines = [
-        Outline(name, counts.of(session, frame, limits), series)
-        for name, frame, series in _others(session)
-    ]
-    axes, table = figure.add_subplot(), _colours(session, shown)
-    draw_distribution(axes, shown, outlines, words, table, log, style)
-
-
-def first_value(axes) -> float:
-    """Return where the values of a histogram begin; left of it is the strip of inverted cells."""
-    return min(bar.get_x() for bar in axes.patches if bar.get_gid() == "shown")
-
-
-def _others(session: Session) -> Iterator[tuple[str, Frame, int | None]]:
-    """Yield what is compared with: its words, the frame, and the number of its look."""
-    moved = session.first is not None and session.view.frame > 0
-    if moved and shown_measure(session) != "displacement":
-        yield "undeformed", session.first, None
-    for run in session.runs:
-        # The last step of the run that is shown is what is played to.
-        if run.last not in (None, session.frame) and run.number != session.shown:
-            yield run.label, run.last, look_of(run)
-
-
-def shown_measure(session: Session) -> ColourBy:
-    """Return what the histogram counts: what the cells are coloured by, or size-skew."""
-    by = session.view.colour_by
-    return "size_skew" if by == "role" else by
-
-
-def range_words(threshold: Range) -> str:
-    """Return a range in words."""
-    if threshold[1] < 0.0:
-        return "inverted cells"
-    return f"{threshold[0]:.3g} to {threshold[1]:.3g}"
-
-
-def _words(what: ColourBy) -> str:
-    return f"{COLOUR_BY[what]} quality [-]"
-
-
-def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
-    """Return the colours of the bars: those of their values in the view."""
-    import matplotlib as mpl
-
-    low, high = session.colour_range
-    middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
-    part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
-    return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]

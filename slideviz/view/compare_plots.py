@@ -18,6 +18,7 @@ from slideviz.view.compare import Row
 from slideviz.view.compare_panels import Line, Panel, Profiler, panels, result_of
 from slideviz.view.plots_style import PRINT
 from slideviz.view.spanwise import spanwise
+from slideviz.view.ticks import rounded_out
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
 WIDTH = 7.0
 """Inches; that of a page's text, at which letters are 8 points or more."""
 
-_MANY = 5000
+_BINS = 25
+"""Intervals of a histogram, each wide enough to see the dashes of its lines."""
 _WIDE = 8.0
 """Times that differ more than so many times need a logarithmic axis."""
 _LAST = ("minimum", "mean")
@@ -52,7 +54,7 @@ def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, F
         if not lines:
             continue
         name = steps_name(number)
-        yield f"histogram_{name}", _grid(group, (_histogram,), across=True)
+        yield f"histogram_{name}", _grid(group, (_histogram(lines),), across=True)
         if any(len(result_of(line).minimum) > 1 for line in lines):
             yield f"by_step_{name}", _grid(group, (_by_step,), across=True)
         if any(result_of(line).history for line in lines):
@@ -125,20 +127,27 @@ def _seconds(axes: Axes, lines: Sequence[Line]) -> None:
     plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
 
 
-def _histogram(axes: Axes, lines: Sequence[Line]) -> None:
-    runs = [
-        plots.QualityRun(
-            line.label,
-            result_of(line).quality.values,
-            result_of(line).quality.status == INVERTED,
-            line.series,
-        )
-        for line in lines
-    ]
-    # Many cells: finer, and logarithmic to show the few bad ones.
-    many = max((len(run.values) for run in runs), default=0) > _MANY
-    edges = np.linspace(0.0, 1.0, 51 if many else 26)
-    plots.histogram(axes, runs, edges=edges, log=many, style=_QUIET)
+def _histogram(every: Sequence[Line]) -> _Draw:
+    """Return what draws some of the lines, with the intervals that suit all."""
+    good = [result_of(line).quality.values[~_inverted(line)] for line in every]
+    values = np.concatenate([*good, [1.0]])
+    edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
+
+    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+        runs = [
+            plots.QualityRun(
+                line.label, result_of(line).quality.values, _inverted(line), line.series
+            )
+            for line in lines
+        ]
+        # Logarithmic: few bad cells matter among many good ones.
+        plots.histogram(axes, runs, edges=edges, log=True, style=_QUIET)
+
+    return draw
+
+
+def _inverted(line: Line) -> np.ndarray:
+    return np.asarray(result_of(line).quality.status == INVERTED)
 
 
 def _by_step(axes: Axes, lines: Sequence[Line]) -> None:

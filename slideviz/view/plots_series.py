@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +33,53 @@ class QualityRun:
     values: FloatArray
     inverted: NDArray[np.bool_] | None = None
     series: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Distribution:
+    """Counts of the cells of one mesh.
+
+    Attributes
+    ----------
+    counts : (k,) int64
+    edges : (k + 1,) float64
+        Of the intervals; what is outside is in the first or the last.
+    inverted : int
+        Cells that are inverted and in no interval.
+    """
+
+    counts: IntArray
+    edges: FloatArray
+    inverted: int
+
+    @classmethod
+    def of(cls, values: FloatArray, edges: FloatArray) -> Distribution:
+        """Return the counts of values (m,) in equal intervals; NaN is an inverted cell."""
+        right = values[np.isfinite(values)]
+        low, high, count = edges[0], edges[-1], len(edges) - 1
+        places = np.clip((right - low) * (count / (high - low)), 0, count - 1).astype(np.int64)
+        return cls(np.bincount(places, minlength=count), edges, len(values) - len(right))
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """A distribution drawn as bars: its words, and a colour for each bar or for all."""
+
+    label: str
+    distribution: Distribution
+    colours: Sequence[Any] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A distribution to compare with: its words, and the number of its look.
+
+    ``series`` None is the undeformed mesh, in a thin line of its own.
+    """
+
+    label: str
+    distribution: Distribution
+    series: int | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,7 +124,8 @@ def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
 
 def add_legend(axes: Axes, style: Style, **options: Any) -> None:
     """Add a legend if the style wants one and there is something to tell apart."""
-    if not style.legend or len(axes.get_legend_handles_labels()[0]) < 2:
+    handles = options.get("handles") or axes.get_legend_handles_labels()[0]
+    if not style.legend or len(handles) < 2:
         return
     axes.legend(
         fontsize=max(style.size, SMALLEST),

@@ -38,6 +38,10 @@ def labels(panel):
     return [text.get_text() for text in panel.canvas.figure.axes[0].get_legend().get_texts()]
 
 
+def bars_of(panel):
+    return [bar for bar in panel.canvas.figure.axes[0].patches if bar.get_gid() == "shown"]
+
+
 def drag(panel, low, high, release=True):
     canvas = panel.canvas
     y = canvas.height() // 2
@@ -100,7 +104,7 @@ def test_the_axis_is_close_around_the_values_or_from_0_to_1(panel, qtbot):
     worst = session.frame.quality.values.min()
     assert 0.8 < low <= worst
     assert high == pytest.approx(1.0)
-    bars = [bar.get_height() for bar in panel.canvas.figure.axes[0].patches if bar.get_gid()]
+    bars = [bar.get_height() for bar in bars_of(panel)]
     assert np.count_nonzero(bars) > 5
     # A range that begins at the left end of the axis has all that are worse, too.
     drag(panel, low, 0.5 * (low + high))
@@ -223,7 +227,7 @@ def test_of_many_states_the_newest_is_drawn_last(full, qtbot):
         full.canvas.fill()
     qtbot.waitUntil(lambda: not full.canvas.busy)
     assert sorted(labels(full)) == ["run 1", "undeformed"]
-    bars = [bar.get_height() for bar in full.canvas.figure.axes[0].patches if bar.get_gid()]
+    bars = [bar.get_height() for bar in bars_of(full)]
     wanted = full.drawing().args[0].of(full.store.session, full.store.session.first, (0.0, 1.0))
     assert bars == list(np.maximum(wanted.counts - 0.5, 0.0))
 
@@ -250,11 +254,13 @@ def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeyp
 
 
 def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
-    from slideviz.gui import histogram
+    from slideviz.view import session_histogram
 
     asked = []
-    real = histogram.distribution
-    monkeypatch.setattr(histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v))
+    real = session_histogram.distribution
+    monkeypatch.setattr(
+        session_histogram, "distribution", lambda *v: asked.append(v[0]) or real(*v)
+    )
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.change(changes.show_frame, 1)
     assert asked == [full.store.session.frame]

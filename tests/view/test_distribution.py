@@ -2,11 +2,16 @@
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle, StepPatch
 
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.distribution import BAND, BINS, Outline, distribution, draw_distribution
+from slideviz.view.distribution import BINS, distribution
+from slideviz.view.look import PAPER
 from slideviz.view.plots import ON_DARK, PRINT
+from slideviz.view.plots_histogram import BAND, draw_distribution
+from slideviz.view.plots_series import Bars, Distribution, Outline
 from slideviz.view.state import Frame
 
 
@@ -41,16 +46,23 @@ def test_displacements_are_counted_between_the_limits_of_the_colours(frames, squ
     assert distribution(frames[1], "displacement", (0.0, 0.01), square).counts[-1] == 16
 
 
+SHOWN = "#123456"
+
+
 def drawn(frames, log, style=PRINT, shown=1):
     axes = Figure().add_subplot()
     outlines = [
-        Outline("undeformed", distribution(frames[0], "skew"), None),
         Outline("run 2", distribution(frames[2], "skew"), 1),
+        Outline("undeformed", distribution(frames[0], "skew"), None),
     ]
     one = distribution(frames[shown], "skew")
-    colours = ["#123456"] * BINS
-    draw_distribution(axes, one, outlines, ("run 1", "skew quality [-]"), colours, log, style)
+    bars = Bars("run 1", one, [SHOWN] * BINS)
+    draw_distribution(axes, bars, outlines, "skew quality [-]", log, style)
     return axes, one, outlines
+
+
+def outlines_of(axes):
+    return {patch.get_label(): patch for patch in axes.patches if isinstance(patch, StepPatch)}
 
 
 @pytest.mark.parametrize("log", [False, True])
@@ -66,30 +78,80 @@ def test_bars_are_as_high_as_there_are_cells(frames, log):
     assert axes.get_xlabel() == "skew quality [-]"
 
 
-def test_others_are_outlines_with_a_name_the_undeformed_one_thin(frames):
-    axes, _, outlines = drawn(frames, False)
-    stairs = {patch.get_label(): patch for patch in axes.patches if "StepPatch" in str(type(patch))}
-    assert stairs["undeformed"].get_linewidth() < stairs["run 2"].get_linewidth()
+@pytest.mark.parametrize("style", [PRINT, ON_DARK])
+def test_others_are_outlines_that_differ_from_each_other_and_from_the_bars(frames, style):
+    axes, one, outlines = drawn(frames, False, style)
+    stairs = outlines_of(axes)
     for other in outlines:
         values = stairs[other.label].get_data().values
         assert values.tolist() == other.distribution.counts.tolist()
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(names) == ["run 1", "run 2", "undeformed"]
+    assert stairs["undeformed"].get_linewidth() < stairs["run 2"].get_linewidth()
+    own = next(patch for patch in axes.patches if patch.get_gid() == "outline")
+    assert own.get_data().values.tolist() == one.counts.tolist()
+    assert own.get_linewidth() > stairs["run 2"].get_linewidth(), "seen below a line on it"
+    every = [own, *(stairs[other.label] for other in outlines)]
+    assert len({str(patch.get_linestyle()) for patch in every}) == 3, "in grey, too"
+    assert len({patch.get_edgecolor() for patch in every}) == 3
+    assert not any(patch.get_path_effects() for patch in every), "no halo"
 
 
-def test_inverted_cells_have_a_strip_left_of_the_values(frames):
-    assert frames[2].quality.inverted
-    axes, one, _ = drawn(frames, True, ON_DARK, shown=2)
+def test_bars_are_paler_where_lines_cross_them(frames):
+    axes, one, _ = drawn(frames, False)
+    own, white = np.array(to_rgb(SHOWN)), np.array(to_rgb(PAPER.background))
+    seen = np.array(axes.containers[0].patches[0].get_facecolor()[:3])
+    assert 0.3 < np.linalg.norm(seen - own) / np.linalg.norm(white - own) < 0.6
+    alone = Figure().add_subplot()
+    draw_distribution(alone, Bars("run 1", one, [SHOWN] * BINS), [], "skew quality [-]")
+    assert to_rgb(alone.containers[0].patches[0].get_facecolor()) == to_rgb(SHOWN)
+
+
+def test_the_legend_shows_what_is_drawn_as_it_is_drawn(frames):
+    axes, _, _ = drawn(frames, False)
+    legend = axes.get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["run 1", "run 2", "undeformed"]
+    colours = [to_rgb(bar.get_facecolor()) for bar in axes.containers[0].patches]
+    boxes = [part for part in legend.findobj(Rectangle) if part.get_transform() is not None]
+    filled = [to_rgb(box.get_facecolor()) for box in boxes if box.get_fill()]
+    assert colours[0] in filled, "the key of the bars has their colours"
+    lines = [to_rgb(handle.get_color()) for handle in legend.legend_handles[1:]]
+    stairs = outlines_of(axes)
+    assert lines == [to_rgb(stairs[name].get_edgecolor()) for name in ("run 2", "undeformed")]
+
+
+def test_the_undeformed_mesh_does_not_press_the_rest_flat():
+    def some(count):
+        counts = np.zeros(BINS, np.int64)
+        counts[-1], counts[3] = count, 5
+        return Distribution(counts, np.linspace(0.0, 1.0, BINS + 1), 0)
+
+    axes = Figure().add_subplot()
+    outlines = [Outline("run 2", some(40), 1), Outline("undeformed", some(10_000), None)]
+    draw_distribution(axes, Bars("run 1", some(20)), outlines, "size quality [-]")
+    assert 40 < axes.get_ylim()[1] < 50
+    alone = Figure().add_subplot()
+    draw_distribution(alone, Bars("undeformed", some(10_000)), [], "size quality [-]")
+    assert alone.get_ylim()[1] > 10_000
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_inverted_cells_have_a_strip_left_of_the_values(frames, log):
+    bad = frames[2].quality.inverted
+    assert bad
+    axes, one, _ = drawn(frames, log, ON_DARK, shown=2)
     assert axes.get_xlim() == pytest.approx((-BAND, 1.0))
     strip = axes.containers[1].patches[0]
-    assert strip.get_height() == one.inverted
+    assert strip.get_y() + strip.get_height() == one.inverted
     assert strip.get_x() < 0
     assert "inverted" in [text.get_text() for text in axes.texts]
+    stem, cap = axes.lines
+    assert stem.get_ydata()[1] == cap.get_ydata()[0] == bad
+    assert max(*stem.get_xdata(), *cap.get_xdata()) < 0
+    assert stem.get_color() == cap.get_color() == ON_DARK.series(1).colour
 
 
 def test_without_inverted_cells_there_is_no_strip(frames):
     axes = Figure().add_subplot()
-    one = distribution(frames[0], "size")
-    draw_distribution(axes, one, [], ("undeformed", "size quality [-]"))
+    bars = Bars("undeformed", distribution(frames[0], "size"))
+    draw_distribution(axes, bars, [], "size quality [-]")
     assert axes.get_xlim() == (0.0, 1.0)
     assert not axes.texts
