@@ -1,5 +1,7 @@
 """The middle of the window: the view of the mesh, and a second one beside it to compare runs."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
 from qtpy.QtCore import QPoint, Qt
@@ -12,6 +14,7 @@ from slideviz.gui.hover import CellHover
 from slideviz.view import changes, jobs
 from slideviz.view.cuts import Cuts
 from slideviz.view.ghosts import Ghosts
+from slideviz.view.legend import STRIP
 from slideviz.view.look import Look
 from slideviz.view.panes import choices, close_pane, panes
 from slideviz.view.scene import Scene
@@ -81,9 +84,8 @@ class Viewing(QWidget):
 
     def _make_second(self, session: Session) -> None:
         """Make the second view; from now on what moves one camera moves the other."""
-        whole = self.scene.sees_all()
+        detail = self._before is not None or self.scene.eye.sees_detail()
         self.second = self._make_view()
-        self._grid.setColumnStretch(1, 1)
         self._place(session.view.swapped)
         self.second.setVisible(True)
         self.second_scene = Scene(self.second, self.scene.look)
@@ -96,7 +98,8 @@ class Viewing(QWidget):
         self.second_scene.take_camera(self.scene)
         self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
-        self._rearranged(whole)
+        self.scene.eye.beside, self.second_scene.eye.beside = self.second_scene.eye, self.scene.eye
+        self._rearranged(not detail)
 
     def _swap(self, swapped: bool) -> None:
         """Let the two views change places where they stand the other way round."""
@@ -109,9 +112,19 @@ class Viewing(QWidget):
             self.fit()
 
     def _share_legend(self, swapped: bool) -> None:
-        """Draw the legend in the view to the right only."""
+        """Draw the legend in the view to the right only, which is wider by its strip."""
         self.scene.set_legend(swapped)
         self.second_scene.set_legend(not swapped)
+        self._share_width()
+
+    def _share_width(self) -> None:
+        """Give both meshes the same room, beside the legend."""
+        if self.second is None:
+            return
+        strip = round(STRIP / self.devicePixelRatioF())
+        rest = max(self.width() - self._grid.spacing() - strip, 2)
+        for column, width in enumerate((rest // 2, rest - rest // 2 + strip)):
+            self._grid.setColumnStretch(column, width)
 
     def _place(self, swapped: bool) -> None:
         """Put the second view to the right of the first, or to the left."""
@@ -125,12 +138,12 @@ class Viewing(QWidget):
         """Draw a view of another size; where everything filled it, everything does again."""
         fitted = self._leader.eye.fitted
         scene.resized()
-        if fitted and scene is self._leader:
+        if fitted:
             self._leader.fit()
 
     @property
     def _leader(self) -> Scene:
-        """Return what is fitted: of two views the one with less room, beside the legend."""
+        """Return what is fitted: of two views the one with the legend."""
         having = (scene for scene in reversed(self._scenes()) if scene.stage.has_legend)
         return next(having, self.scene)
 
@@ -148,10 +161,12 @@ class Viewing(QWidget):
         whole = self.scene.sees_all()
         self._link.end()
         self._link = None
+        self.scene.eye.beside = None
         for view in (second, self.view):
             self._grid.removeWidget(view)
         self._grid.addWidget(self.view, 1, 0)
-        self._grid.setColumnStretch(1, 0)
+        for column, stretch in enumerate((1, 0)):
+            self._grid.setColumnStretch(column, stretch)
         second.close()
         second.deleteLater()
         for title in self.titles:
@@ -241,6 +256,10 @@ class Viewing(QWidget):
     def _zoomed(self, view: View3D, scene: Scene, where: QPoint, factor: float) -> None:
         scene.zoom_at(*view.to_pixels(where), factor)
         self.render()
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._share_width()
 
     # Camera and pictures ---------------------------------------------------------------
 

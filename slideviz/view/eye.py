@@ -13,6 +13,9 @@ from slideviz.view.stage import Stage
 FILL = 0.92
 """How much of the free height or width a mesh takes."""
 
+DETAIL = 0.5
+"""Who sees less than this part of the height that would show everything looks at a detail."""
+
 SLACK = 0.25
 """The box around a mesh may be outside the view by this much of it, with the mesh inside."""
 
@@ -36,12 +39,19 @@ class Eye:
     stage : Stage
     shapes : callable
         Returns the data sets that should be seen.
+
+    Attributes
+    ----------
+    beside : Eye or None
+        That of a view beside this one, which looks from the same place: what fills the view is
+        all that both show.
     """
 
     def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
         self.stage = stage
         self._shapes = shapes
         self._fitted: tuple[float, ...] = ()
+        self.beside: Eye | None = None
 
     @property
     def _camera(self) -> Any:
@@ -62,20 +72,39 @@ class Eye:
 
     def fit(self) -> None:
         """Make everything fill the view, from the present side, beside the legend's strip."""
-        width, height = self.stage.plotter.window_size
         self.shift()
-        shapes = self._shapes()
-        if not shapes:
+        found = self._whole()
+        if found is None:
             return
-        points = np.concatenate([np.asarray(shape.points) for shape in shapes])
-        axes = self._axes()
-        along = axes @ points.T
-        low, high = along.min(axis=1), along.max(axis=1)
-        centre, extent = axes.T @ ((low + high) / 2.0), high - low
-        free = max(width - self.stage.strip(), 1.0)
-        half = max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
-        self.aim(centre, half, float(np.linalg.norm(extent)))
+        centre, half, depth = found
+        self.aim(centre, half, depth)
         self._fitted = self.place
+
+    def _whole(self) -> tuple[Any, float, float] | None:
+        """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
+        eyes = [self] if self.beside is None else [self, self.beside]
+        shapes = [shape for eye in eyes for shape in eye._shapes()]
+        if not shapes:
+            return None
+        axes = self._axes()
+        # Not all points at once: of large meshes, a copy of them takes longer than all else.
+        along = [axes @ np.asarray(shape.points).T for shape in shapes]
+        low = np.min([one.min(axis=1) for one in along], axis=0)
+        high = np.max([one.max(axis=1) for one in along], axis=0)
+        extent = high - low
+        half = max(eye._half(extent) for eye in eyes)
+        return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
+
+    def _half(self, extent: Any) -> float:
+        """Return half the height that shows an extent (3,) in a view of this size."""
+        width, height = self.stage.plotter.window_size
+        free = max(width - self.stage.strip(), 1.0)
+        return max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
+
+    def sees_detail(self) -> bool:
+        """Tell whether much less than everything is in the view, for somebody wanted it so."""
+        found = self._whole()
+        return found is not None and self._camera.parallel_scale < DETAIL * found[1]
 
     @property
     def fitted(self) -> bool:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors
@@ -14,8 +15,14 @@ from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 
+RIM = "\nrim"
+"""What stands behind the name of an actor that draws the rim of a ghost; no boundary has it."""
 STILL = 1e-9
 """Part of its extent that rounding may move a boundary that stays where it is."""
+DEEPER = 330.0
+"""Units of depth that faces of ghosts are drawn behind where they are, and their rims before: of
+the 65536 from the nearest to the furthest point. A boundary that slides within its surface would
+show through its ghost in patches."""
 
 
 class GhostLayer:
@@ -47,9 +54,10 @@ class GhostLayer:
     def set_moved(self, moved: Mapping[str, FloatArray]) -> None:
         """Draw where boundaries will go: points (u, d) of the nodes of each."""
         for name in set(self.moved) - set(moved):
-            self._actors.pop(f"motion:{name}", None)
-            self._shapes.pop(f"motion:{name}", None)
-            self.stage.remove(f"motion:{name}")
+            for key in (f"motion:{name}", f"motion:{name}{RIM}"):
+                self._actors.pop(key, None)
+                self._shapes.pop(key, None)
+                self.stage.remove(key)
         self.moved = dict(moved)
         self._draw_moved(self._session)
 
@@ -62,41 +70,83 @@ class GhostLayer:
     def _draw_moved(self, session: Session) -> None:
         if session.mesh is None:
             return
-        view, lift = session.view, self.stage.lift(session.mesh)
-        shown = view.motion_ghost and (view.frame == 0 or session.outdated)
+        view = session.view
+        shown = view.motion_ghost and is_planned(session)
         for name, points in self.moved.items():
             surface = self._surfaces.get(name)
             if surface is None:
                 continue
-            actor = self._actor(f"motion:{name}", surface, 0.55)
-            actors.place(self._shapes[f"motion:{name}"], points, 3 * lift)
-            actor.prop.color = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
-            actor.prop.line_width = 4.5 if session.clash else 2.5
-            # In the same place it would be drawn through the boundary, in patches.
+            # In the same place there is nothing to tell.
             at = session.mesh.points[surface.nodes]
             moves = np.abs(points - at).max() > STILL * np.ptp(at, axis=0).max()
-            actor.visibility = bool(shown and moves and name not in view.hidden)
+            colour = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
+            for actor, shape in self._parts(f"motion:{name}", surface, 0.55):
+                actors.place(shape, points, 3 * self.stage.lift(session.mesh))
+                actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
+                actor.prop.line_width = 4.5 if session.clash else 2.5
+                actor.visibility = bool(shown and moves and name not in view.hidden)
+
+    def _rim_colour(self, colour: str) -> tuple[float, float, float]:
+        """Return a colour that is seen on that of the boundary itself."""
+        own, text = (np.array(pv.Color(one).float_rgb) for one in (colour, self.stage.look.text))
+        red, green, blue = (0.5 * (own + text)).tolist()
+        return red, green, blue
 
     def _draw_undeformed(self, session: Session) -> None:
-        shown = session.view.undeformed and session.mesh is not None
+        view = session.view
+        # The undeformed mesh itself needs no ghost.
+        shown = view.undeformed and session.mesh is not None and view.frame > 0
         for name, surface in self._surfaces.items():
             key = f"undeformed:{name}"
             if not shown and key not in self._actors:
                 continue
-            actor = self._actor(key, surface, 0.45)
             moves = session.role(name) != "fixed"
-            actor.prop.color = self.stage.look.ghost
-            actor.visibility = shown and moves and name not in session.view.hidden
+            for actor, _ in self._parts(key, surface, 0.45):
+                actor.prop.color = self.stage.look.ghost
+                actor.visibility = shown and moves and name not in view.hidden
 
-    def _actor(self, key: str, surface: Surface, opacity: float) -> Any:
-        """Return the actor of that name, made where it is not there yet."""
+    def _parts(self, key: str, surface: Surface, opacity: float) -> list[tuple[Any, Any]]:
+        """Return actor and shape of what a ghost is made of: lines; or faces, and their rim."""
+        faces = self._part(key, lambda at, lift: actors.surface_shape(surface, at, lift))
+        if surface.flat:
+            faces[0].prop.opacity = opacity + 0.25
+            return [faces]
+        faces[0].prop.opacity = opacity - 0.1
+        _shift_depth(faces[0], DEEPER)
+        if not len(surface.rim):
+            return [faces]
+        rim = self._part(f"{key}{RIM}", lambda at, lift: actors.rim_shape(surface, at, lift))
+        rim[0].prop.opacity = min(opacity + 0.35, 1.0)
+        _shift_depth(rim[0], -DEEPER)
+        return [faces, rim]
+
+    def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> tuple[Any, Any]:
+        """Return the actor of that name and its shape, made where they are not there yet."""
         if key not in self._actors:
             mesh = self._session.mesh
             assert mesh is not None
-            flat = surface.facets.shape[1] == 2
-            shape = actors.surface_shape(surface, mesh.points, 3 * self.stage.lift(mesh))
-            actor = self.stage.add(shape, key, lighting=not flat, pickable=False)
-            actor.prop.opacity = opacity + 0.25 if flat else opacity - 0.1
+            shape = make(mesh.points, 3 * self.stage.lift(mesh))
+            lit = mesh.dim == 3 and not key.endswith(RIM)
+            actor = self.stage.add(shape, key, lighting=lit, pickable=False)
             actor.prop.line_width = 2.5
             self._actors[key], self._shapes[key] = actor, shape
-        return self._actors[key]
+        return self._actors[key], self._shapes[key]
+
+
+def _shift_depth(actor: Any, units: float) -> None:
+    """Draw an actor so much deeper than where it is; less than 0 is nearer."""
+    mapper = actor.mapper
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, units)
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, units)
+
+
+def is_planned(session: Session) -> bool:
+    """Tell whether a view should say where motions will take boundaries.
+
+    Of the undeformed mesh it should, but not beside a run, which shows that better; of the steps
+    of a run, where settings have changed since.
+    """
+    if session.view.frame == 0:
+        return session.view.beside is None
+    return session.outdated

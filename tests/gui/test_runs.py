@@ -336,10 +336,12 @@ def compare(driver, number=1):
     return viewing
 
 
-def test_both_views_have_half_the_room_and_a_title(ran):
+def test_both_meshes_have_the_same_room_beside_the_legend_and_a_title(ran):
     viewing = compare(ran)
     QApplication.processEvents()
-    assert abs(viewing.view.width() - viewing.second.width()) <= 2
+    ratio = viewing.second.devicePixelRatioF()
+    strip = viewing.second_scene.stage.strip() / ratio
+    assert abs(viewing.view.width() - (viewing.second.width() - strip)) <= 2
     assert viewing.titles[0].text.startswith("Run 2: direct sliding")
     assert viewing.titles[1].text.startswith("Run 1: pseudo sliding")
     assert viewing.titles[1].isVisible()
@@ -367,11 +369,29 @@ def test_the_whole_mesh_is_seen_in_both_and_a_detail_stays_one(ran):
         seen = to_display(view, points)
         assert seen.min() >= 0
         assert (seen.max(axis=0) <= view.window_size).all()
+    rooms = [view.width() for view in (viewing.view, viewing.second)]
+    assert seen[:, 0].max() - seen[:, 0].min() > 0.8 * min(rooms), "both are well filled"
     ran.window.store.change(changes.show_beside, None)
     viewing.scene.zoom_at(200, 200, 5.0)
     scale = viewing.view.camera.parallel_scale
     compare(ran)
     assert viewing.second.camera.parallel_scale == viewing.view.camera.parallel_scale == scale
+
+
+def test_entering_the_comparison_shows_all_of_both_unless_a_detail_is_looked_at(ran):
+    store, viewing = ran.window.store, ran.window.viewing
+    # Far to the side, as after a drag: nothing was looked at in detail.
+    viewing.scene.eye.aim((9.0, 0.0, 0.0), viewing.view.camera.parallel_scale)
+    compare(ran, changes.UNDEFORMED)
+    for view, scene in ((viewing.view, viewing.scene), (viewing.second, viewing.second_scene)):
+        seen = to_display(view, np.concatenate([one.shape.points for one in scene.drawn.values()]))
+        assert seen.min() >= 0
+        assert (seen.max(axis=0) <= view.window_size).all()
+    store.change(changes.show_beside, None)
+    ran.window.viewing.fly_to(3)
+    place = viewing.scene.eye.place
+    compare(ran, changes.UNDEFORMED)
+    assert viewing.scene.eye.place == place
 
 
 @pytest.mark.parametrize("leads", [0, 1])

@@ -37,3 +37,83 @@ def test_a_boundary_that_stays_in_its_surface_is_drawn_whole(scene, cube):
     scene.plotter.render()
     apart = np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
     assert (np.abs(apart - before).max(axis=2) > 8).mean() > 0.05, "elsewhere it is seen"
+
+
+def image(scene):
+    scene.plotter.render()
+    return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)
+
+
+def slid(cube, name):
+    """The points of a side of the cube, pushed along x within its plane."""
+    return cube.points[cube.marker(name).nodes] + np.array([0.25, 0.0, 0.0])
+
+
+def side_of(cube, normal):
+    """The boundary that lies in the plane z = 1, or another."""
+    low, high = cube.points.min(axis=0), cube.points.max(axis=0)
+    middle = (low + high) / 2.0 + np.asarray(normal) * (high - low) / 2.0
+    return min(
+        cube.marker_names,
+        key=lambda name: np.linalg.norm(cube.points[cube.marker(name).nodes].mean(axis=0) - middle),
+    )
+
+
+def test_a_boundary_that_slides_in_its_surface_keeps_its_colour_within_the_rim(scene, cube):
+    top = side_of(cube, (0, 0, 1))
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_role(session, (top,), "moving")
+    session = changes.set_view(session, edges=False, legend=False, triad=False)
+    scene.open(session, find_surfaces(cube))
+    scene.look_from("+z")
+    before = image(scene)
+    scene.set_motion_ghosts({top: slid(cube, top)})
+    after = image(scene)
+    changed = np.abs(after - before).max(axis=2) > 8
+    # Inside of the mesh only the left edge of the rim is drawn over it, without patches.
+    box = np.abs(before - before[2, 2]).max(axis=2) > 30
+    rows, columns = np.nonzero(box)
+    inner = (slice(rows.min() + 6, rows.max() - 6), slice(columns.min() + 6, columns.max() - 6))
+    share = changed[inner].mean(axis=0)
+    assert (share > 0.9).sum() in range(1, 7)
+    assert ((share < 0.02) | (share > 0.9)).mean() > 0.97
+    # Beside it the ghost is seen.
+    assert changed[rows.mean().astype(int), columns.max() + 4]
+
+
+def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
+    top = side_of(cube, (0, 0, 1))
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_role(session, (top,), "moving")
+    scene.open(session, find_surfaces(cube))
+    before = image(scene)
+    session = changes.set_view(session, undeformed=True)
+    scene.update(session)
+    assert np.array_equal(image(scene), before)
+    moved = cube.with_points(cube.points * (1.0, 1.0, 1.5))
+    session = changes.add_frames(changes.start_run(session), [Frame(moved, quality(moved))])
+    scene.update(session)
+    assert scene.plotter.actors[f"undeformed:{top}"].visibility
+    scene.update(changes.show_frame(session, 0))
+    assert not scene.plotter.actors[f"undeformed:{top}"].visibility
+
+
+def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
+    top = side_of(cube, (0, 0, 1))
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_role(session, (top,), "moving")
+    scene.open(session, find_surfaces(cube))
+    scene.set_motion_ghosts({top: slid(cube, top)})
+    ghost = scene.plotter.actors[f"motion:{top}"]
+    assert ghost.visibility
+    frames = [Frame(cube, quality(cube))]
+    session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
+    session = changes.show_beside(session, changes.UNDEFORMED)
+    for state in (changes.seen_beside(session), changes.show_frame(session, 0)):
+        scene.update(state)
+        assert not ghost.visibility
+    # Settings that have changed since are told of over the run.
+    scene.update(changes.set_role(session, (top,), "fixed"))
+    assert ghost.visibility
+    scene.set_motion_ghosts({})
+    assert not any(name.startswith("motion:") for name in scene.plotter.actors)
