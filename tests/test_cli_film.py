@@ -64,6 +64,39 @@ def test_colours_say_what_is_asked_for(case, tmp_path):
     assert (np.abs(still - violet).max(axis=2) < 40).sum() > 1000
 
 
+def test_two_runs_stand_beside_each_other(case, tmp_path, capsys):
+    file = tmp_path / "a.gif"
+    beside = ["--beside", "SLIDING_MODE=none", "--beside", "PERIODIC_MODE=none"]
+    words = ["film", str(case), "--steps", "2", "--size", "800x400", "-o", str(file)]
+    assert run([*words, *beside]) == 0
+    with Image.open(file) as image:
+        assert (image.size, image.n_frames) == ((800, 400), 3)
+    out = capsys.readouterr()
+    assert "SLIDING_MODE= ps, PERIODIC_MODE= moving: 2 steps, min 0." in out.out
+    assert "SLIDING_MODE= none, PERIODIC_MODE= none: 2 steps, min 0." in out.out
+    assert "SLIDING_MODE= none: inflow, outflow will not slide" in out.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--beside", "STEPS"], "--beside 'STEPS' is not of the form KEY=VALUE"),
+        (["--beside", "STEP=2"], "--beside STEP=2: unknown key 'STEP'; did you mean STEPS?"),
+        (["--beside", "MESH_FILENAME=other.su2"], "must deform the same mesh"),
+        (["--beside", "STEPS=1", "--size", "320x300"], "too narrow for two runs"),
+    ],
+)
+def test_what_cannot_stand_beside_is_told_before_the_work(
+    case, tmp_path, capsys, monkeypatch, words, message
+):
+    def never(*_):
+        raise AssertionError("too late")
+
+    monkeypatch.setattr("slideviz.cli.film_command._frames", never)
+    assert run(["film", str(case), "-o", str(tmp_path / "a.gif"), *words]) == 1
+    assert message in capsys.readouterr().err
+
+
 def test_inverted_cells_are_code_3_and_the_film_is_written(tmp_path, capsys):
     write_sample("square", tmp_path / "square")
     file, case = tmp_path / "a.mp4", tmp_path / "square" / "square.cfg"

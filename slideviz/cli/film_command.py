@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+    from slideviz.view.film_pair import Told
     from slideviz.view.moved import Zoom
+    from slideviz.view.reel import Reel
     from slideviz.view.state import Frame
 
 SMOOTH = 4
@@ -23,46 +26,70 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.progress import Bar
     from slideviz.cli.run_command import read_case
     from slideviz.view.film import film as draw
+    from slideviz.view.film_pair import film_pair, pair_size
     from slideviz.view.reel import Reel, check_film
 
     file = arguments.output
     reel = Reel(arguments.size, arguments.fps, arguments.hold, arguments.between)
     check_film(file, reel, overwrite=arguments.force)  # before the work, not after it
-    frames = _frames(arguments, read_case(arguments))
-    drawing = draw(
-        frames,
-        file,
-        reel,
-        colour_by=arguments.color.replace("-", "_"),
-        zoom=arguments.zoom,
-        overwrite=arguments.force,
-    )
+    if arguments.beside:
+        pair_size(reel.pixels(file))
+    runs = _runs(arguments, read_case(arguments))
+    look = {"colour_by": arguments.color.replace("-", "_"), "zoom": arguments.zoom}
+    look["overwrite"] = arguments.force
+    if len(runs) == 2:
+        drawing = film_pair((runs[0], runs[1]), file, reel, **look)
+    else:
+        drawing = draw(runs[0].frames, file, reel, **look)
     with Bar(not arguments.quiet) as bar, closing(drawing):
         for drawn in drawing:
             bar.count(drawn.done, drawn.total, "image")
-    last = frames[-1].quality
     if not arguments.quiet:
-        _print_film(arguments, reel.count(len(frames)), reel.pace(len(frames)), frames)
-    if last.inverted:
-        print(
-            f"slideviz: {last.inverted} of {len(last)} cells are inverted in the last step; "
-            f"`slideviz run {arguments.case}` says which, and what may help",
-            file=sys.stderr,
-        )
-        return INVERTED
-    return DONE
+        _print_film(arguments, reel, runs)
+    for run in runs:
+        _tell_inverted(arguments, run)
+    return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
 
 
-def _frames(arguments: argparse.Namespace, case: Case) -> list[Frame]:
-    """Return the undeformed mesh and every step, with their quality."""
-    from slideviz import deform, quality, read
-    from slideviz.cli.progress import Bar
+def _runs(arguments: argparse.Namespace, case: Case) -> list[Told]:
+    """Return the run of the case, and the one with the changes of ``--beside``."""
+    from slideviz import read
+    from slideviz.cli.run_command import changed
     from slideviz.errors import CaseError
-    from slideviz.view.state import Frame
+    from slideviz.view.film_pair import Told
 
+    other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     mesh = read(case.mesh_file, zone=case.zone)
+    if not arguments.beside:
+        return [Told("", _frames(arguments, case, mesh))]
+    if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
+        raise CaseError("--beside: two runs beside each other must deform the same mesh")
+    keys = [text.partition("=")[0].strip().upper() for text in arguments.beside]
+    return [Told(_words(one, keys), _frames(arguments, one, mesh)) for one in (case, other)]
+
+
+def _words(case: Case, keys: list[str]) -> str:
+    """Return the values that a case has for some keys, as they stand in a case file."""
+    from textwrap import shorten
+
+    from slideviz.case.keys import KEYS
+
+    words = []
+    for name in dict.fromkeys(keys):
+        value = KEYS[name].get(case)
+        text = "not set" if value is None else KEYS[name].kind.write(value)
+        words.append(f"{name}= {shorten(text, 40, placeholder=' ...')}")
+    return ", ".join(words)
+
+
+def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Frame]:
+    """Return the undeformed mesh and every step, with their quality."""
+    from slideviz import deform, quality
+    from slideviz.cli.progress import Bar
+    from slideviz.view.state import Frame
+
     frames = [Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))]
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
@@ -73,14 +100,29 @@ def _frames(arguments: argparse.Namespace, case: Case) -> list[Frame]:
     return frames
 
 
-def _print_film(
-    arguments: argparse.Namespace, count: int, pace: float, frames: list[Frame]
-) -> None:
-    steps, last = len(frames) - 1, frames[-1].quality
-    print(f"{steps} steps, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
-    print(f"film: {arguments.output} ({count} images, {pace:.3g} a second)")
-    if steps < SMOOTH and not arguments.between:
+def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Told]) -> None:
+    from slideviz.cli.report import counted
+
+    for run in runs:
+        last = run.frames[-1].quality
+        name = f"{run.name}: " if run.name else ""
+        steps = counted(len(run.frames) - 1, "step")
+        print(f"{name}{steps}, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
+    most = max(len(run.frames) for run in runs)
+    print(f"film: {arguments.output} ({reel.count(most)} images, {reel.pace(most):.3g} a second)")
+    if most - 1 < SMOOTH and not arguments.between:
         print("few steps; --between 20 puts 20 images between two of them")
+
+
+def _tell_inverted(arguments: argparse.Namespace, run: Told) -> None:
+    last = run.frames[-1].quality
+    if last.inverted:
+        name = f"{run.name}: " if run.name else ""
+        print(
+            f"slideviz: {name}{last.inverted} of {len(last)} cells are inverted in the last step; "
+            f"`slideviz run {arguments.case}` says which, and what may help",
+            file=sys.stderr,
+        )
 
 
 def add_film(calls: argparse._SubParsersAction) -> None:
@@ -128,6 +170,17 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change a key of the case for this run; may be repeated",
+    )
+    call.add_argument(
+        "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
+    )
+    call.add_argument(
+        "--beside",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="show beside it a second run with this change, as SLIDING_MODE=none; repeated: one "
+        "run with all of them",
     )
     call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
     call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")

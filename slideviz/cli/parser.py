@@ -49,19 +49,8 @@ def _asks_help(argv: Sequence[str]) -> bool:
     return bool(argv) and argv[0] in ("-h", "--help", "help")
 
 
-def _base(**options: object) -> argparse.ArgumentParser:
-    return argparse.ArgumentParser(
-        prog="slideviz",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-        **options,  # type: ignore[arg-type]
-    )
-
-
-class _Command(argparse.ArgumentParser):
-    """A command, whose options are written in full: ``--steps`` is not ``--steps-dir``."""
+class _Parser(argparse.ArgumentParser):
+    """A parser whose options are written in full: ``--steps`` is not ``--steps-dir``."""
 
     def __init__(self, **options: object) -> None:
         super().__init__(allow_abbrev=False, **options)  # type: ignore[arg-type]
@@ -69,6 +58,16 @@ class _Command(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Leave with code 2 and a sentence, instead of all options."""
         self.exit(2, f"{self.prog}: {message}; see `{self.prog} --help`\n")
+
+
+def _base(**options: object) -> _Parser:
+    return _Parser(
+        prog="slideviz",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        **options,
+    )
 
 
 def _window_parser() -> argparse.ArgumentParser:
@@ -85,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = _base()
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     calls = parser.add_subparsers(
-        title="commands", metavar="COMMAND", required=True, parser_class=_Command
+        title="commands", metavar="COMMAND", required=True, parser_class=_Parser
     )
     _add_run(calls)
     _add_info(calls)

@@ -121,6 +121,11 @@ def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality)
     }
 
 
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words: 1 step, 2 steps."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def type_name(mesh: Mesh, cell: int) -> str:
     """Return the name of a cell's type."""
     return ELEMENTS[int(mesh.cells.types[cell])].name

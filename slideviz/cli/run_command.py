@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
@@ -76,20 +78,37 @@ def run(arguments: argparse.Namespace) -> int:
 def read_case(arguments: argparse.Namespace) -> Case:
     """Return the case of the file with the changes of ``--set`` and ``--zone``."""
     from slideviz import Case
+
+    texts = list(arguments.set)
+    if getattr(arguments, "step_count", None) is not None:
+        texts.append(f"STEPS={arguments.step_count}")
+    case = changed(Case.read(arguments.case), texts)
+    return case.change(zone=arguments.zone) if arguments.zone else case
+
+
+def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
+    """Return the case with other values of some keys, each as KEY=VALUE.
+
+    Raises
+    ------
+    CaseError
+        One is not of that form, there is no such key, or the value is wrong.
+    """
     from slideviz.case.cfg import set_key
     from slideviz.case.check import idle_roles
     from slideviz.errors import CaseError
 
-    case = Case.read(arguments.case)
-    for text in arguments.set:
+    before = idle_roles(case)
+    for text in texts:
         key, sign, value = text.partition("=")
         if not sign:
-            raise CaseError(f"--set {text!r} is not of the form KEY=VALUE")
-        case = set_key(case, key.strip(), value.strip())
-    if getattr(arguments, "step_count", None) is not None:
-        case = set_key(case, "STEPS", arguments.step_count)
-    case = case.change(warnings=(*case.warnings, *idle_roles(case)))
-    return case.change(zone=arguments.zone) if arguments.zone else case
+            raise CaseError(f"{option} {text!r} is not of the form KEY=VALUE")
+        try:
+            case = set_key(case, key.strip(), value.strip())
+        except CaseError as problem:
+            raise CaseError(str(problem).replace("--set", option)) from problem
+    kept = [warning for warning in case.warnings if warning not in before]
+    return case.change(warnings=(*kept, *idle_roles(case)))
 
 
 def _default_output(mesh_file: Path) -> Path:
@@ -143,11 +162,11 @@ def _write_qualities(path: Path, found: Quality) -> None:
 
 
 def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> None:
-    from slideviz.cli.report import quality_lines, table
+    from slideviz.cli.report import counted, quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
-    print(f"{report['case']}: {report['steps']} steps, {method}", end="")
+    print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
     print(f"sliding {report['sliding']}, periodic {report['periodic']}")
     print(quality_lines(found))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +26,8 @@ from slideviz.view.surfaces import Surface
 if TYPE_CHECKING:
     from slideviz.view.scene import Scene
 
-_CAPTION_AT = 0.02
+CAPTION_AT = 0.02
+"""Where in the width the words above a film begin."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +70,20 @@ def film(
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     path = Path(file)
-    _check(frames, path, reel, overwrite)
+    require_steps(frames, path, reel, overwrite)
     with offscreen(reel.pixels(path)) as plotter:
         first, *_, last = (frame.mesh for frame in frames)
         seen = [frame.mesh for frame in frames]
         portrait = Portrait(plotter, last, first, colour_by, zoom, seen)
 
-        def draw(shot: _Shot) -> Pixels:
+        def draw(position: float) -> Pixels:
+            shot = shot_at(frames, position)
             portrait.show(shot.frame)
             words = portrait.caption(shot.words, shot.frame.quality)
-            write_title(plotter, words, PAPER, _CAPTION_AT)
+            write_title(plotter, words, PAPER, CAPTION_AT)
             return image_of(plotter)
 
-        yield from _expose(frames, path, reel, draw)
+        yield from expose(len(frames), path, reel, draw)
 
 
 def film_of(
@@ -120,7 +121,7 @@ def film_of(
 
     path, size = Path(file), reel.pixels(Path(file))
     frames = session.frames
-    _check(frames, path, reel, overwrite)
+    require_steps(frames, path, reel, overwrite)
     look: Look = like.look if like is not None else PAPER
     with offscreen(size) as plotter:
         scene = Scene(plotter, look, LETTERS * font_scale(size))
@@ -131,13 +132,14 @@ def film_of(
             scene.set_motion_ghosts(like.motion_ghosts)
             scene.take_camera(like)
 
-        def draw(shot: _Shot) -> Pixels:
+        def draw(position: float) -> Pixels:
+            shot = shot_at(frames, position)
             scene.update(_showing(session, shot.frame))
             words = caption(shot.words, shot.frame.quality, session.view.colour_by)
-            write_title(plotter, words, look, _CAPTION_AT)
+            write_title(plotter, words, look, CAPTION_AT)
             return image_of(plotter)
 
-        yield from _expose(frames, path, reel, draw)
+        yield from expose(len(frames), path, reel, draw)
 
 
 def _showing(session: Session, frame: Frame) -> Session:
@@ -151,46 +153,58 @@ def _showing(session: Session, frame: Frame) -> Session:
 
 
 @dataclass(frozen=True)
-class _Shot:
+class Shot:
     """A frame, and the words for where in the film it is."""
 
     frame: Frame
     words: str
 
 
-def _check(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
+def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
+    """Raise SlidevizError when there is nothing to make a film of, or it cannot be made so."""
     if len(frames) < 2:
         raise SlidevizError("there are no steps to make a film of; run the case first")
     check_film(file, reel, frames=len(frames), overwrite=overwrite)
 
 
-def _expose(
-    frames: Sequence[Frame], file: Path, reel: Reel, draw: Callable[[_Shot], Pixels]
+def expose(
+    frames: int, file: Path, reel: Reel, draw: Callable[[float], Pixels]
 ) -> Generator[Drawn, None, None]:
-    """Yield after each image that ``draw`` made and the encoder took."""
-    total, pace = reel.count(len(frames)), reel.pace(len(frames))
-    take = Take(reel.pixels(file), total, pace, partial(_samples, frames, draw))
+    """Yield after each image that the encoder took.
+
+    Parameters
+    ----------
+    frames : int
+        The undeformed mesh and every step.
+    file : Path
+    reel : Reel
+    draw : callable
+        Draws a position in the film: the number of a step, or something between two.
+    """
+    total, pace = reel.count(frames), reel.pace(frames)
+    samples = sorted({0, frames // 2, frames - 1})
+    take = Take(reel.pixels(file), total, pace, lambda: [draw(float(at)) for at in samples])
     with writer(file, take) as add:
-        for done, shot in enumerate(_shots(frames, reel.between), start=1):
-            add(draw(shot), 1.0 / pace if done < total else max(reel.hold, 1.0 / pace))
+        for done, position in enumerate(_positions(frames - 1, reel.between), start=1):
+            add(draw(position), 1.0 / pace if done < total else max(reel.hold, 1.0 / pace))
             yield Drawn(done, total)
 
 
-def _samples(frames: Sequence[Frame], draw: Callable[[_Shot], Pixels]) -> list[Pixels]:
-    """Return the first, the middle and the last image."""
-    chosen = sorted({0, len(frames) // 2, len(frames) - 1})
-    return [draw(_Shot(frames[k], _words(k, len(frames) - 1))) for k in chosen]
+def _positions(steps: int, between: int) -> Iterator[float]:
+    """Yield the steps and what lies between them."""
+    for step in range(steps):
+        yield from (step + k / (between + 1) for k in range(between + 1))
+    yield float(steps)
 
 
-def _shots(frames: Sequence[Frame], between: int) -> Iterator[_Shot]:
-    """Yield all frames and those in between, made when they are wanted."""
-    steps = len(frames) - 1
-    for step, frame in enumerate(frames):
-        yield _Shot(frame, _words(step, steps))
-        for k in range(1, between + 1) if step < steps else ():
-            part = k / (between + 1)
-            words = f"{_words(step + part, steps)}, interpolated"
-            yield _Shot(_blend(frame, frames[step + 1], part, frames[0]), words)
+def shot_at(frames: Sequence[Frame], position: float) -> Shot:
+    """Return a step, or, between two steps, a mesh on the way from one to the next."""
+    step, steps = int(position), len(frames) - 1
+    words = _words(position, steps)
+    if position == step:
+        return Shot(frames[step], words)
+    frame = _blend(frames[step], frames[step + 1], position - step, frames[0])
+    return Shot(frame, f"{words}, interpolated")
 
 
 def _words(position: float, steps: int) -> str:

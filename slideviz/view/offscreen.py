@@ -66,17 +66,21 @@ def font_scale(size: tuple[int, int]) -> float:
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
-def write_title(plotter: Any, words: str, look: Look, at: float = 0.5) -> None:
-    """Write ``words`` along the upper edge, in place of what stood there.
+def write_title(
+    plotter: Any, words: str, look: Look, at: float = 0.5, letters: float = TITLE
+) -> None:
+    """Write ``words``, a line or two, along the upper edge, in place of what stood there.
 
     ``at`` is the place in the width, 0 to 1; in the middle they are centred about it, elsewhere
     they begin there, so that the words of a film do not tremble when a digit more comes.
+    ``letters`` is their height in pixels, at normal size.
     """
     import pyvista as pv
 
     scale = font_scale(tuple(plotter.window_size))
     title = pv.Text(words)
-    set_letters(title.prop, look, TITLE * scale)
+    set_letters(title.prop, look, letters * scale)
+    title.prop.SetLineSpacing(1.25)
     # The mesh of a view that was zoomed into may lie behind.
     title.prop.SetBackgroundColor(*pv.Color(look.background_top).float_rgb)
     title.prop.SetBackgroundOpacity(0.7)
@@ -84,7 +88,8 @@ def write_title(plotter: Any, words: str, look: Look, at: float = 0.5) -> None:
         title.prop.SetJustificationToCentered()
     title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-    title.GetPositionCoordinate().SetValue(at, 1.0 - 20 * scale / plotter.window_size[1])
+    middle = (10 + 10 * len(words.splitlines())) * scale
+    title.GetPositionCoordinate().SetValue(at, 1.0 - middle / plotter.window_size[1])
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
 
 

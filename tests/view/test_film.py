@@ -2,6 +2,7 @@ import os
 import re
 import stat
 from contextlib import suppress
+from dataclasses import replace
 
 import imageio_ffmpeg
 import numpy as np
@@ -10,7 +11,6 @@ from PIL import Image
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
 from slideviz.view.film import film, film_of
 from slideviz.view.look import PAPER
 from slideviz.view.offscreen import font_scale, offscreen
@@ -65,8 +65,8 @@ def frames(square):
 @pytest.fixture
 def ran(session, frames):
     run = Run(1, session.case, frames[1:], "done")
-    view = changes.replace(session.view, colour_by="size_skew", frame=2)
-    return changes.replace(session, first=frames[0], runs=(run,), shown=1, view=view)
+    view = replace(session.view, colour_by="size_skew", frame=2)
+    return replace(session, first=frames[0], runs=(run,), shown=1, view=view)
 
 
 def test_an_mp4_has_the_size_the_time_and_the_steps(tmp_path, frames):
@@ -308,7 +308,7 @@ def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
 
 
 def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran, monkeypatch):
-    ran = changes.replace(ran, view=changes.replace(ran.view, colour_by="displacement"))
+    ran = replace(ran, view=replace(ran.view, colour_by="displacement"))
     seen = []
     update = Scene.update
 
