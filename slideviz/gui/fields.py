@@ -75,7 +75,7 @@ class NumberField(QLineEdit):
     def set_tip(self, text: str) -> None:
         """Explain the field; shown while its value is valid."""
         self._tip = text
-        self._mark(self.problem)
+        self.mark(self.problem)
 
     def set_scale(self, scale: float) -> None:
         """Take a length beside which the smallest numbers are shown as 0."""
@@ -90,7 +90,7 @@ class NumberField(QLineEdit):
             return
         self._value = float(value)
         self._write()
-        self._mark("")
+        self.mark("")
 
     def _write(self) -> None:
         """Write the value, the first digits in sight."""
@@ -114,7 +114,7 @@ class NumberField(QLineEdit):
 
     def _edited(self) -> None:
         problem = self.problem
-        self._mark(problem)
+        self.mark(problem)
         if not problem:
             self._value = float(self.text().strip().replace(",", "."))
             self.changed.emit(self._value)
@@ -122,9 +122,10 @@ class NumberField(QLineEdit):
     def _tidy(self) -> None:
         if self.problem:
             self._write()
-            self._mark("")
+            self.mark("")
 
-    def _mark(self, problem: str) -> None:
+    def mark(self, problem: str) -> None:
+        """Show that the number is not valid, and why; or, with an empty text, that it is."""
         self.setToolTip(problem or self._tip)
         if bool(self.property("bad")) != bool(problem):
             self.setProperty("bad", bool(problem))
@@ -133,12 +134,22 @@ class NumberField(QLineEdit):
 
 
 class VectorField(QWidget):
-    """Two or three numbers in a row."""
+    """Two or three numbers in a row.
+
+    ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
+    then, and the change is not told.
+    """
 
     changed = Signal(tuple)
 
-    def __init__(self, values: Sequence[float] = (0.0, 0.0, 0.0), names: str = "xyz") -> None:
+    def __init__(
+        self,
+        values: Sequence[float] = (0.0, 0.0, 0.0),
+        allowed: Callable[[Sequence[float]], str] | None = None,
+        names: str = "xyz",
+    ) -> None:
         super().__init__()
+        self._allowed = allowed or (lambda _: "")
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(4)
@@ -147,7 +158,7 @@ class VectorField(QWidget):
         for name, value in zip(names, values, strict=True):
             label, field = QLabel(name), NumberField(value)
             field.setAccessibleName(name)
-            field.changed.connect(lambda _: self.changed.emit(self.value))
+            field.changed.connect(lambda _: self._tell())
             row.addWidget(label)
             row.addWidget(field, 1)
             self.fields.append(field)
@@ -161,6 +172,20 @@ class VectorField(QWidget):
     def value(self) -> tuple[float, ...]:
         """Return the numbers, as many as the mesh has dimensions."""
         return tuple(field.value for field in self.fields[: self.count])
+
+    @property
+    def problem(self) -> str:
+        """Return why the numbers together are not valid, or an empty text."""
+        return self._allowed(self.value)
+
+    def _tell(self) -> None:
+        self._mark()
+        if not self.problem:
+            self.changed.emit(self.value)
+
+    def _mark(self) -> None:
+        for field in self.fields:
+            field.mark(field.problem or self.problem)
 
     def set_count(self, count: int) -> None:
         """Show the first ``count`` numbers only."""
@@ -179,6 +204,7 @@ class VectorField(QWidget):
         for field, value in zip(self.fields, values, strict=False):
             field.show_value(value)
         self._compare()
+        self._mark()
 
     def _compare(self) -> None:
         """Show as 0 what is left of it by rounding beside the other numbers."""
@@ -223,6 +249,11 @@ def positive(value: float) -> str:
 def not_zero(value: float) -> str:
     """Return why a number may not be zero."""
     return "" if value else "0 would flatten the boundary"
+
+
+def a_direction(values: Sequence[float]) -> str:
+    """Return why numbers are no direction."""
+    return "" if any(values) else "an axis needs a direction: not all may be 0"
 
 
 def angle_limit(value: float) -> str:

@@ -22,14 +22,14 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.case.model import Reduction
-from slideviz.gui.fields import Choice, NumberField, VectorField, positive
+from slideviz.gui.fields import Choice, NumberField, VectorField, a_direction, positive
 from slideviz.gui.method_more import NO_REDUCTION, MoreSettings, enable, not_used, set_tip
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
+from slideviz.view.motion_words import direction_words
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
-AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 MAX_STEPS = 9999
 
 TIPS = {
@@ -124,7 +124,7 @@ class MethodPanel(QWidget):
         self.periodic_type = Choice(
             {"auto": "automatic", "translational": "translational", "rotational": "rotational"}
         )
-        self.axis = VectorField((0.0, 0.0, 1.0))
+        self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
         self.origin = VectorField((0.0, 0.0, 0.0))
         self.found = QLabel()
         self.found.setWordWrap(True)
@@ -172,7 +172,7 @@ class MethodPanel(QWidget):
     def _connect(self) -> None:
         for name in ("method", "sliding", "periodic", "periodic_type"):
             getattr(self, name).chosen.connect(lambda value, name=name: self._set(name, value))
-        self.axis.changed.connect(self._axis_changed)
+        self.axis.changed.connect(lambda value: self._set("axis", value))
         self.origin.changed.connect(lambda value: self._set("origin", value))
         self.steps.valueChanged.connect(lambda value: self._set("steps", value))
         self.reduction.toggled.connect(self._reduction_toggled)
@@ -181,10 +181,6 @@ class MethodPanel(QWidget):
     def _set(self, name: str, value: object) -> None:
         if getattr(self.store.session.case, name) != value:
             self.store.change(changes.set_case, **{name: value})
-
-    def _axis_changed(self, value: tuple[float, ...]) -> None:
-        if any(value):
-            self._set("axis", value)
 
     def _reduction_toggled(self, on: bool) -> None:
         # What was set before it was switched off comes back with it.
@@ -287,17 +283,13 @@ def _kinds(session: Session) -> set[str]:
 def period_text(pair: Pair) -> str:
     """Return the period of a pair in a few words: λ or θ, and along or about what."""
     if pair.kind == "rotational":
-        return f"θ = {math.degrees(pair.period):.6g}° about {axis_text(pair.axis)}"
-    return f"λ = {pair.period:.6g} along {axis_text(pair.vector / pair.period)}"
+        return f"θ = {math.degrees(pair.period):.6g}° about {_axis(pair.axis)}"
+    return f"λ = {pair.period:.6g} along {_axis(pair.vector / pair.period)}"
 
 
-def axis_text(direction: Sequence[float]) -> str:
-    """Return a direction as x, y or z where it is one, else its components."""
-    whole = (*direction, 0.0)[:3]
-    for axis, name in AXES.items():
-        if abs(abs(sum(a * b for a, b in zip(axis, whole, strict=True))) - 1.0) < 1e-6:
-            return name
-    return f"({', '.join(f'{v:.4g}' for v in direction)})"
+def _axis(direction: Sequence[float]) -> str:
+    """Return an axis in words: which of its two ways it is told does not matter."""
+    return direction_words(direction).removeprefix("-")
 
 
 def found_text(session: Session) -> str:

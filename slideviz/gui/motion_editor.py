@@ -5,33 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import (
-    QFileDialog,
-    QFormLayout,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QWidget,
-)
+from qtpy.QtWidgets import QFileDialog, QWidget
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
-from slideviz.gui.fields import Choice, NumberField, VectorField, not_zero
+from slideviz.gui.motion_form import ABOUT, MotionForm
+from slideviz.gui.motion_kinds import Axis, new_motion
 
-KINDS: dict[type, str] = {
-    Translate: "translate",
-    Rotate: "rotate",
-    Scale: "scale",
-    Radial: "push radially",
-    FromFile: "displacement file",
-}
 ALL_MOVING = ""
-ABOUT = {"centroid": "its centroid", "axis": "the machine's axis", "point": "a point"}
-Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""Direction, and a point on it."""
+Z = (0.0, 0.0, 1.0)
 
 
-class MotionEditor(QWidget):
+class MotionEditor(MotionForm):
     """Shows a motion and tells each valid change of it."""
 
     changed = Signal(object)
@@ -43,94 +27,17 @@ class MotionEditor(QWidget):
         self._markers: tuple[str, ...] = ()
         self._centroid = {}
         self._machine: Axis | None = None
-        self.form = QFormLayout(self)
-        self.form.setContentsMargins(0, 2, 0, 0)
-        self.form.setVerticalSpacing(4)
-        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self._make_fields()
-        self._place_fields()
+        self._connect()
         self.show_motion(None, (), 3)
 
-    def _make_fields(self) -> None:
-        self.marker = Choice({})
-        self.kind = Choice(KINDS)
-        self.vector = VectorField()
-        self.vector.set_tip("How far it moves along each axis, in the mesh's length unit.")
-        self.angle = NumberField()
-        self.angle.set_tip("Degrees; positive turns counter-clockwise seen against the axis.")
-        self.factors = VectorField((1.0, 1.0, 1.0))
-        self.factors.set_tip("Enlargement along each axis: 1 leaves it, 2 doubles it.")
-        for field in self.factors.fields:
-            field._allowed = not_zero
-        self.percent = NumberField(allowed=_above_minus_100)
-        self.percent.set_tip("How much larger the radius becomes, in percent: 3 is 3 % outwards.")
-        self.distance = NumberField()
-        self.distance.set_tip("How far outwards besides, in the mesh's length unit.")
-        self.about = Choice({"centroid": ABOUT["centroid"], "point": ABOUT["point"]})
-        self.about.setToolTip("What stays in place while it turns or grows.")
-        self.point = VectorField()
-        self.point.set_tip("The point that stays in place.")
-        self.axis = VectorField((0.0, 0.0, 1.0))
-        self.axis.set_tip("Direction of the axis; its length does not matter.")
-        self.path = QLineEdit()
-        self.path.setToolTip("A line for each node: its number and its displacement.")
-        self.browse = QPushButton("…")
-        self.browse.setMaximumWidth(30)
-        self.browse.setToolTip("Choose the file.")
+    def _connect(self) -> None:
         self.marker.chosen.connect(lambda _: self._tell())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        for field in (
-            self.vector,
-            self.angle,
-            self.factors,
-            self.percent,
-            self.distance,
-            self.point,
-            self.axis,
-        ):
+        for field in self.numbers:
             field.changed.connect(lambda _: self._tell())
         self.path.textEdited.connect(lambda _: self._tell())
         self.browse.clicked.connect(self._browse)
-
-    def _place_fields(self) -> None:
-        row = QWidget()
-        line = QHBoxLayout(row)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.setSpacing(4)
-        line.addWidget(self.path, 1)
-        line.addWidget(self.browse)
-        both = QWidget()
-        pair = QHBoxLayout(both)
-        pair.setContentsMargins(0, 0, 0, 0)
-        pair.setSpacing(6)
-        pair.addWidget(self.kind, 1)
-        pair.addWidget(self.marker, 1)
-        self.form.addRow("Motion", both)
-        self._rows: dict[str, QWidget] = {
-            "vector": self.vector,
-            "angle": self.angle,
-            "factors": self.factors,
-            "percent": self.percent,
-            "distance": self.distance,
-            "about": self.about,
-            "point": self.point,
-            "axis": self.axis,
-            "path": row,
-        }
-        titles = (
-            "By",
-            "Angle (°)",
-            "Factors",
-            "Radius by (%)",
-            "and by",
-            "About",
-            "Point",
-            "Axis",
-            "File",
-        )
-        for title, widget in zip(titles, self._rows.values(), strict=True):
-            self.form.addRow(QLabel(title), widget)
 
     def show_motion(self, motion: Motion | None, markers: tuple[str, ...], dim: int) -> None:
         """Show a motion of one of these moving boundaries, or nothing."""
@@ -145,8 +52,7 @@ class MotionEditor(QWidget):
             shown |= {"about"} | self._show_place(motion, dim)
         for vector in (self.vector, self.factors, self.point):
             vector.set_count(dim)
-        for name, widget in self._rows.items():
-            self.form.setRowVisible(widget, name in shown)
+        self.show_rows(shown)
 
     def _show_numbers(self, motion: Motion, dim: int) -> set[str]:
         """Show what a motion does, and return the rows for it."""
@@ -226,25 +132,27 @@ class MotionEditor(QWidget):
         """Take the centroids of boundaries: where a point starts that nobody has typed yet."""
         self._centroid = centroids
 
+    def set_extent(self, extent: float) -> None:
+        """Take the size of the mesh, beside which what rounding left of zero is shown as 0."""
+        self.point.set_scale(extent)
+
     def set_machine(self, machine: Axis | None) -> None:
         """Take the axis about which the mesh repeats; None where it does not."""
         self._machine = machine
 
     def _tell(self) -> None:
         marker, kind = self.marker.currentData() or "", type(self._motion)
+        axis = self.axis.value if self._dim == 3 else Z
+        if self.axis.problem:
+            axis = getattr(self._motion, "axis", Z)
         point = "centroid" if self.about.currentData() == "centroid" else self.point.value
         if kind is Translate:
             motion: Motion = Translate(marker, self.vector.value)
         elif kind is Rotate:
-            axis = self.axis.value if self._dim == 3 else (0.0, 0.0, 1.0)
-            if not any(axis):
-                self.axis.fields[0].setToolTip("The axis needs a direction: not all may be 0.")
-                return
             motion = Rotate(marker, self.angle.value, point, axis)
         elif kind is Scale:
             motion = Scale(marker, self.factors.value, point)
         elif kind is Radial:
-            axis = self.axis.value if self._dim == 3 else (0.0, 0.0, 1.0)
             factor = round(1.0 + self.percent.value / 100.0, 14)
             motion = Radial(marker, factor, self.distance.value, axis, point)
         else:
@@ -257,26 +165,3 @@ class MotionEditor(QWidget):
         if name:
             self.path.setText(name)
             self._tell()
-
-
-def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -> Motion:
-    """Return a motion of that kind which does not move anything yet.
-
-    Where the mesh repeats about an axis, what turns or is pushed does so about that axis.
-    """
-    axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    if kind is Translate:
-        return Translate(marker, (0.0,) * dim)
-    if kind is Rotate:
-        about = "centroid" if machine is None else origin[:dim]
-        return Rotate(marker, 0.0, about, axis)
-    if kind is Radial:
-        return Radial(marker, 1.0, 0.0, axis, origin[:dim])
-    if kind is Scale:
-        return Scale(marker, (1.0,) * dim)
-    return FromFile(Path(), marker)
-
-
-def _above_minus_100(value: float) -> str:
-    """Return why a radius cannot change by so many percent."""
-    return "" if value > -100.0 else "-100 % or less would fold the boundary"

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 from qtpy.QtCore import QSize, Qt
@@ -18,13 +19,17 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.icons import icon
-from slideviz.gui.motion_editor import KINDS, Axis, MotionEditor, new_motion
+from slideviz.gui.motion_editor import MotionEditor
+from slideviz.gui.motion_kinds import KINDS, Axis, new_motion
+from slideviz.mesh.model import Mesh
 from slideviz.view import changes
 from slideviz.view.look import Look
 from slideviz.view.motion_words import describe
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
+DIGITS = 12
+"""Of a centroid, counted from the first of the extent of the mesh."""
 HEIGHT, LEAST_HEIGHT = 300, 210
 """Pixels that the panel would like, and that its longest form needs."""
 
@@ -36,7 +41,8 @@ class MotionPanel(QWidget):
         super().__init__(parent)
         self.store = store
         self._syncing = False
-        self._mesh = None
+        self._mesh: Mesh | None = None
+        self._extent = 0.0
         layout = QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 6, 4)
         layout.setSpacing(4)
@@ -105,9 +111,13 @@ class MotionPanel(QWidget):
     def sync(self, session: Session) -> None:
         """Show the session."""
         motions, moving = session.case.motions, session.case.markers_with("moving")
+        if session.mesh is not self._mesh:
+            self._take_mesh(session.mesh)
         self._syncing = True
         try:
-            texts = [f"{i}.  {describe(motion)}" for i, motion in enumerate(motions, 1)]
+            dim = session.mesh.dim if session.mesh is not None else 2
+            said = (describe(motion, dim, self._extent) for motion in motions)
+            texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
             current = self.list.currentRow()
             if self.list.count() != len(texts):
                 # A new motion is the one to be edited; after a removal, its neighbour is.
@@ -120,12 +130,15 @@ class MotionPanel(QWidget):
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
         finally:
             self._syncing = False
-        if session.mesh is not self._mesh:
-            self._mesh = session.mesh
-            self.editor.set_centroids(_centroids(session))
         self.editor.set_machine(_machine(session))
         self._sync_editor(session)
         self._sync_buttons(session, moving)
+
+    def _take_mesh(self, mesh: Mesh | None) -> None:
+        """Note what motions need to know of another mesh; that takes a while."""
+        self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
+        self.editor.set_centroids(_centroids(mesh) if mesh is not None else {})
+        self.editor.set_extent(self._extent)
 
     def _sync_editor(self, session: Session) -> None:
         row, motions = self.list.currentRow(), session.case.motions
@@ -190,13 +203,14 @@ class MotionPanel(QWidget):
         super().keyPressEvent(event)
 
 
-def _centroids(session: Session) -> dict[str, tuple[float, ...]]:
-    if session.mesh is None:
-        return {}
-    points = session.mesh.points
+def _centroids(mesh: Mesh) -> dict[str, tuple[float, ...]]:
+    """Return the centroid of each boundary, without the last digits, which are rounding."""
+    digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
     return {
-        marker.name: tuple(float(v) for v in points[marker.nodes].mean(axis=0))
-        for marker in session.mesh.markers
+        marker.name: tuple(
+            round(float(v), digits) + 0.0 for v in mesh.points[marker.nodes].mean(axis=0)
+        )
+        for marker in mesh.markers
         if len(marker.nodes)
     }
 

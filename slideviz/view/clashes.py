@@ -1,11 +1,12 @@
-"""Whether the motions, as they are typed, put a boundary through another one."""
+"""Whether motions, as they are typed, put a boundary through another, or have bad files."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from slideviz.case.clash import clash
-from slideviz.case.model import Case
+from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
@@ -20,18 +21,29 @@ def clash_key(session: Session) -> tuple[object, ...]:
 
 
 def find_clash(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
-    """Return the sentence about a clash, empty when there is none or the case has other problems.
+    """Return the sentence about a clash, or about a displacement file with mistakes.
 
-    Those are told elsewhere; a displacement file that cannot be read, by the run.
+    It is empty when there is none, or when the case has other problems: they are told elsewhere.
     """
+    files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
     try:
         if not case.motions or check_case(case, mesh) or stopped():
             return ""
+        if not all(path.is_file() for path in files):
+            return ""
         moved = displacements(case, mesh)
         found = clash(case, mesh, moved.nodes, moved.vectors)
-    except SlidevizError:
-        return ""
+    except SlidevizError as error:
+        return _first_line(error, files)
     return found[0].upper() + found[1:] + "." if found else ""
+
+
+def _first_line(error: SlidevizError, files: list[Path]) -> str:
+    """Return the first mistake, without the folders of files, and how many more there are."""
+    first, *others = str(error).splitlines()
+    for path in files:
+        first = first.replace(str(path), path.name)
+    return f"{first} ({len(others)} more)." if others else f"{first}."
 
 
 def set_clash(session: Session, text: str, key: tuple[object, ...]) -> Session:

@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Case, FromFile, Motion, Point, Radial, Rotate, Scale, Translate
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+ALONG = 1e-12
+"""What the cosine of the angle between a direction and an axis may miss of 1."""
+NOTHING = 1e-10
+"""Part of the extent of a mesh below which a coordinate is what rounding left of zero."""
 
 
-def describe(motion: Motion) -> str:
-    """Return a motion in a few words."""
-    return f"{motion.marker or 'all moving'}: {_in_full(motion)}"
+def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
+    """Return a motion in a few words.
+
+    Parameters
+    ----------
+    motion : Motion
+    dim : int
+        Dimensions of the mesh; in 3D a rotation has an axis.
+    extent : float
+        Size of the mesh: of a point, what rounding left of zero beside it is told as 0.
+    """
+    return f"{motion.marker or 'all moving'}: {_in_full(motion, dim, extent)}"
 
 
-def _in_full(motion: Motion) -> str:
+def _in_full(motion: Motion, dim: int, extent: float) -> str:
     if isinstance(motion, Translate):
         return f"translate by {vector_words(motion.vector)}"
     if isinstance(motion, Rotate):
-        return f"rotate by {motion.angle_deg:.5g}°" + _about(motion.point)
+        turned = f"rotate by {motion.angle_deg:.5g}°"
+        if dim == 3:
+            through = _place(motion.point, extent)
+            return f"{turned} about {direction_words(motion.axis)} through {through}"
+        return f"{turned} about {_place(motion.point, extent)}"
     if isinstance(motion, Scale):
-        return f"scale by {_factors(motion.factors)}" + _about(motion.point)
+        return f"scale by {_factors(motion.factors)} about {_place(motion.point, extent)}"
     if isinstance(motion, Radial):
         return f"push radially by {_push(motion)}"
     return f"displace as in {motion.path.name or '(no file yet)'}"
@@ -81,11 +102,11 @@ def _exactly(motion: Motion) -> str:
     if isinstance(motion, Translate):
         return f"translate {vector_words(motion.vector, '.15g')}"
     if isinstance(motion, Scale):
-        return f"scale {_factors(motion.factors, '.15g')}" + _about(motion.point, ".15g")
+        return f"scale {_factors(motion.factors, '.15g')}" + _about(motion.point)
     if isinstance(motion, Radial):
         by = f"× {motion.factor:.15g} {motion.distance:+.15g}"
-        return f"radially {by}" + _about(motion.point, ".15g") + _along(motion.axis)
-    turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point, ".15g")
+        return f"radially {by}" + _about(motion.point) + _along(motion.axis)
+    turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point)
     return turned + _along(motion.axis)
 
 
@@ -104,11 +125,25 @@ def _push(motion: Radial) -> str:
     return " and ".join(parts)
 
 
-def _about(point: object, form: str = ".4g") -> str:
-    if isinstance(point, tuple):
-        return f" about {vector_words(point, form)}"
-    return " about its centroid"
+def _place(point: Point, extent: float = 0.0, form: str = ".4g") -> str:
+    if isinstance(point, str):
+        return f"its {point}"
+    return vector_words([v if abs(v) >= NOTHING * extent else 0.0 for v in point], form)
+
+
+def _about(point: Point) -> str:
+    return f" about {_place(point, form='.15g')}"
 
 
 def _along(axis: Sequence[float]) -> str:
-    return "" if tuple(axis) == (0.0, 0.0, 1.0) else f", axis {vector_words(axis, '.15g')}"
+    return "" if tuple(axis) == AXES["z"] else f", axis {vector_words(axis, '.15g')}"
+
+
+def direction_words(direction: Sequence[float]) -> str:
+    """Return a direction as x, -x and so on where it is one, else its components."""
+    whole = (*direction, 0.0)[:3]
+    least = (1.0 - ALONG) * math.hypot(*whole)
+    for name, value in zip(AXES, whole, strict=True):
+        if abs(value) > least > 0.0:
+            return name if value > 0.0 else f"-{name}"
+    return vector_words(direction)

@@ -29,6 +29,11 @@ def _of_last(run: Run, name: str) -> float | None:
     return getattr(run.last.quality, name) if run.last is not None else None
 
 
+def _motions(run: Run) -> str | None:
+    dim = run.last.mesh.dim if run.last is not None else 2
+    return "; ".join(describe(motion, dim) for motion in run.case.motions) or None
+
+
 def _error(run: Run) -> float | None:
     step = run.last.step if run.last is not None else None
     return step.max_error if step is not None else None
@@ -51,7 +56,7 @@ class Column:
 COLUMNS: tuple[Column, ...] = (
     Column("run", lambda run: run.number),
     Column("name", lambda run: run.name or None),
-    Column("motion", lambda run: "; ".join(map(describe, run.case.motions)) or None),
+    Column("motion", _motions),
     Column("method", lambda run: method_words(run.case)),
     Column("periodicity", lambda run: PERIODIC[run.case.periodic]),
     Column("steps", lambda run: len(run.frames)),

@@ -42,6 +42,27 @@ def test_other_problems_of_the_case_are_told_elsewhere(passage):
     assert look(lost, passage.mesh) == ""
 
 
+def test_mistakes_of_a_displacement_file_are_told_without_its_folder(passage, tmp_path):
+    file = tmp_path / "table.txt"
+    case = Case(roles={"airfoil": "moving"}, motions=(FromFile(file, "airfoil"),))
+    node = int(passage.mesh.marker("airfoil").nodes[0])
+    file.write_text(f"{node} 0.001 0.002\n")
+    assert look(case, passage.mesh) == ""
+    file.write_text(f"{node} 0.001\nx 1 2\n")
+    text = look(case, passage.mesh)
+    assert text.startswith("table.txt:1: ")
+    assert "needed are 3" in text
+    assert text.endswith("(1 more).")
+
+
+def test_boundaries_that_disagree_about_a_node_are_told(square):
+    roles = {"bottom": "moving", "left": "moving"}
+    motions = (Translate("bottom", (0.1, 0.0)), Translate("left", (0.2, 0.0)))
+    case = Case(roles=roles, motions=motions)
+    assert "bottom" in look(case, square)
+    assert look(case.change(motions=(motions[0], Translate("left", (0.1, 0.0)))), square) == ""
+
+
 def test_a_clash_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
     session = changes.set_role(session, ["bottom"], "moving")
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))

@@ -129,6 +129,18 @@ def test_ghosts_read_displacement_files_again_when_they_change(tmp_path, passage
     assert np.allclose(ghosts.moved(case)["airfoil"][0], mesh.points[node])
 
 
+def test_a_displacement_file_of_all_moving_boundaries_moves_each_ghost(tmp_path, passage):
+    mesh, file = passage.mesh, tmp_path / "d.txt"
+    names = ("airfoil", "inflow")
+    nodes = {name: mesh.marker(name).nodes for name in names}
+    file.write_text("".join(f"{nodes[name][1]} 0.5 {at}\n" for at, name in enumerate(names)))
+    case = Case(roles=dict.fromkeys(names, "moving"), motions=(FromFile(file),))
+    moved = Ghosts(mesh).moved(case)
+    for at, name in enumerate(names):
+        assert np.allclose(moved[name][1] - mesh.points[nodes[name][1]], [0.5, at])
+        assert np.allclose(moved[name][0], mesh.points[nodes[name][0]])
+
+
 def test_the_view_needs_no_qt():
     import subprocess
     import sys

@@ -1,0 +1,141 @@
+"""The motion panel: what its fields show, keep and refuse, for 2D and 3D meshes."""
+
+import numpy as np
+import pytest
+from qtpy.QtTest import QTest
+
+from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
+from slideviz.view import changes
+
+NOISE = 3.7e-13
+
+
+@pytest.fixture
+def block(driver, sample_folder):
+    """The block in a cube, which moves, without a motion."""
+    driver.open(sample_folder / "hexahedron" / "mesh.su2")
+    driver.role("BLOCK", "moving")
+    return driver
+
+
+@pytest.fixture
+def blade(driver, passage_file):
+    driver.open(passage_file)
+    driver.role("airfoil", "moving")
+    return driver
+
+
+def editor(driver):
+    return driver.window.motions.editor
+
+
+def texts(vector):
+    return [field.text() for field in vector.fields[: vector.count]]
+
+
+def put(driver, *motions):
+    driver.window.store.change(changes.set_case, motions=motions)
+
+
+def listed(driver, row=0):
+    return driver.window.motions.list.item(row).text()
+
+
+def test_what_rounding_left_of_zero_reads_0_and_stays_in_the_case(block):
+    motion = Rotate("BLOCK", 5.0, (NOISE, 0.0, 0.0))
+    put(block, motion)
+    assert texts(editor(block).point) == ["0", "0", "0"]
+    assert "through (0, 0, 0)" in listed(block)
+    block.type(editor(block).angle, "7")
+    assert block.session.case.motions[0].point == motion.point, "nobody has edited it"
+    put(block, Rotate("BLOCK", 5.0, (1e-7, 0.0, 0.0)))
+    assert texts(editor(block).point)[0] == "1e-07", "a small length is none"
+    assert "through (1e-07, 0, 0)" in listed(block)
+
+
+def test_a_small_displacement_is_shown_as_it_is(block):
+    put(block, Translate("BLOCK", (NOISE, 0.0, 0.0)))
+    assert texts(editor(block).vector) == ["3.7e-13", "0", "0"]
+
+
+def test_a_point_begins_at_the_centroid_without_the_digits_of_rounding(block):
+    put(block, Scale("BLOCK", (2.0, 2.0, 2.0)))
+    block.choose(editor(block).about, "point")
+    point = block.session.case.motions[0].point
+    points = block.session.mesh.points[block.session.mesh.marker("BLOCK").nodes]
+    assert point == pytest.approx(points.mean(axis=0), abs=1e-11)
+    assert point == (0.5, 0.5, 0.5)
+
+
+def test_an_axis_without_direction_is_marked_and_the_rest_goes_on(block):
+    put(block, Rotate("BLOCK", 5.0, "centroid", (1.0, 0.0, 0.0)))
+    axis = editor(block).axis
+    axis.fields[0].selectAll()
+    QTest.keyClicks(axis.fields[0], "0")
+    assert [field.property("bad") for field in axis.fields] == [True] * 3
+    assert axis.fields[2].toolTip() == "an axis needs a direction: not all may be 0"
+    assert block.session.case.motions[0].axis == (1.0, 0.0, 0.0)
+    axis.fields[1].selectAll()
+    QTest.keyClicks(axis.fields[1], "2")
+    assert not any(field.property("bad") for field in axis.fields)
+    assert block.session.case.motions[0].axis == (0.0, 2.0, 0.0)
+    axis.fields[1].selectAll()
+    QTest.keyClicks(axis.fields[1], "0")
+    block.type(editor(block).angle, "9")
+    assert block.session.case.motions == (Rotate("BLOCK", 9.0, "centroid", (0.0, 2.0, 0.0)),)
+
+
+def test_the_list_tells_the_axis_of_a_3d_rotation(block, sample_folder):
+    put(block, Rotate("BLOCK", 5.0, "centroid", (0.0, -1.0, 0.0)), Rotate("BLOCK", 5.0))
+    assert listed(block, 0) == "1.  BLOCK: rotate by 5° about -y through its centroid"
+    assert listed(block, 1) == "2.  BLOCK: rotate by 5° about z through its centroid"
+
+
+def test_the_list_tells_the_point_of_a_2d_rotation(blade):
+    put(blade, Rotate("airfoil", 5.0), Rotate("airfoil", 5.0, (1.0, 0.5)))
+    assert listed(blade, 0) == "1.  airfoil: rotate by 5° about its centroid"
+    assert listed(blade, 1) == "2.  airfoil: rotate by 5° about (1, 0.5)"
+
+
+MOVED = {
+    Translate: lambda p: p + np.r_[0.02, np.zeros(p.shape[1] - 1)],
+    Scale: lambda p: p.mean(axis=0) + (p - p.mean(axis=0)) * np.r_[1.2, np.ones(p.shape[1] - 1)],
+    Radial: lambda p: np.c_[1.1 * p[:, :2], p[:, 2:]],
+}
+"""Where the nodes of a boundary (n, d) go."""
+
+
+def type_first(driver, kind):
+    """Type the number that makes a motion of that kind move something."""
+    form = editor(driver)
+    field, text = {
+        Translate: (form.vector.fields[0], "0.02"),
+        Scale: (form.factors.fields[0], "1.2"),
+        Radial: (form.percent, "10"),
+    }[kind]
+    driver.type(field, text)
+
+
+@pytest.mark.parametrize("kind", MOVED)
+@pytest.mark.parametrize("what", ["blade", "block"])
+def test_every_kind_moves_its_ghost_as_it_is_typed(request, kind, what):
+    driver, name = request.getfixturevalue(what), {"blade": "airfoil", "block": "BLOCK"}[what]
+    driver.add_motion(kind)
+    type_first(driver, kind)
+    points = driver.session.mesh.points[driver.session.mesh.marker(name).nodes]
+    ghost = driver.window.scene.motion_ghosts[name]
+    assert np.allclose(ghost, MOVED[kind](points))
+    driver.add_motion(Translate)
+    type_first(driver, Translate)
+    ghost = driver.window.scene.motion_ghosts[name]
+    assert np.allclose(ghost, MOVED[Translate](MOVED[kind](points))), "one after the other"
+
+
+def test_a_file_with_mistakes_is_told_as_it_is_chosen(blade, tmp_path, qtbot):
+    file = tmp_path / "table.txt"
+    file.write_text("0 0.1\n")
+    blade.add_motion(FromFile)
+    blade.type(editor(blade).path, str(file))
+    told = blade.window.run_panel.text
+    qtbot.waitUntil(lambda: "table.txt:1: " in told.text(), timeout=10_000)
+    assert not blade.window.run_panel.run.isEnabled()
