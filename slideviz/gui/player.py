@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QElapsedTimer, Qt, QTimer
-from qtpy.QtGui import QAction, QActionGroup, QTextDocument
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
+from qtpy.QtGui import QAction, QActionGroup
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from slideviz.gui.icons import icon
+from slideviz.gui.step_numbers import Results, result_parts
 from slideviz.view import changes
 from slideviz.view.state import Session
 from slideviz.view.store import Store
@@ -20,6 +21,8 @@ STEP_MS = (50, 500)
 TICK_MS = 33
 """Shortest time between two pictures; where drawing takes longer too, steps are left out."""
 SPEEDS = (0.5, 1.0, 2.0, 4.0)
+NARROW = 540
+"""Pixels; a player with less leaves out speed and loop, and words."""
 
 
 def step_ms(steps: int, speed: float = 1.0) -> float:
@@ -28,55 +31,13 @@ def step_ms(steps: int, speed: float = 1.0) -> float:
     return min(max(FILM_MS / max(steps, 1), shortest), longest) / speed
 
 
-class Results(QLabel):
-    """The numbers of a step, in the order of what matters; those without room are left out."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._parts: list[str] = []
-        self.setTextFormat(Qt.TextFormat.RichText)
-        self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        # Numbers that come and go may not take room from the view or the panels.
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-
-    def show_parts(self, parts: list[str]) -> None:
-        """Show other numbers, each as rich text."""
-        if parts != self._parts:
-            self._parts = parts
-            self._fit()
-
-    def resizeEvent(self, event) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        metrics = self.fontMetrics()
-        room, fitting = self.width() - 4, []
-        for part in self._parts:
-            # Bold letters are somewhat wider than those that are measured.
-            room -= round(1.1 * metrics.horizontalAdvance(plain(part) + "  · "))
-            if room < 0:
-                break
-            fitting.append(part)
-        self.setText("&nbsp;· ".join(fitting))
-        missing = len(fitting) < len(self._parts)
-        self.setToolTip("<br>".join(self._parts) if missing else "")
-
-
-def plain(rich: str) -> str:
-    """Return rich text without its marks."""
-    document = QTextDocument()
-    document.setHtml(rich)
-    return document.toPlainText()
-
-
 class Player(QWidget):
     """First, back, play, forward, last, a slider, and the numbers of the step."""
 
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.store = store
+        self._narrow = False
         row = QHBoxLayout(self)
         row.setContentsMargins(6, 3, 8, 3)
         row.setSpacing(1)
@@ -108,7 +69,7 @@ class Player(QWidget):
         row.addSpacing(6)
         row.addWidget(self.step_text)
         self.result = Results()
-        row.addWidget(self.result, 3)
+        row.addWidget(self.result, 4)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._tick)
         self._clock = QElapsedTimer()
@@ -183,16 +144,28 @@ class Player(QWidget):
             enabled = last > 0 and (always or (at < last if ahead else at > 0))
             button.setEnabled(enabled)
         # The slider keeps its length, whatever the text says.
-        widest = max(self._advance(text) for text in ("Undeformed", f"Step {last} of {last}"))
+        widest = max(self._advance(self._step_words(step, last)) for step in (0, last))
         self.step_text.setFixedWidth(widest + 4)
-        if session.mesh is None:
-            self.step_text.setText("")
-        else:
-            self.step_text.setText(f"Step {at} of {last}" if at else "Undeformed")
+        self.step_text.setText("" if session.mesh is None else self._step_words(at, last))
         self.speed_button.setEnabled(last > 0)
         self.result.show_parts(result_parts(session))
         if not last:
             self.stop()
+
+    def _step_words(self, step: int, last: int) -> str:
+        """Return which step is shown, in as many words as there is room for."""
+        if self._narrow and last:
+            return f"{step}/{last}"
+        return f"Step {step} of {last}" if step else "Undeformed"
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        narrow = self.width() < NARROW
+        if narrow != self._narrow:
+            self._narrow = narrow
+            for button in (self.loop, self.speed_button):
+                button.setHidden(narrow)
+            self.sync(self.store.session)
 
     @property
     def playing(self) -> bool:
@@ -242,18 +215,3 @@ class Player(QWidget):
         self.step(by)
         if self.store.session.view.frame >= last and not self.loop.isChecked():
             self.stop()
-
-
-def result_parts(session: Session) -> list[str]:
-    """Return the numbers of the step that is shown, the most important first, as rich text."""
-    frame = session.frame
-    if frame is None:
-        return []
-    quality = frame.quality
-    bad = quality.inverted
-    colour = " style='color:#e8112d'" if bad else ""
-    return [
-        f"<span{colour}><b>{bad:,}</b> inverted</span>",
-        f"min <b>{quality.min:.4f}</b>",
-        f"mean <b>{quality.mean:.4f}</b>",
-    ]

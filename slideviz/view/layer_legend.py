@@ -13,11 +13,15 @@ from slideviz.view.legend import (
     add_point_legend,
     add_role_legend,
     clear_legend,
+    lines_room,
     place_bar,
 )
+from slideviz.view.plate import Plate
 from slideviz.view.stage import Stage
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.surfaces import Surface
+
+PLATE = "plate:legend"
 
 
 class LegendLayer:
@@ -30,6 +34,8 @@ class LegendLayer:
         self._mapper.lookup_table = stage.table
         self._drawn: tuple[object, ...] = ()
         self._bar: tuple[str, float] | None = None
+        self._plate: Plate | None = None
+        self._end = 0.0
         self._placed: tuple[int, ...] = ()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -38,7 +44,7 @@ class LegendLayer:
     def clear(self) -> None:
         """Forget the mesh."""
         clear_legend(self.stage.plotter)
-        self._drawn, self._bar = (), None
+        self._drawn, self._bar, self._plate = (), None, None
 
     def shapes(self) -> list[Any]:
         """Return nothing: the legend has a place of its own."""
@@ -50,7 +56,7 @@ class LegendLayer:
         if key != self._drawn:
             self._drawn = key
             clear_legend(self.stage.plotter)
-            self._bar = None
+            self._bar = self._plate = None
             if new.view.legend and self.stage.has_legend and new.mesh is not None:
                 self._make(new)
         self._place()
@@ -59,23 +65,35 @@ class LegendLayer:
         stage, mesh, what = self.stage, session.mesh, session.view.colour_by
         assert mesh is not None
         style = (stage.look, stage.font_scale)
+        self._placed = ()
+        # First: what comes after it lies above it.
+        self._plate = Plate(stage.plotter, PLATE, stage.look) if stage.has_plate else None
         if what == "role":
             used = {session.role(name) for name in mesh.marker_names}
             roles = [role for role in ROLES if role in used]
             add_role_legend(stage.plotter, roles, stage.look, stage.font_scale)
-            add_point_legend(stage.plotter, stage.point_words, 24.0 * len(roles) + 16, style)
+            top = 24.0 * len(roles) + 16
+            self._end = add_point_legend(stage.plotter, stage.point_words, top, style)
             return
         title = COLOUR_BY[what]
         add_colour_bar(stage.plotter, self._mapper, title, has_inverted(session), style)
         end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
-        self._bar, self._placed = (title, end + (34 if stage.point_words else 0)), ()
+        self._bar, self._end = (title, end + (34 if stage.point_words else 0)), end
 
     def _place(self) -> None:
-        """Put the colour bar where it belongs in a view of this size."""
-        size = tuple(self.stage.plotter.window_size)
-        if self._bar is not None and size != self._placed:
-            self._placed = size
-            place_bar(self.stage.plotter, *self._bar, self.stage.font_scale)
+        """Put colour bar and plate where they belong in a view of this size."""
+        plotter, scale = self.stage.plotter, self.stage.font_scale
+        size = tuple(plotter.window_size)
+        if size == self._placed or not self._drawn:
+            return
+        self._placed = size
+        rect = lines_room(plotter, self._end, scale)
+        if self._bar is not None:
+            room = place_bar(plotter, *self._bar, scale)
+            # Lines about points are above the bar.
+            rect = (*room[:3], rect[3]) if self.stage.point_words else room
+        if self._plate is not None:
+            self._plate.place(rect)
 
     def _key(self, session: Session) -> tuple[object, ...]:
         """Return all that the legend says, and how."""
@@ -84,7 +102,7 @@ class LegendLayer:
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         colours = (view.colour_by, view.colour_map, session.colour_range)
         points, style = self.stage.point_words, (self.stage.look, self.stage.font_scale)
-        shown = view.legend and self.stage.has_legend
+        shown = view.legend and self.stage.has_legend, self.stage.has_plate
         return (id(mesh), shown, colours, said, points, style)
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import pyvista as pv
+
 from slideviz.view.legend import set_letters
+from slideviz.view.plate import OPACITY
 from slideviz.view.stage import Stage
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
@@ -43,7 +46,7 @@ class TriadLayer:
         plotter = self.stage.plotter
         shown = new.view.triad and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
-        style = (self.stage.look, self.stage.font_scale)
+        style = (self.stage.look, self.stage.font_scale, self.stage.has_plate)
         key = (shown, flat, style, tuple(plotter.window_size))
         if key == self._drawn or not (shown or self._axes):
             return
@@ -55,6 +58,9 @@ class TriadLayer:
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()
             set_letters(letters, self.stage.look, 13 * self.stage.font_scale)
+            # The mesh of a view that was zoomed into may lie behind.
+            letters.SetBackgroundColor(*pv.Color(self.stage.look.background).float_rgb)
+            letters.SetBackgroundOpacity(OPACITY if self.stage.has_plate else 0.0)
         width, height = plotter.window_size
         size = SIZE * self.stage.font_scale
         widget = plotter.renderer.axes_widget

@@ -9,6 +9,7 @@ from typing import Any
 
 from slideviz.case.model import Role
 from slideviz.view.look import ROLE_COLOURS, Look
+from slideviz.view.plate import Rect
 from slideviz.view.ticks import tick_format, ticks
 
 STRIP = 104
@@ -18,6 +19,8 @@ UNITS = {"displacement": "[mesh units]"}
 """Units of what colour bars show, below its name; the others have none."""
 
 _VTK_FONT_FILE = 4
+_AIR = 12.0
+"""Pixels around the colour bar and its letters."""
 
 
 @lru_cache(maxsize=1)
@@ -92,9 +95,9 @@ def _line(
 
 
 def clear_legend(plotter: Any) -> None:
-    """Remove the legend of roles and the colour bar."""
+    """Remove the legend of roles and the colour bar, and the plate below it."""
     for name in list(plotter.actors):
-        if name.startswith("legend:"):
+        if name.startswith(("legend:", "plate:")):
             plotter.remove_actor(name, reset_camera=False, render=False)
     for name in list(plotter.scalar_bars.keys()):
         plotter.remove_scalar_bar(name, render=False)
@@ -134,14 +137,29 @@ def add_colour_bar(
     bar.SetNanAnnotation("inverted" if inverted else "")
 
 
-def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> None:
+def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect:
     """Put the colour bar at the right edge of the view as it is now, ``below`` pixels from its top.
 
-    There its title ends, where lines about points above it do.
+    There its title ends, where lines about points above it do. Return the room of bar and letters.
     """
     width, height = (max(side, 1) for side in plotter.window_size)
     bar, bottom = plotter.scalar_bars[title], 0.16
     bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
     bar.SetWidth((STRIP - 20) * font_scale / width)
     free = 1.0 - below * font_scale / height
-    bar.SetHeight(max(min(0.68, free - bottom), 0.2))
+    part = max(min(0.68, free - bottom), 0.2)
+    bar.SetHeight(part)
+    room = _AIR * font_scale
+    return _rect(plotter, bottom * height - room, (bottom + part) * height + room, font_scale)
+
+
+def lines_room(plotter: Any, end: float, font_scale: float) -> Rect:
+    """Return the room of lines in the upper right corner, the last ``end`` pixels below the top."""
+    height = plotter.window_size[1]
+    return _rect(plotter, height - (end + 13) * font_scale, height, font_scale)
+
+
+def _rect(plotter: Any, bottom: float, top: float, font_scale: float) -> Rect:
+    """Return the strip between two heights, in pixels."""
+    width, height = plotter.window_size
+    return width - STRIP * font_scale, bottom, float(width), min(top, float(height))

@@ -102,7 +102,8 @@ def picture_of(
     with offscreen(size) as plotter:
         scene = Scene(plotter, look, font_scale(size))
         if transparent:
-            # A gradient would stay opaque.
+            # A gradient would stay opaque, and so would a plate.
+            scene.stage.has_plate = False
             plotter.set_background(look.background)
         scene.open(session, surfaces)
         if like is not None:

@@ -58,6 +58,8 @@ class Stage:
         Words and colours of the nodes drawn as points, for the legend.
     has_legend : bool
         Whether the legend is drawn, if it is wanted, and its strip kept free.
+    has_plate : bool
+        Whether the legend has a half-transparent plate; not where the background is left out.
     """
 
     def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
@@ -67,6 +69,7 @@ class Stage:
         self.table = lookup_table()
         self.point_words: tuple[tuple[str, str], ...] = ()
         self.has_legend = True
+        self.has_plate = True
         self._values: tuple[object, FloatArray] | None = None
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:

@@ -153,6 +153,7 @@ class Studio:
         plotter.window_size = list(figure.size)
         scene.stage.font_scale = figure.scale
         scene.stage.has_legend = figure.legend
+        scene.stage.has_plate = figure.background != "transparent"
         scene.update(figure.showing(session))
         scene.set_look(self._look(figure))
         if figure.background == "transparent":

@@ -14,7 +14,8 @@ from qtpy.QtWidgets import QApplication, QMenu
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
-from slideviz.gui.player import plain, result_parts, step_ms
+from slideviz.gui.player import step_ms
+from slideviz.gui.step_numbers import plain, result_parts
 from slideviz.mesh.quality import INVERTED
 from slideviz.view import changes, jobs, opening
 from slideviz.view.advice import ended
@@ -639,20 +640,46 @@ def test_neither_view_nor_slider_nor_panels_change_their_size_with_the_numbers(r
         assert [part.width() for part in parts] == widths
 
 
-def test_numbers_without_room_are_left_out_whole(ready):
+def test_numbers_without_room_are_shorter_and_then_left_out_whole(ready):
     run(ready)
     result = ready.window.player.result
-    full = [plain(part) for part in result_parts(ready.session)]
+    full, *short = [[plain(part) for part in form] for form in result_parts(ready.session)]
     result.resize(5000, 20)
     assert [part.strip() for part in plain(result.text()).split("·")] == full
-    for width in range(20, 600, 20):
+    assert not result.toolTip()
+    seen = set()
+    for width in range(20, 600, 10):
         result.resize(width, 20)
         text = plain(result.text())
         shown = [part.strip() for part in text.split("·")] if text else []
-        assert shown == full[: len(shown)]
+        assert shown in (full, *short) or shown == short[-1][: len(shown)]
         assert not text or result.minimumSizeHint().width() <= width
+        seen.add(tuple(shown))
+    assert {tuple(form) for form in (full, *short)} <= seen
     result.resize(120, 20)
     assert full[1] in plain(result.toolTip())
+
+
+def test_the_mean_is_read_in_a_window_of_the_usual_size(ready):
+    run(ready)
+    ready.window.resize(1280, 800)
+    QApplication.processEvents()
+    shown = plain(ready.window.player.result.text())
+    for word in ("inv", "min", "mean"):
+        assert word in shown
+
+
+def test_a_narrow_player_leaves_out_speed_and_words_before_numbers(ready):
+    run(ready)
+    player = ready.window.player
+    ready.window.resize(900, 620)
+    ready.qtbot.waitUntil(lambda: not player.speed_button.isVisible())
+    assert player.step_text.text() == "3/3"
+    ready.qtbot.waitUntil(lambda: player.step_text.x() > player.slider.geometry().right())
+    assert "inv" in plain(player.result.text())
+    ready.window.resize(1280, 800)
+    ready.qtbot.waitUntil(player.speed_button.isVisible)
+    assert player.step_text.text() == "Step 3 of 3"
 
 
 def test_cancel_keeps_the_steps_that_are_done(ready):

@@ -1,0 +1,93 @@
+"""Letters over a mesh have a plate that is seen only where something is behind it."""
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from slideviz.mesh.quality import quality
+from slideviz.view import changes
+from slideviz.view.legend import STRIP
+from slideviz.view.look import DARK, LIGHT
+from slideviz.view.plate import OPACITY
+from slideviz.view.scene import Scene
+from slideviz.view.state import Frame
+from slideviz.view.studio import Figure, Studio
+from slideviz.view.surfaces import find_surfaces
+
+SIZE = (500, 400)
+
+
+@pytest.fixture
+def plotter():
+    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
+    yield plotter
+    plotter.close()
+
+
+def opened(plotter, mesh, look, **view):
+    scene = Scene(plotter, look)
+    scene.set_look(look)
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.set_view(session, edges=False, triad=False, **view)
+    scene.open(session, find_surfaces(mesh))
+    return scene, session
+
+
+def image(scene):
+    scene.plotter.render()
+    return np.asarray(scene.plotter.screenshot(return_img=True)).astype(float)
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK])
+def test_beside_the_mesh_no_plate_is_seen(plotter, square, look):
+    scene, session = opened(plotter, square, look, colour_by="size_skew")
+    with_plate = image(scene)
+    scene.stage.has_plate = False
+    scene.update(session)
+    assert np.abs(image(scene) - with_plate).max() <= 3
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK])
+@pytest.mark.parametrize("by", ["size_skew", "role"])
+def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, look, by):
+    scene, session = opened(plotter, square, look, colour_by=by)
+    scene.eye.aim((2.0, 2.0, 0.0), 0.3)
+    covered = image(scene)
+    scene.stage.has_plate = False
+    scene.update(session)
+    bare = image(scene)
+    # Most of the strip is neither bar nor letter.
+    right = np.s_[90:300, -STRIP + 2 : -2] if by == "size_skew" else np.s_[4:50, -STRIP + 2 : -2]
+    colour = look.background if by == "size_skew" else look.background_top
+    background = np.array(pv.Color(colour).int_rgb, float)
+
+    def away(picture):
+        return np.median(np.abs(picture[right] - background).max(axis=2))
+
+    assert away(covered) < 0.45 * away(bare)
+    # Left of the strip nothing is covered.
+    assert np.array_equal(covered[:, : -STRIP - 2], bare[:, : -STRIP - 2])
+
+
+def test_a_plate_follows_the_size_of_the_view(plotter, square):
+    scene, _ = opened(plotter, square, LIGHT, colour_by="size_skew")
+    plate = plotter.actors["plate:legend"]
+    before = np.array(plate.GetMapper().GetInput().GetBounds()[:4])
+    assert before[:2] == pytest.approx((SIZE[0] - STRIP, SIZE[0]))
+    plotter.window_size = [700, 300]
+    scene.resized()
+    after = np.array(plate.GetMapper().GetInput().GetBounds()[:4])
+    assert after[:2] == pytest.approx((700 - STRIP, 700))
+    assert after[3] < before[3]
+
+
+def test_a_transparent_picture_has_no_plate(square):
+    session = changes.open_mesh(Frame(square, quality(square)), None)
+    session = changes.set_view(session, colour_by="size_skew")
+    with Studio(session, find_surfaces(square)) as studio:
+        clear = studio.image(Figure(SIZE, background="transparent"))
+        strip = round(STRIP * Figure(SIZE).scale)
+        opacity = clear[:, -strip:, 3]
+        assert (opacity == 0).mean() > 0.5
+        # But for single pixels at the edges of letters.
+        assert (opacity == round(255 * OPACITY)).mean() < 0.01
