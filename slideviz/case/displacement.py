@@ -76,6 +76,22 @@ def read_displacements(
         The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
     """
     text, warnings = read_text(path, "displacement file")
+    read = parse_displacements(text, path, nodes, shape, of)
+    return Displacements(read.nodes, read.vectors, (*warnings, *read.warnings))
+
+
+def parse_displacements(
+    text: str, path: Path, nodes: IntArray, shape: tuple[int, ...], of: str
+) -> Displacements:
+    """Return the displacement of each of ``nodes`` that the text of a displacement file lists.
+
+    Parameters as of `read_displacements`; ``path`` is for messages only.
+
+    Raises
+    ------
+    CaseError
+        The text has mistakes: a line ``file:line: sentence`` for each.
+    """
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if any(sign in text for sign in COMMENT_SIGNS):
         text = _COMMENT.sub("", text)
@@ -90,8 +106,8 @@ def read_displacements(
     if len(given) < len(nodes):
         missing = len(nodes) - len(given)
         warning = f"{path}: {missing} of {len(nodes)} nodes on {of} are not listed; they stay"
-        warnings = (*warnings, warning)
-    return Displacements(nodes, vectors, warnings)
+        return Displacements(nodes, vectors, (warning,))
+    return Displacements(nodes, vectors)
 
 
 def _table(path: Path, lines: list[str], dim: int) -> FloatArray:

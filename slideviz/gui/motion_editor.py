@@ -9,16 +9,26 @@ from qtpy.QtWidgets import QFileDialog, QWidget
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
 from slideviz.gui.motion_form import ABOUT, MotionForm
-from slideviz.gui.motion_kinds import Axis, new_motion
+from slideviz.gui.motion_kinds import new_motion
+from slideviz.view.motion_places import Axis
 
 ALL_MOVING = ""
 Z = (0.0, 0.0, 1.0)
 
 
 class MotionEditor(MotionForm):
-    """Shows a motion and tells each valid change of it."""
+    """Shows a motion and tells each valid change of it.
+
+    Signals
+    -------
+    changed(Motion)
+        Another motion instead.
+    table_wanted()
+        The rows of its displacement file are to be typed.
+    """
 
     changed = Signal(object)
+    table_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -38,6 +48,7 @@ class MotionEditor(MotionForm):
             field.changed.connect(lambda _: self._tell())
         self.path.textEdited.connect(lambda _: self._tell())
         self.browse.clicked.connect(self._browse)
+        self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
     def show_motion(self, motion: Motion | None, markers: tuple[str, ...], dim: int) -> None:
         """Show a motion of one of these moving boundaries, or nothing."""

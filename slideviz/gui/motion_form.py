@@ -55,6 +55,9 @@ class MotionForm(QWidget):
         self.browse = QPushButton("…")
         self.browse.setMaximumWidth(30)
         self.browse.setToolTip("Choose the file.")
+        self.table = QPushButton("Table…")
+        self.table.setObjectName("motion_table")
+        self.table.setToolTip("Type or paste the rows, or change them, and save them as the file.")
         self.numbers = (
             self.vector,
             self.angle,
@@ -72,6 +75,7 @@ class MotionForm(QWidget):
         line.setSpacing(4)
         line.addWidget(self.path, 1)
         line.addWidget(self.browse)
+        line.addWidget(self.table)
         both = QWidget()
         pair = QHBoxLayout(both)
         pair.setContentsMargins(0, 0, 0, 0)

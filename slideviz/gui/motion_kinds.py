@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.view.motion_places import Axis
 
 KINDS: dict[type, str] = {
     Translate: "translate",
@@ -13,8 +14,6 @@ KINDS: dict[type, str] = {
     Radial: "push radially",
     FromFile: "displacement file",
 }
-Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""Direction, and a point on it."""
 
 
 def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -> Motion:

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
+from pathlib import Path
 
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import (
@@ -18,18 +18,22 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.case.model import FromFile
+from slideviz.errors import SlidevizError
 from slideviz.gui.icons import icon
 from slideviz.gui.motion_editor import MotionEditor
-from slideviz.gui.motion_kinds import KINDS, Axis, new_motion
+from slideviz.gui.motion_kinds import KINDS, new_motion
+from slideviz.gui.motion_table import ask_table
+from slideviz.gui.plot_canvas import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.view import changes
 from slideviz.view.look import Look
+from slideviz.view.motion_places import centroids, machine_axis
+from slideviz.view.motion_table import Rows
 from slideviz.view.motion_words import describe
 from slideviz.view.state import Session
 from slideviz.view.store import Store
 
-DIGITS = 12
-"""Of a centroid, counted from the first of the extent of the mesh."""
 HEIGHT, LEAST_HEIGHT = 300, 210
 """Pixels that the panel would like, and that its longest form needs."""
 
@@ -56,6 +60,7 @@ class MotionPanel(QWidget):
         layout.addWidget(self.list, 4)
         self.editor = MotionEditor()
         self.editor.changed.connect(self._edited)
+        self.editor.table_wanted.connect(self.edit_table)
         layout.addWidget(self.editor)
         self.hint = QLabel()
         self.hint.setWordWrap(True)
@@ -80,6 +85,7 @@ class MotionPanel(QWidget):
         for kind, words in KINDS.items():
             self.add_actions[kind] = menu.addAction(words.capitalize())
             self.add_actions[kind].triggered.connect(partial(self._add, kind))
+        self.add_table = menu.addAction("Displacement table…", self.new_table)
         self.add.setMenu(menu)
         row.addWidget(self.add)
         row.addStretch(1)
@@ -130,14 +136,14 @@ class MotionPanel(QWidget):
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
         finally:
             self._syncing = False
-        self.editor.set_machine(_machine(session))
+        self.editor.set_machine(machine_axis(session))
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
     def _take_mesh(self, mesh: Mesh | None) -> None:
         """Note what motions need to know of another mesh; that takes a while."""
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
-        self.editor.set_centroids(_centroids(mesh) if mesh is not None else {})
+        self.editor.set_centroids(centroids(mesh) if mesh is not None else {})
         self.editor.set_extent(self._extent)
 
     def _sync_editor(self, session: Session) -> None:
@@ -170,13 +176,48 @@ class MotionPanel(QWidget):
             self._sync_editor(session)
             self._sync_buttons(session, session.case.markers_with("moving"))
 
-    def _add(self, kind: type, *_checked: bool) -> None:
+    def _next_marker(self) -> str:
+        """Return the boundary that a new motion is for."""
         session = self.store.session
         moving = session.case.markers_with("moving")
         chosen = [name for name in session.view.selected if name in moving]
-        marker = (chosen or list(moving))[0]
-        motion = new_motion(kind, marker, session.mesh.dim, _machine(session))
+        return (chosen or list(moving))[0]
+
+    def _add(self, kind: type, *_checked: bool) -> None:
+        session = self.store.session
+        motion = new_motion(kind, self._next_marker(), session.mesh.dim, machine_axis(session))
         self.store.change(changes.add_motion, motion)
+
+    def new_table(self) -> None:
+        """Let a table of displacements be typed, and add a motion that uses it."""
+        marker = self._next_marker()
+        path = self._ask_table(marker, Path())
+        if path is not None:
+            self.store.change(changes.add_motion, FromFile(path, marker))
+
+    def edit_table(self) -> None:
+        """Let the rows of the displacement file of a motion be typed."""
+        row = self.list.currentRow()
+        motion = self.store.session.case.motions[row]
+        path = self._ask_table(motion.marker, motion.path)
+        if path is None:
+            return
+        if path == motion.path:
+            # The same file with other rows: only another motion makes everybody read it again.
+            self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
+        self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
+
+    def _ask_table(self, marker: str, path: Path) -> Path | None:
+        case, mesh_file = self.store.session.case, self.store.session.path
+        beside = case.source or mesh_file
+        folder = beside.parent if beside is not None else folder_of(self)
+        default = folder / f"displacement_{marker or 'all'}.txt"
+        try:
+            rows = Rows.on(self.store.session.mesh, case, marker)
+            return ask_table(self.window(), rows, path, default)
+        except SlidevizError as error:
+            main_window(self).banner.tell_error(error)
+            return None
 
     def _edited(self, motion: object) -> None:
         self.store.change(changes.replace_motion, self.list.currentRow(), motion)
@@ -201,24 +242,3 @@ class MotionPanel(QWidget):
             self._remove()
             return
         super().keyPressEvent(event)
-
-
-def _centroids(mesh: Mesh) -> dict[str, tuple[float, ...]]:
-    """Return the centroid of each boundary, without the last digits, which are rounding."""
-    digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
-    return {
-        marker.name: tuple(
-            round(float(v), digits) + 0.0 for v in mesh.points[marker.nodes].mean(axis=0)
-        )
-        for marker in mesh.markers
-        if len(marker.nodes)
-    }
-
-
-def _machine(session: Session) -> Axis | None:
-    """Return the axis about which periodic boundaries repeat, if they do."""
-    for pair in session.pairs:
-        both = {session.role(pair.first), session.role(pair.second)}
-        if pair.kind == "rotational" and both == {"periodic"}:
-            return pair.axis, pair.origin
-    return None

@@ -5,7 +5,9 @@ import pytest
 from qtpy.QtTest import QTest
 
 from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
+from slideviz.gui.motion_table import TableDialog
 from slideviz.view import changes
+from slideviz.view.motion_table import Rows
 
 NOISE = 3.7e-13
 
@@ -139,3 +141,99 @@ def test_a_file_with_mistakes_is_told_as_it_is_chosen(blade, tmp_path, qtbot):
     told = blade.window.run_panel.text
     qtbot.waitUntil(lambda: "table.txt:1: " in told.text(), timeout=10_000)
     assert not blade.window.run_panel.run.isEnabled()
+
+
+# Tables ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def dialog(blade, qtbot):
+    session = blade.session
+    made = TableDialog(blade.window, Rows.on(session.mesh, session.case, "airfoil"))
+    qtbot.addWidget(made)
+    return made
+
+
+def test_a_table_is_checked_as_it_is_typed(dialog, blade, qtbot):
+    node = blade.session.mesh.marker("airfoil").nodes[0]
+    assert not dialog.save.isEnabled()
+    QTest.keyClicks(dialog.edit, f"{node} 0.3 0.4")
+    qtbot.waitUntil(dialog.save.isEnabled)
+    assert dialog.told.text().startswith("1 of ")
+    assert not dialog.told.property("bad")
+    QTest.keyClicks(dialog.edit, " 7")
+    qtbot.waitUntil(lambda: bool(dialog.told.property("bad")))
+    assert "needed are 3: node dx dy" in dialog.told.text()
+    assert not dialog.save.isEnabled()
+
+
+def test_a_table_can_have_all_nodes_and_that_can_be_undone(dialog, blade):
+    blade.click(dialog.fill)
+    assert len(dialog.text.splitlines()) == 1 + len(dialog.rows.nodes)
+    assert dialog.save.isEnabled()
+    dialog.edit.undo()
+    assert dialog.text == ""
+
+
+def test_a_wrong_table_is_not_accepted(dialog):
+    dialog.edit.setPlainText("nonsense")
+    dialog.accept()
+    assert dialog.result() != TableDialog.DialogCode.Accepted
+
+
+@pytest.fixture
+def typed(monkeypatch):
+    """Answer the dialog with a text; tells what it began with."""
+    began = []
+
+    def answer(text):
+        def go(dialog):
+            began.append(dialog.text)
+            if text is None:
+                return TableDialog.DialogCode.Rejected
+            dialog.edit.setPlainText(text)
+            return TableDialog.DialogCode.Accepted
+
+        monkeypatch.setattr(TableDialog, "exec", go)
+        return began
+
+    return answer
+
+
+def test_a_new_table_is_saved_and_used(blade, typed, answers, tmp_path):
+    mesh = blade.session.mesh
+    node, file = int(mesh.marker("airfoil").nodes[0]), tmp_path / "mine.txt"
+    asked = answers("ask_save", file)
+    typed(f"{node} 0.001 0.002")
+    blade.window.motions.add_table.trigger()
+    assert asked[0][1] == blade.session.path.parent / "displacement_airfoil.txt"
+    assert blade.session.case.motions == (FromFile(file, "airfoil"),)
+    moved = blade.window.scene.motion_ghosts["airfoil"][0] - mesh.points[node]
+    assert np.allclose(moved, [0.001, 0.002])
+
+
+def test_the_rows_of_a_file_are_changed_and_its_ghost_follows(blade, typed, answers, tmp_path):
+    mesh = blade.session.mesh
+    node, file = int(mesh.marker("airfoil").nodes[0]), tmp_path / "mine.txt"
+    file.write_text(f"{node} 0.001 0.002\n")
+    put(blade, FromFile(file, "airfoil"))
+    began = typed(f"{node} 0.003 0.004")
+    asked = answers("ask_save", file)
+    blade.click(editor(blade).table)
+    assert began == [f"{node} 0.001 0.002\n"]
+    assert asked[0][1] == file
+    assert blade.session.case.motions == (FromFile(file, "airfoil"),)
+    moved = blade.window.scene.motion_ghosts["airfoil"][0] - mesh.points[node]
+    assert np.allclose(moved, [0.003, 0.004])
+    typed(None)
+    blade.click(editor(blade).table)
+    assert file.read_text() == f"{node} 0.003 0.004\n"
+
+
+def test_a_table_that_cannot_be_written_is_told(blade, typed, answers, tmp_path):
+    node = int(blade.session.mesh.marker("airfoil").nodes[0])
+    typed(f"{node} 0 0")
+    answers("ask_save", tmp_path / "none" / "mine.txt")
+    blade.window.motions.add_table.trigger()
+    assert "the folder does not exist" in blade.window.banner.text.text()
+    assert not blade.session.case.motions
