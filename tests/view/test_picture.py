@@ -5,12 +5,9 @@ from PIL import Image
 
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
 from slideviz.view.look import COLOUR_MAP
 from slideviz.view.moved import Detail, half_of, tiny_motion
-from slideviz.view.picture import picture, picture_of
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.picture import picture
 
 
 def pixels(path):
@@ -58,18 +55,6 @@ def test_other_endings_are_refused(tmp_path, square):
 def test_a_missing_folder_is_told(tmp_path, square):
     with pytest.raises(MeshError, match="folder"):
         picture(square, tmp_path / "no" / "a.png", size=(100, 80))
-
-
-def test_the_view_can_be_drawn_at_any_size_and_without_background(tmp_path, square):
-    session = changes.open_mesh(Frame(square, quality(square)), None)
-    surfaces = find_surfaces(square)
-    picture_of(session, surfaces, tmp_path / "a.png", size=(640, 300))
-    picture_of(session, surfaces, tmp_path / "b.png", size=(320, 500), transparent=True)
-    assert pixels(tmp_path / "a.png").shape == (300, 640, 4)
-    image = pixels(tmp_path / "b.png")
-    assert image.shape == (500, 320, 4)
-    assert image[2, 2, 3] == 0
-    assert image[250, 100, 3] == 255
 
 
 def far_field(half_width):
