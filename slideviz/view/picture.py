@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
@@ -13,9 +12,6 @@ from slideviz.view.moved import Zoom
 from slideviz.view.offscreen import check_png, offscreen, write_png, write_title
 from slideviz.view.portrait import Portrait
 from slideviz.view.state import Frame
-
-if TYPE_CHECKING:
-    pass
 
 SIZE = (1600, 1000)
 
