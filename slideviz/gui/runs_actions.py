@@ -154,7 +154,11 @@ class RunActions:
 
     def remove(self, number: int | None = None) -> None:
         """Remove a run from the list."""
-        self.store.change(changes.remove_run, number or self.tree.number)
+        number = number or self.tree.number
+        if number is None:
+            return
+        self.store.change(changes.remove_run, number)
+        self._say(f"Run {number} removed (Ctrl+Z brings it back)")
 
     def copy_table(self) -> None:
         """Put the table into the clipboard, for a spreadsheet."""

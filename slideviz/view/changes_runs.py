@@ -11,6 +11,8 @@ from slideviz.view.state import Frame, Run, Session
 
 UNDEFORMED = 0
 """Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
+MOST_REMOVED = 2
+"""Removed runs that are kept for undo: each may hold hundreds of megabytes."""
 
 
 def start_run(session: Session) -> Session:
@@ -19,8 +21,9 @@ def start_run(session: Session) -> Session:
     Runs that were cancelled or failed before their first step go.
     """
     kept = tuple(run for run in session.runs if run.frames)
-    number = 1 + max((run.number for run in session.runs), default=0)
-    session = replace(session, runs=(*kept, Run(number, session.case)), shown=number)
+    number = 1 + max((session.newest, *(run.number for run in session.runs)))
+    runs = (*kept, Run(number, session.case))
+    session = replace(session, runs=runs, shown=number, newest=number)
     return show_frame(session, 0)
 
 
@@ -64,18 +67,32 @@ def show_beside(session: Session, number: int | None) -> Session:
 
 
 def remove_run(session: Session, number: int) -> Session:
-    """Return the session without a run; one that goes on stays."""
+    """Return the session without a run, which is kept for undo; one that goes on stays."""
     run = session.run(number)
     if run is None or not run.end:
         return session
     rest = tuple(other for other in session.runs if other.number != number)
     beside = None if session.view.beside == number else session.view.beside
-    session = set_view(replace(session, runs=rest), beside=beside)
+    removed = (*session.removed, run)[-MOST_REMOVED:]
+    newest = max(session.newest, *(other.number for other in session.runs))
+    session = replace(session, runs=rest, removed=removed, newest=newest)
+    session = set_view(session, beside=beside)
     if session.shown != number:
         return session
     if not rest:
         return show_frame(set_view(replace(session, shown=None), beside=None), 0)
     return show_run(session, rest[-1].number)
+
+
+def bring_back(session: Session, number: int) -> Session:
+    """Return the session with a removed run at its old place, if it is still kept."""
+    back = [run for run in session.removed if run.number == number]
+    if not back:
+        return session
+    runs = tuple(sorted((*session.runs, *back), key=lambda run: run.number))
+    return replace(
+        session, runs=runs, removed=tuple(run for run in session.removed if run not in back)
+    )
 
 
 def rename_run(session: Session, number: int, name: str) -> Session:

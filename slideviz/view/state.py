@@ -61,6 +61,10 @@ class Session:
         What was computed, in the order of the starts.
     shown : int or None
         The number of the run whose steps are shown.
+    removed : tuple of Run
+        Those taken out of ``runs`` last, which undo brings back.
+    newest : int
+        The highest number that a run was given, removed ones too.
     saved : Case or None
         What is on disk, or what was there at the start.
     reduction_guess : str
@@ -81,6 +85,8 @@ class Session:
     view: ViewState = field(default_factory=ViewState)
     reduction_guess: str = ""
     clash: str = ""
+    removed: tuple[Run, ...] = ()
+    newest: int = 0
 
     def run(self, number: int | None) -> Run | None:
         """Return the run of that number, if it is still there."""

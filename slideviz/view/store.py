@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from slideviz.case.model import Case
+from slideviz.view.changes_runs import bring_back, remove_run, show_run
 from slideviz.view.state import Guess, Session, ViewState
 
 Listener = Callable[[Session, Session], None]
@@ -31,6 +32,7 @@ WORDS: dict[str, str] = {
     "lay_flat": "flat view",
     "show": "hidden boundaries",
     "isolate": "hidden boundaries",
+    "remove_run": "removing a run",
     "take_settings": "settings of a run",
     "set_case": "settings",
     "set_view": "view",
@@ -78,20 +80,39 @@ def tell_all(
 
 @dataclass(frozen=True)
 class Memento:
-    """What undo brings back: roles, motions, settings, and the style of the view."""
+    """What undo brings back: roles, motions, settings, style of the view, removed runs.
+
+    Attributes
+    ----------
+    removed : frozenset of int
+        The numbers of the runs that were removed then. Those that came later are in none, so
+        that no run is lost by undoing what was done before it.
+    shown : int or None
+        The run that was shown then; it is again if it comes back.
+    """
 
     case: Case
     guesses: Mapping[str, Guess]
     reduction_guess: str
     style: ViewState
+    removed: frozenset[int] = frozenset()
+    shown: int | None = field(default=None, compare=False)
 
     @classmethod
     def of(cls, session: Session) -> Memento:
         """Return that of a session."""
-        return cls(session.case, session.guesses, session.reduction_guess, session.view.style)
+        return cls(
+            session.case,
+            session.guesses,
+            session.reduction_guess,
+            session.view.style,
+            frozenset(run.number for run in session.removed),
+            session.shown,
+        )
 
     def put_into(self, session: Session) -> Session:
         """Return the session with it; the step that is shown and the like stay."""
+        session = self._put_runs(session)
         view, style = session.view, self.style
         # Where the case was saved to does not come back: it is on disk, undone or not.
         case = self.case.change(
@@ -108,6 +129,17 @@ class Memento:
             reduction_guess=self.reduction_guess,
             view=replace(style, **passing),
         )
+
+    def _put_runs(self, session: Session) -> Session:
+        """Return the session with the runs back that were there, and without removed ones."""
+        for number in sorted({run.number for run in session.removed} - self.removed):
+            session = bring_back(session, number)
+            if number == self.shown:
+                session = show_run(session, number)
+        for run in session.runs:
+            if run.number in self.removed:
+                session = remove_run(session, run.number)
+        return session
 
 
 @dataclass(frozen=True)
@@ -248,4 +280,7 @@ class Store:
                 self._undo.append(replace(last, at_s=at_s))
             return
         self._undo.append(_Done(before, words, kind, at_s))
+        # A run that is no longer kept cannot be brought back.
+        there = {run.number for run in new.removed}
+        self._undo = [d for d in self._undo if d.kind[0] != "remove_run" or d.kind[1] in there]
         del self._undo[:-DEEPEST]

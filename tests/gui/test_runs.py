@@ -297,6 +297,19 @@ def test_the_menu_removes_shows_beside_and_saves(ran, answers, tmp_path):
     assert panel(ran).tree.topLevelItemCount() == 1
 
 
+def test_a_removed_run_comes_back_with_undo(ran):
+    frames = ran.session.run(2).frames
+    ran.click(panel(ran).buttons["remove"])
+    assert [run.number for run in ran.session.runs] == [1]
+    said = ran.window.statusBar().currentMessage()
+    assert said == "Run 2 removed (Ctrl+Z brings it back)"
+    assert "removing a run" in ran.window.actions_.by_name["undo"].text()
+    ran.window.actions_.by_name["undo"].trigger()
+    assert ran.session.run(2).frames is frames
+    assert ran.session.shown == 2
+    assert panel(ran).tree.topLevelItemCount() == 2
+
+
 def test_the_table_is_exported_and_copied(ran, answers, tmp_path):
     answers("ask_save", tmp_path / "runs.csv")
     ran.click(panel(ran).buttons["export"])

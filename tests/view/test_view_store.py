@@ -144,6 +144,63 @@ def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, cloc
     assert not store.can_undo
 
 
+def run_once(store):
+    perform(store, ("run", 1))
+    return store.session.runs[-1]
+
+
+def numbers(store):
+    return [run.number for run in store.session.runs]
+
+
+def test_a_removed_run_is_brought_back_and_removed_again(store, clock):
+    first, second = run_once(store), run_once(store)
+    store.change(changes.remove_run, 2)
+    assert (numbers(store), store.session.shown) == ([1], 1)
+    assert store.can_undo == "removing a run"
+    store.undo()
+    assert store.session.runs == (first, second)
+    assert store.session.shown == 2
+    store.redo()
+    assert numbers(store) == [1]
+
+
+def test_undoing_what_was_before_a_run_keeps_the_run(store, clock):
+    run_once(store)
+    store.change(changes.remove_run, 1)
+    clock.now += 10
+    store.change(changes.set_case, steps=7)
+    later = run_once(store)
+    assert later.number == 2, "no two runs of a session have the same number"
+    store.undo()
+    assert numbers(store) == [2]
+    store.undo()
+    assert numbers(store) == [1, 2]
+    store.redo()
+    assert numbers(store) == [2]
+
+
+def test_only_the_last_two_removed_runs_are_kept(store, clock):
+    for _ in range(3):
+        run_once(store)
+    for number in (3, 2, 1):
+        store.change(changes.remove_run, number)
+    assert [run.number for run in store.session.removed] == [2, 1]
+    assert run_once(store).number == 4
+    store.undo()
+    store.undo()
+    assert numbers(store) == [1, 2, 4]
+    assert not store.can_undo, "the oldest cannot come back, so undo does not offer it"
+
+
+def test_another_mesh_forgets_removed_runs(store, cube):
+    run_once(store)
+    store.change(changes.remove_run, 1)
+    store.put(changes.open_mesh(Frame(cube, quality(cube)), None))
+    assert not store.session.removed
+    assert not store.can_undo
+
+
 names = st.lists(st.sampled_from(["left", "right", "top", "bottom"]), min_size=1, unique=True)
 intents = st.one_of(
     st.tuples(st.just("set_role"), names.map(tuple), st.sampled_from(ROLES)),
