@@ -1,20 +1,19 @@
-"""Menus, tool bar and shortcuts: one table of actions."""
+"""Menus and shortcuts: the actions by name, and which of them can be done."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
-from qtpy.QtWidgets import QLabel, QMainWindow, QMenu, QSizePolicy, QToolBar, QWidget
+from qtpy.QtWidgets import QMainWindow, QMenu
 
 from slideviz.gui.beside import fill_compare
-from slideviz.gui.fields import Choice
 from slideviz.gui.icons import icon
 from slideviz.gui.theme import THEMES
 from slideviz.gui.tips import tip_of
+from slideviz.gui.tool_bar import ToolBar
 from slideviz.view import changes
-from slideviz.view.state import COLOUR_BY, Session
+from slideviz.view.state import Session
 
 TOGGLES = (
     ("edges", "Mesh edges", "E", "Draw the edges of the cells."),
@@ -39,7 +38,8 @@ class Actions:
         self._make_file()
         self._make_view()
         self._make_help()
-        self._make_tool_bar()
+        self.bar = ToolBar(window, self.by_name)
+        window.addToolBar(self.bar)
 
     def _add(self, name: str, text: str, function=None, keys="", image: str = "") -> QAction:
         act = QAction(text, self.window)
@@ -192,50 +192,6 @@ class Actions:
         if getattr(self.window.store.session.view, name) != checked:
             self.window.store.change(changes.set_view, **{name: checked})
 
-    def _make_tool_bar(self) -> None:
-        window = self.window
-        bar = QToolBar("Tools")
-        bar.setObjectName("tools")
-        bar.setMovable(False)
-        bar.setIconSize(QSize(20, 20))
-        window.addToolBar(bar)
-        self.bar = bar
-        for name in ("open", "save_mesh", "save_case", "save_picture"):
-            bar.addAction(self.by_name[name])
-        bar.addSeparator()
-        for name in ("undo", "redo"):
-            bar.addAction(self.by_name[name])
-        bar.addSeparator()
-        bar.addWidget(QLabel(" Colour by "))
-        self.colour = Choice(dict(COLOUR_BY))
-        self.colour.setObjectName("colour_by")
-        self.colour.setToolTip("What the colours of the view say; quality is always 0 to 1.")
-        self.colour.chosen.connect(
-            lambda value: window.store.change(changes.set_view, colour_by=value)
-        )
-        bar.addWidget(self.colour)
-        bar.addSeparator()
-        for name, *_ in TOGGLES:
-            if name != "triad":  # seldom switched, and the room is needed
-                bar.addAction(self.by_name[name])
-        bar.addSeparator()
-        bar.addAction(self.by_name["fit"])
-        for side in ("+x", "+y", "+z", "iso"):
-            self.by_name[f"side{side}"].setIconText(
-                side.strip("+").upper() if side != "iso" else "Iso"
-            )
-            bar.addAction(self.by_name[f"side{side}"])
-        space = QWidget()
-        space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        bar.addWidget(space)
-        self.zone = Choice({})
-        self.zone.setObjectName("zone")
-        self.zone.setToolTip("Which zone of the file is open.")
-        self.zone.chosen.connect(window.files.open_zone)
-        self.zone_label = bar.addWidget(QLabel(" Zone "))
-        self.zone_shown = bar.addWidget(self.zone)
-        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-
     def _sync_export(self, session: Session, busy: bool) -> None:
         """Show which exports there can be, and say why not."""
         stepped, opened = len(session.frames) > 1, session.mesh is not None
@@ -288,13 +244,4 @@ class Actions:
         self.by_name["save_mesh"].setEnabled(opened and not busy)
         self.by_name["run"].setEnabled(ready and not busy)
         self.by_name["cancel"].setEnabled(busy)
-        self.colour.setEnabled(opened)
-        self.colour.show_value(session.view.colour_by)
-        zones = session.mesh.zones if opened else 1
-        if self.zone.count() != zones:
-            self.zone.clear()
-            for zone in range(1, zones + 1):
-                self.zone.addItem(f"{zone} of {zones}", zone)
-        self.zone.show_value(session.mesh.zone if opened else 1)
-        for shown in (self.zone_label, self.zone_shown):
-            shown.setVisible(zones > 1)
+        self.bar.sync(session)

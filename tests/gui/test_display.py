@@ -36,7 +36,7 @@ def view(driver):
 def test_colours_and_map_are_chosen_and_undone(shown):
     shown.choose(panel(shown).colour_by, "skew")
     assert view(shown).colour_by == "skew"
-    assert shown.window.actions_.colour.currentData() == "skew"
+    assert shown.window.actions_.bar.colour.currentData() == "skew"
     shown.choose(panel(shown).map, "cividis")
     assert view(shown).colour_map == "cividis"
     assert shown.window.scene.stage.table.cmap.name == "cividis"
