@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from slideviz.case.model import Case, Motion, Role
+from slideviz.view.rows import replaced, without
 from slideviz.view.state import Session
 
 
@@ -46,15 +47,12 @@ def add_motion(session: Session, motion: Motion) -> Session:
 
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
     """Return the session with another motion at that place."""
-    motions = list(session.case.motions)
-    motions[index] = motion
-    return set_case(session, motions=tuple(motions))
+    return set_case(session, motions=replaced(session.case.motions, index, motion))
 
 
 def remove_motion(session: Session, index: int) -> Session:
     """Return the session without the motion at that place."""
-    motions = session.case.motions
-    return set_case(session, motions=motions[:index] + motions[index + 1 :])
+    return set_case(session, motions=without(session.case.motions, index))
 
 
 def move_motion(session: Session, index: int, by: int) -> Session:

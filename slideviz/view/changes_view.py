@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.rows import replaced, without
 from slideviz.view.state import ColourBy, Session, ViewState
 
 if TYPE_CHECKING:
@@ -73,15 +74,12 @@ def add_section(session: Session, section: Section) -> Session:
 
 def replace_section(session: Session, index: int, section: Section) -> Session:
     """Return the session with another section at that place."""
-    sections = list(session.view.sections)
-    sections[index] = section
-    return set_view(session, sections=tuple(sections))
+    return set_view(session, sections=replaced(session.view.sections, index, section))
 
 
 def remove_section(session: Session, index: int) -> Session:
     """Return the session without the section at that place."""
-    sections = session.view.sections
-    return set_view(session, sections=sections[:index] + sections[index + 1 :])
+    return set_view(session, sections=without(session.view.sections, index))
 
 
 def lay_flat(session: Session, index: int | None) -> Session:
