@@ -64,7 +64,8 @@ class ToolBar(QToolBar):
         self.zone.setObjectName("zone")
         self.zone.setToolTip("Which zone of the file is open.")
         self.zone.chosen.connect(open_zone)
-        self._zone_parts = (self.addWidget(QLabel(" Zone ")), self.addWidget(self.zone))
+        self.zone_label = self.addWidget(QLabel(" Zone "))
+        self.zone_shown = self.addWidget(self.zone)
 
     def sync(self, session: Session) -> None:
         """Show the session."""
@@ -77,5 +78,5 @@ class ToolBar(QToolBar):
             for zone in range(1, zones + 1):
                 self.zone.addItem(f"{zone} of {zones}", zone)
         self.zone.show_value(session.mesh.zone if opened else 1)
-        for shown in self._zone_parts:
+        for shown in (self.zone_label, self.zone_shown):
             shown.setVisible(zones > 1)

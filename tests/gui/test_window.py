@@ -150,14 +150,14 @@ def test_zones_can_be_chosen(driver, tmp_path, passage_file):
     two = one.replace("airfoil", "vane")
     both.write_text(f"NZONE= 2\nIZONE= 1\n{one}\nIZONE= 2\n{two}\n")
     driver.open(both)
-    zone = driver.window.actions_.bar.zone
-    assert zone.isVisible()
+    bar = driver.window.actions_.bar
+    assert bar.zone_shown.isVisible()
     assert "airfoil" in driver.session.mesh.marker_names
-    driver.choose(zone, 2)
+    driver.choose(bar.zone, 2)
     driver.settle()
     assert "vane" in driver.session.mesh.marker_names
     driver.open(passage_file)
-    assert not zone.isVisible()
+    assert not bar.zone_shown.isVisible()
 
 
 # Boundaries -------------------------------------------------------------------------------
