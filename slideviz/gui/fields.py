@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from qtpy.QtCore import QLocale, Signal
+from qtpy.QtCore import QLocale, Qt, Signal
 from qtpy.QtWidgets import QComboBox, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
 
 
@@ -36,7 +36,8 @@ class NumberField(QLineEdit):
     """A number; what is not allowed is marked at once, with the reason as tooltip.
 
     ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
-    while it is edited; the value keeps them all.
+    while it is edited; the value keeps them all. What is not valid when the field is left goes
+    back to the number before it was edited, not to a valid beginning of what was typed.
     """
 
     changed = Signal(float)
@@ -44,9 +45,10 @@ class NumberField(QLineEdit):
     def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
         super().__init__(short_text(value))
         self._allowed = allowed or (lambda _: "")
-        self._value = float(value)
+        self._value = self._before = float(value)
         self._scale = 0.0
         self._tip = ""
+        self._whole = False
         self.setCursorPosition(0)
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
@@ -88,6 +90,8 @@ class NumberField(QLineEdit):
         """Show a number without telling; what is being typed is left if it means the same."""
         if value == self._value and (self.hasFocus() or not self.problem):
             return
+        if not (self.hasFocus() and self.isModified()):
+            self._before = float(value)
         self._value = float(value)
         self._write()
         self.mark("")
@@ -103,8 +107,23 @@ class NumberField(QLineEdit):
 
     def focusInEvent(self, event) -> None:
         if not self.problem:
+            self._before = self._value
             self._write()
         super().focusInEvent(event)
+
+    def mouseDoubleClickEvent(self, event) -> None:
+        # Qt takes a word, and a point ends one: half of a decimal number would be replaced.
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.selectAll()
+            self._whole = True
+
+    def mouseMoveEvent(self, event) -> None:
+        if not self._whole:  # a hand that trembles in a double click selects less again
+            super().mouseMoveEvent(event)
+
+    def mouseReleaseEvent(self, event) -> None:
+        self._whole = False
+        super().mouseReleaseEvent(event)
 
     def focusOutEvent(self, event) -> None:
         super().focusOutEvent(event)
@@ -120,9 +139,14 @@ class NumberField(QLineEdit):
             self.changed.emit(self._value)
 
     def _tidy(self) -> None:
-        if self.problem:
-            self._write()
-            self.mark("")
+        if not self.problem:
+            self._before = self._value
+            return
+        typed, self._value = self._value, self._before
+        self._write()
+        self.mark("")
+        if typed != self._value:
+            self.changed.emit(self._value)
 
     def mark(self, problem: str) -> None:
         """Show that the number is not valid, and why; or, with an empty text, that it is."""
@@ -236,6 +260,11 @@ class Choice(QComboBox):
         index = self.findData(value)
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
+
+    def showPopup(self) -> None:
+        # Escape leaves the list at the entry below the mouse; it would open there next time.
+        self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
+        super().showPopup()
 
     def wheelEvent(self, event) -> None:
         event.ignore()

@@ -1,12 +1,13 @@
 """Fields of numbers: what is shown, and what is kept."""
 
 import pytest
+from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QFocusEvent, QPalette
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui import theme
-from slideviz.gui.fields import NumberField, VectorField, short_text
+from slideviz.gui.fields import Choice, NumberField, VectorField, short_text
 
 THIRD = 0.005596983152812345
 
@@ -39,6 +40,56 @@ def test_every_digit_is_there_to_be_edited(field):
     field.selectAll()
     QTest.keyClicks(field, "2.5")
     assert (field.value, told[-1]) == (2.5, 2.5)
+
+
+@pytest.mark.parametrize("typed", ["0.0.945", "12x", "", "-"])
+def test_a_malformed_number_goes_back_to_what_was_there_before(qtbot, typed):
+    made, other, told = NumberField(0.949), NumberField(1.0), []
+    for field in (made, other):
+        qtbot.addWidget(field)
+    made.changed.connect(told.append)
+    made.selectAll()
+    QTest.keyClick(made, Qt.Key.Key_Backspace)
+    QTest.keyClicks(made, typed)
+    assert made.problem
+    made.editingFinished.emit()
+    assert (made.text(), made.value) == ("0.949", 0.949)
+    assert (told or [0.949])[-1] == 0.949
+    made.selectAll()
+    QTest.keyClicks(made, "0.5")
+    made.editingFinished.emit()
+    QTest.keyClicks(made, "..")
+    made.editingFinished.emit()
+    assert made.value == 0.5, "the last one that was left valid"
+
+
+def test_a_double_click_selects_the_whole_number(qtbot):
+    made = NumberField(0.949)
+    qtbot.addWidget(made)
+    made.show()
+    where = made.cursorRect().center()
+    QTest.mouseClick(made, Qt.MouseButton.LeftButton, pos=where)
+    QTest.mouseDClick(made, Qt.MouseButton.LeftButton, pos=where)
+    assert made.selectedText() == "0.949"
+    QTest.keyClicks(made, "2")
+    assert made.value == 2.0
+
+
+def test_a_list_opens_at_its_value_after_escape(qtbot):
+    choice = Choice({"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"})
+    qtbot.addWidget(choice)
+    choice.show_value("ps")
+    choice.show()
+    view = choice.view()
+    choice.showPopup()
+    first = view.window().y()
+    view.setCurrentIndex(view.model().index(2, 0))  # as the mouse does that passes over it
+    QTest.keyClick(view, Qt.Key.Key_Escape)
+    assert choice.currentData() == "ps"
+    choice.showPopup()
+    assert view.currentIndex().row() == 1
+    assert view.window().y() == first, "the value lies below the mouse that opened the list"
+    choice.hidePopup()
 
 
 def test_short_numbers_are_shown_as_they_are():
