@@ -115,6 +115,84 @@ def test_input_mesh_is_not_overwritten(square, capsys):
     assert (square / "mesh.su2").read_bytes() != before
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "none/a.su2"], "none/a.su2: cannot be written: the folder does not exist"),
+        (["-o", "a.xyz"], "a.xyz: no mesh format has the ending .xyz"),
+        (["--json", "none/a.json"], "none/a.json: cannot be written"),
+        (["--json", "mesh.su2/a.json"], "a part of the path is a file, not a folder"),
+        (["--history", "."], "cannot be written: it is a folder; give the name of a file"),
+        (["--picture", "none/a.png"], "none/a.png: cannot be written"),
+        (["--picture", "a.jpg"], "a.jpg: pictures are PNG"),
+        (["--picture", "a.png", "--picture-size", "0x0"], "0x0 pixels cannot be drawn"),
+        (["--picture", "a.png", "--zoom", "9,9,0.1"], "misses the mesh, which has x from 0 to 1"),
+        (["--picture", "a.png", "--zoom", "0,0,0,1"], "is not a place in a 2D mesh"),
+        (["--steps-dir", "mesh.su2/a"], "mesh.su2/a: cannot be made a folder: a part of"),
+        (["--steps-dir", "mesh.su2"], "mesh.su2: cannot be made a folder: it is a file"),
+        (["--steps", "0"], "STEPS=0: 0 is too small; needed is a whole number from 1"),
+        (["--zone", "0"], "there is no zone 0"),
+    ],
+)
+def test_what_cannot_be_written_is_told_before_the_work(
+    square, monkeypatch, capsys, words, message
+):
+    def never(*_):
+        raise AssertionError("too late")
+
+    monkeypatch.chdir(square)
+    monkeypatch.setattr("slideviz.cli.run_command._pull", never)
+    before = sorted(square.iterdir())
+    assert run(["run", "square.cfg", *words]) == 1
+    err = capsys.readouterr().err
+    assert message in err
+    assert err.count("\n") == 1
+    assert sorted(square.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "mesh.su2", "--json", "none/a"],
+        ["quality", "mesh.su2", "--json", "none/a"],
+        ["quality", "mesh.su2", "-o", "none/a.vtu"],
+        ["quality", "mesh.su2", "-o", "none/a.csv"],
+        ["section", "mesh.su2", "--plane", "y=0.5", "-o", "none/a.png"],
+        ["section", "mesh.su2", "--plane", "y=0.5", "-o", "a.png", "--json", "none/a"],
+        ["film", "square.cfg", "-o", "none/a.gif"],
+    ],
+)
+def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
+    square, monkeypatch, capsys, words
+):
+    def never(*_, **__):
+        raise AssertionError("too late")
+
+    monkeypatch.chdir(square)
+    monkeypatch.setattr("slideviz.mesh.files.read", never)
+    monkeypatch.setattr("slideviz.read", never, raising=False)
+    assert run(words) == 1
+    assert "the folder" in (err := capsys.readouterr().err)
+    assert "does not exist" in err
+    assert not (square / "a.png").exists()
+
+
+def test_one_step_is_one_step(square, capsys):
+    argv = ["run", str(square / "square.cfg"), "-o", str(square / "a.su2"), "--steps"]
+    run([*argv, "1"])
+    assert ": 1 step, sliding" in capsys.readouterr().out
+    run([*argv, "2"])
+    assert ": 2 steps, sliding" in capsys.readouterr().out
+
+
+def test_wrong_usage_is_one_sentence(square, capsys):
+    assert run(["run", str(square / "square.cfg"), "--zoom", "nan,0,1"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("slideviz run: argument --zoom: 'nan,0,1' is neither X,Y,WIDTH")
+    assert err.endswith("see `slideviz run --help`\n")
+    assert err.count("\n") == 1
+
+
 def test_info_tells_what_is_there(square, capsys):
     assert run(["info", str(square / "mesh.su2"), "--json", "-"]) == 0
     report = json.loads(capsys.readouterr().out)

@@ -70,6 +70,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli import DONE
+    from slideviz.cli.places import make_folder, require_files
     from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
     from slideviz.view.compare import METHODS, MODES, warm
@@ -81,11 +82,9 @@ def compare(arguments: argparse.Namespace) -> int:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     wanted = _wanted(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
     mesh = read(case.mesh_file, zone=case.zone)
+    make_folder(folder)
+    require_files(folder / "compare.csv")
     cannot = refused(case, mesh, wanted)
 
     def say(text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import closing
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,11 +58,13 @@ def _runs(arguments: argparse.Namespace, case: Case) -> list[Told]:
     from slideviz.cli.run_command import changed
     from slideviz.errors import CaseError
     from slideviz.view.film_pair import Told
+    from slideviz.view.moved import require_detail
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     mesh = read(case.mesh_file, zone=case.zone)
+    require_detail(arguments.zoom, mesh)
     if not arguments.beside:
         return [Told("", _frames(arguments, case, mesh))]
     if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
@@ -220,7 +223,7 @@ def zoom(text: str) -> Zoom:
         *centre, width = (float(word) for word in text.split(","))
     except ValueError:
         centre, width = [], 0.0
-    if len(centre) not in (2, 3) or not 0.0 < width < float("inf"):
+    if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
         raise argparse.ArgumentTypeError(
             f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
         )

@@ -27,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE, INVERTED
     from slideviz.cli.report import run_report, save_history, save_json
     from slideviz.errors import CaseError
+    from slideviz.view.moved import require_detail
 
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -35,8 +36,12 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
     if not arguments.force:
         _refuse_input(output, case.mesh_file)
+    qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
+    _require_places(arguments, output, qualities)
     seconds = {"read": -time.perf_counter()}
     mesh = read(case.mesh_file, zone=case.zone)
+    if arguments.picture:
+        require_detail(arguments.zoom, mesh)
     seconds["read"] += time.perf_counter()
     steps = _pull(arguments, case, mesh)
     last = steps[-1]
@@ -45,7 +50,6 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     write(output, last.mesh, overwrite=arguments.force, cell_data=cell_data(output, found))
-    qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
     if qualities:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
@@ -75,15 +79,30 @@ def run(arguments: argparse.Namespace) -> int:
     return DONE
 
 
+def _require_places(arguments: argparse.Namespace, output: Path, qualities: Path | None) -> None:
+    """Raise where a result could not be written, before the work and not after it."""
+    from slideviz.cli.places import make_folder, require_files, require_mesh_file
+
+    require_mesh_file(output)
+    if arguments.picture:
+        from slideviz.view.offscreen import check_png, check_size
+        from slideviz.view.picture import SIZE
+
+        check_png(arguments.picture)
+        check_size(arguments.picture_size or SIZE)
+    require_files(qualities, arguments.json, arguments.picture, arguments.history)
+    if arguments.steps_dir:
+        make_folder(arguments.steps_dir)
+
+
 def read_case(arguments: argparse.Namespace) -> Case:
     """Return the case of the file with the changes of ``--set`` and ``--zone``."""
     from slideviz import Case
 
-    texts = list(arguments.set)
+    case = changed(Case.read(arguments.case), arguments.set)
     if getattr(arguments, "step_count", None) is not None:
-        texts.append(f"STEPS={arguments.step_count}")
-    case = changed(Case.read(arguments.case), texts)
-    return case.change(zone=arguments.zone) if arguments.zone else case
+        case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
+    return case if arguments.zone is None else case.change(zone=arguments.zone)
 
 
 def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
@@ -130,15 +149,9 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
-    from slideviz.errors import CaseError
 
     steps: list[Step] = []
     folder = arguments.steps_dir
-    if folder:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise CaseError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:

@@ -6,6 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -17,6 +18,9 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
 COLOURS = ("size-skew", "size", "skew", "displacement")
 """As of `slideviz.case.view_keys` and `slideviz.view.section_paint`, which load too much here."""
+
+MOST_COPIES = 100
+"""On each side: more could neither be told apart nor be drawn in reasonable time."""
 
 PLANE_HELP = (
     "normal and a point: nx,ny,nz,x,y,z (2D: nx,ny,x,y); or an axis and a coordinate, as in z=0.5"
@@ -162,8 +166,10 @@ def neighbours(text: str) -> int | Literal["wheel"]:
     """Return the number of passages on each side, or ``wheel``."""
     if text == "wheel":
         return "wheel"
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r}: give a number, 0 or more, or the word wheel")
+    if not text.isdecimal() or int(text) > MOST_COPIES:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: give a number, 0 to {MOST_COPIES}, or the word wheel"
+        )
     return int(text)
 
 
@@ -191,6 +197,8 @@ def _numbers(text: str, counts: tuple[int, ...], form: str) -> list[float]:
         values = [float(word) for word in text.split(",")]
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not {form}") from None
+    if not all(map(isfinite, values)):
+        raise argparse.ArgumentTypeError(f"{text!r} has a number that is not finite")
     if len(values) not in counts:
         raise argparse.ArgumentTypeError(f"{text!r} has {len(values)} numbers; write {form}")
     return values

@@ -71,11 +71,29 @@ def atomic_write(path: str | Path, error: type[SlidevizError] = MeshError) -> It
         # The block may have failed to read some other file, which is not ours to explain.
         if problem.filename is not None and not _is_ours(problem.filename, target, temporary):
             raise
-        raise error(f"{target}: cannot be written: {_reason(problem)}") from problem
+        raise error(f"{target}: cannot be written: {reason_of(problem)}") from problem
     finally:
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+def require_writable(path: str | Path, error: type[SlidevizError] = MeshError) -> None:
+    """Check that a file could be written now, before the work that leads to it; nothing is left.
+
+    Raises
+    ------
+    SlidevizError
+        It cannot be written, as for `atomic_write`.
+    """
+    real = Path(os.path.realpath(path))
+    draft = real.parent / f".slideviz-{secrets.token_hex(8)}.tmp"
+    try:
+        _mode_of(real)
+        draft.touch(exist_ok=False)
+        draft.unlink()
+    except OSError as problem:
+        raise error(f"{path}: cannot be written: {reason_of(problem)}") from problem
 
 
 def _mode_of(path: Path) -> int | None:
@@ -96,6 +114,7 @@ def _is_ours(name: object, target: Path, temporary: Path | None) -> bool:
     return str(name) in {str(target), str(temporary), os.path.realpath(target)}
 
 
-def _reason(problem: OSError) -> str:
+def reason_of(problem: OSError) -> str:
+    """Return why something cannot be written, and the remedy."""
     text = problem.strerror or str(problem)
     return _REMEDIES.get(problem.errno or 0, text)

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.view.actors import volume
 
@@ -34,6 +35,25 @@ class Detail:
 
 Zoom = Detail | Literal["auto", "all"]
 """A given detail, the whole mesh, or the whole unless what moved is tiny in it."""
+
+
+def require_detail(zoom: Zoom, mesh: Mesh) -> None:
+    """Raise SlidevizError where a given detail is no part of a mesh, before the work."""
+    if not isinstance(zoom, Detail):
+        return
+    place = ", ".join(f"{x:g}" for x in zoom.centre)
+    if len(zoom.centre) != mesh.dim:
+        raise SlidevizError(
+            f"a detail about {place} is not a place in a {mesh.dim}D mesh; give {mesh.dim} "
+            "coordinates and a width"
+        )
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    # Boundaries may move out of the box by some of its size.
+    far = 0.5 * zoom.width + 0.5 * float((high - low).max())
+    if np.any(zoom.centre < low - far) or np.any(zoom.centre > high + far):
+        ends = zip("xyz", low, high, strict=False)
+        box = ", ".join(f"{axis} from {a:.6g} to {b:.6g}" for axis, a, b in ends)
+        raise SlidevizError(f"a detail about {place} misses the mesh, which has {box}")
 
 
 def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.view.actors import VALUES, lookup_table, shown_values, volume
 from slideviz.view.legend import STRIP, add_colour_bar, place_bar
 from slideviz.view.look import PAPER
-from slideviz.view.moved import Detail, Zoom, half_of, lengths, tiny_motion
+from slideviz.view.moved import Detail, Zoom, half_of, lengths, require_detail, tiny_motion
 from slideviz.view.offscreen import font_scale
 from slideviz.view.state import COLOUR_BY, ColourBy, Frame
 from slideviz.view.surfaces import padded
@@ -48,7 +47,7 @@ class Portrait:
     Raises
     ------
     SlidevizError
-        The detail has not as many coordinates as the mesh.
+        The detail has not as many coordinates as the mesh, or is no part of it.
     """
 
     def __init__(
@@ -60,11 +59,7 @@ class Portrait:
         zoom: Zoom = "auto",
         seen: Sequence[Mesh] = (),
     ) -> None:
-        if isinstance(zoom, Detail) and len(zoom.centre) != mesh.dim:
-            raise SlidevizError(
-                f"a detail about {', '.join(f'{x:g}' for x in zoom.centre)} is not a place in a "
-                f"{mesh.dim}D mesh; give {mesh.dim} coordinates and a width"
-            )
+        require_detail(zoom, base)
         self.plotter = plotter
         self.colour_by = colour_by
         self._base = base

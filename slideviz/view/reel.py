@@ -96,6 +96,8 @@ def check_film(
     folder = paths[0].parent
     if folder == file and not folder.exists():
         folder = folder.parent  # it will be made
+    if folder.exists() and not folder.is_dir():
+        raise SlidevizError(f"{file}: {folder} is a file, not a folder; choose another folder")
     if not folder.is_dir():
         raise SlidevizError(f"{file}: the folder {folder} does not exist; create it first")
     if not os.access(folder, os.W_OK):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.atomic import atomic_write, require_writable
 
 
 def names(folder: Path) -> list[str]:
@@ -20,6 +20,30 @@ def test_writes_and_leaves_nothing_else(tmp_path):
         assert not (tmp_path / "a.su2").exists()
     assert (tmp_path / "a.su2").read_bytes() == b"one\n"
     assert names(tmp_path) == ["a.su2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("no/a.su2", "the folder does not exist; create it first"),
+        ("f/a.su2", "a part of the path is a file, not a folder"),
+        ("folder", "it is a folder; give the name of a file"),
+    ],
+)
+def test_what_cannot_be_written_is_known_before(tmp_path, name, words):
+    (tmp_path / "f").write_bytes(b"")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(CaseError, match=f"{name}: cannot be written: {words}"):
+        require_writable(tmp_path / name, CaseError)
+    assert names(tmp_path) == ["f", "folder"]
+
+
+def test_asking_whether_a_file_can_be_written_leaves_no_trace(tmp_path):
+    (tmp_path / "old.su2").write_bytes(b"old")
+    for name in ("old.su2", "new.su2"):
+        require_writable(tmp_path / name)
+    assert names(tmp_path) == ["old.su2"]
+    assert (tmp_path / "old.su2").read_bytes() == b"old"
 
 
 def write_then_fail(path: Path, problem: BaseException) -> None:
