@@ -21,6 +21,7 @@ from slideviz.gui.plot_canvas import (
     write_plot,
 )
 from slideviz.gui.plot_image import Draw
+from slideviz.gui.theme import alarm
 from slideviz.view import changes
 from slideviz.view.actors import shown_values
 from slideviz.view.inspect import ONLY_INVERTED, chosen_cells
@@ -141,7 +142,7 @@ class HistogramPanel(QWidget):
         # Of a node: the values of cells are means of theirs.
         shifts = session.frame.mesh.points - session.mesh.points
         ends = np.linalg.norm(shifts, axis=1).max() if what == "displacement" else plain.min()
-        red = " style='color:#e8112d'" if bad else ""
+        red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
             f"{low} <b>{ends:.4g}</b>&nbsp; mean <b>{plain.mean():.4g}</b>&nbsp; "
             f"<span{red}>inverted <b>{bad:,}</b></span>"

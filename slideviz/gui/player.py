@@ -126,6 +126,8 @@ class Player(QWidget):
         self._colour = colour
         for name, button in self.buttons.items():
             button.setIcon(icon("pause" if name == "play" and self.playing else name, colour))
+        # Words about inverted cells have the theme's red.
+        self.sync(self.store.session)
 
     def sync(self, session: Session) -> None:
         """Show the session."""

@@ -8,6 +8,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QTextDocument
 from qtpy.QtWidgets import QLabel, QSizePolicy
 
+from slideviz.gui.theme import alarm
 from slideviz.view.state import Session
 
 SEPARATOR = "&nbsp;· "
@@ -80,7 +81,7 @@ def result_parts(session: Session) -> list[list[str]]:
     if frame is None:
         return []
     quality = frame.quality
-    colour = " style='color:#e8112d'" if quality.inverted else ""
+    colour = f" style='color:{alarm()}'" if quality.inverted else ""
 
     def form(word: str, digits: int) -> list[str]:
         return [

@@ -114,7 +114,7 @@ _EXTRA = {
         "window": "#262b31",
         "soft": "#a3adb8",
         "base": "#1d2126",
-        "bad": "#ff8a80",
+        "bad": "#ff9186",
         "accent": "#3d7fc4",
         "accent_hover": "#4c8fd6",
         "mid": "#3a424b",
@@ -126,7 +126,15 @@ _EXTRA = {
 }
 
 
-FRAMED = ("QCheckBox", "QRadioButton", "QLineEdit", "QAbstractSpinBox", "QComboBox", "QTableView")
+FRAMED = (
+    "QCheckBox",
+    "QRadioButton",
+    "QLineEdit",
+    "QAbstractSpinBox",
+    "QComboBox",
+    "QTableView",
+    "QListView",
+)
 """Widgets whose frames or boxes must stand out from what is around them."""
 
 _OUTLINE = 140
@@ -170,3 +178,9 @@ def apply(theme: str) -> Look:
 def icon_colour(look: Look) -> str:
     """Return the colour of icons on that theme's toolbars."""
     return "#dfe5ec" if look.name == "dark" else "#3b4652"
+
+
+def alarm() -> str:
+    """Return the colour of words about inverted cells, readable in the theme that is shown."""
+    window = QApplication.palette().color(QPalette.ColorRole.Window)
+    return _EXTRA["dark" if window.lightness() < 128 else "light"]["bad"]

@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
+from slideviz.gui.theme import alarm
 from slideviz.gui.worst_table import WorstModel, WorstTable
 from slideviz.mesh.model import FloatArray
 from slideviz.view import changes
@@ -227,7 +228,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     ``every`` tells every corner and coordinate.
     """
     info = cell_info(session.frame, cell)
-    red = " style='color:#e8112d'" if info.state == "inverted" else ""
+    red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
     around = axis_of(session)
     parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"

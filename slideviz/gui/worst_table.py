@@ -156,6 +156,8 @@ class WorstTable(QTableView):
         super().__init__()
         self.setObjectName("worst")
         self._shared: tuple[str, ...] = ()
+        self._needed: list[int] = []
+        self._given: list[int] = []
         self.setModel(model)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -183,11 +185,29 @@ class WorstTable(QTableView):
         if self.model().rowCount() and self.model().headers != self._shared:
             self._shared = self.model().headers
             metrics, rows = self.fontMetrics(), range(self.model().rowCount())
+            self._needed = []
             for column, words in enumerate(self._shared):
                 texts = [self.model().index(row, column).data() for row in rows]
                 room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
                 # What Qt would take is more than there is.
-                self.setColumnWidth(column, room + 8 + (ARROW if column == QUALITY else 0))
+                self._needed.append(room + 8 + (ARROW if column == QUALITY else 0))
+            self._given = []
+            self._spread()
+
+    def _spread(self) -> None:
+        """Give every column its part of the width, unless somebody has chosen others."""
+        now = [self.columnWidth(column) for column in range(len(self._needed))]
+        # The last one takes what is left.
+        if not self._needed or (self._given and now[:-1] != self._given[:-1]):
+            return
+        spare = max(self.viewport().width() - sum(self._needed), 0) // len(self._needed)
+        self._given = [needed + spare for needed in self._needed]
+        for column, width in enumerate(self._given):
+            self.setColumnWidth(column, width)
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._spread()
 
     def keyPressEvent(self, event) -> None:
         before = self.currentIndex().row()

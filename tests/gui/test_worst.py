@@ -8,6 +8,7 @@ import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
 
 from slideviz.case.samples import sample
 from slideviz.gui import plot_canvas, worst
@@ -359,3 +360,18 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
     words = window.docks_.panels["histogram"].numbers
     low = f"{opened.session.frame.quality.min:.4g}"
     opened.qtbot.waitUntil(lambda: low in words.text())
+
+
+def test_columns_share_the_width_unless_somebody_chose_others(full):
+    table = full.table
+    table.resize(600, 300)
+    QApplication.processEvents()
+    count = table.model().columnCount()
+    widths = [table.columnWidth(column) for column in range(count)]
+    assert sum(widths) >= table.viewport().width() - count
+    spare = [width - needed for width, needed in zip(widths, table._needed, strict=True)]
+    assert max(spare) - min(spare) <= count, "none is much wider than its numbers"
+    table.setColumnWidth(1, 140)
+    table.resize(700, 300)
+    QApplication.processEvents()
+    assert table.columnWidth(1) == 140
