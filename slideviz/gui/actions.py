@@ -15,6 +15,12 @@ from slideviz.gui.tool_bar import ToolBar
 from slideviz.view import changes
 from slideviz.view.state import Session
 
+CUTS = {
+    3: {"add_plane": "&Cut by a plane", "add_cylinder": "Cut by a c&ylinder"},
+    2: {"add_plane": "&Cut by a line", "add_cylinder": "Cut by a circl&e"},
+}
+"""What the actions that add a section are called, by the dimensions of the mesh."""
+
 TOGGLES = (
     ("edges", "Mesh edges", "E", "Draw the edges of the cells."),
     ("undeformed", "Undeformed", "U", "Draw the undeformed boundaries as a ghost."),
@@ -148,8 +154,8 @@ class Actions:
         self.compare.aboutToShow.connect(lambda: fill_compare(self.compare, window.store))
         menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
         for name, text, keys in (
-            ("add_plane", "&Cut by a plane", "C"),
-            ("add_cylinder", "Cut by a c&ylinder", "Shift+C"),
+            ("add_plane", CUTS[3]["add_plane"], "C"),
+            ("add_cylinder", CUTS[3]["add_cylinder"], "Shift+C"),
         ):
             menu.addAction(self._add(name, text, partial(self._add_section, name), keys))
         menu.addSeparator()
@@ -228,8 +234,9 @@ class Actions:
         self.by_name["perspective"].setEnabled(opened and not flat)
         for side in (*SIDE_KEYS, "iso"):
             self.by_name[f"side{side}"].setEnabled(opened and not flat)
-        self.by_name["add_plane"].setEnabled(opened)
-        self.by_name["add_cylinder"].setEnabled(opened and not flat)
+        for name, text in CUTS[2 if flat else 3].items():
+            self.by_name[name].setText(text)
+            self.by_name[name].setEnabled(opened)
         store = self.window.store
         for name, what in (("undo", store.can_undo), ("redo", store.can_redo)):
             act = self.by_name[name]

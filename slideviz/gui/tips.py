@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import html
+
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QFontMetrics
+from qtpy.QtWidgets import QToolTip
+
 TIPS: dict[str, str] = {
     "open": "Open a mesh, or a case with its mesh.",
     "open_recent": "Open one of the files used last.",
@@ -24,8 +30,9 @@ TIPS: dict[str, str] = {
     "sideiso": "Look at the mesh from a corner.",
     "compare": "Show the undeformed mesh or another run beside the run that is shown.",
     "show_all": "Show the boundaries that were hidden.",
-    "add_plane": "Show the cells that a plane cuts, and put it where you want.",
-    "add_cylinder": "Show the cells that a cylinder about the axis cuts, and unroll it.",
+    "add_plane": "Show the cells that a plane, in 2D a line, cuts, and put it where you want.",
+    "add_cylinder": "Show the cells that a cylinder about the axis cuts, and unroll it; in 2D a "
+    "circle.",
     "steps": "Show another step of the deformation.",
     "step_first": "Show the mesh before it is deformed.",
     "step_previous": "Show the step before this one.",
@@ -51,3 +58,18 @@ def tip_of(name: str, text: str) -> str:
     if name.startswith("side") and name not in TIPS:
         return f"Look at the mesh from {name.removeprefix('side')}."
     return TIPS.get(name, f"{text.replace('…', '').replace('&', '')}.")
+
+LETTERS = 60
+"""In a line of a tooltip."""
+
+
+def wrapped(text: str) -> str:
+    """Return a tooltip in lines of about 60 letters; Qt shows plain text on one line.
+
+    Short lines, and what is rich text already, stay as they are.
+    """
+    if Qt.mightBeRichText(text) or all(len(line) <= LETTERS + 10 for line in text.splitlines()):
+        return text
+    width = round(1.05 * LETTERS * QFontMetrics(QToolTip.font()).averageCharWidth())
+    lines = html.escape(text, quote=False).replace("\n", "<br>")
+    return f"<table width='{width}'><tr><td>{lines}</td></tr></table>"

@@ -122,6 +122,14 @@ def test_sections_are_added_by_keys_and_removed_by_delete(window, driver, panel)
     assert [section.kind for section in sections(window)] == ["plane"]
 
 
+def test_in_2d_the_menu_offers_a_line_and_a_circle(window, driver, flat_panel):
+    actions = window.actions_.by_name
+    assert actions["add_plane"].text().replace("&", "") == "Cut by a line"
+    assert actions["add_cylinder"].text().replace("&", "") == "Cut by a circle"
+    QTest.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ShiftModifier)
+    assert [section.kind for section in sections(window)] == ["cylinder"]
+
+
 def test_a_free_normal(window, driver, panel):
     driver.click(panel.add_plane)
     assert not panel.editor.direction.isVisible()
