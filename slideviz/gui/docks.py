@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,10 +21,12 @@ from slideviz.gui.runs import RunsPanel
 from slideviz.gui.sections import sections_panel
 from slideviz.gui.worst import WorstPanel
 
+Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
 """Pixels that the panels at the sides need at least."""
+FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 SIDE = 0.22
 """Part of the window's width that the panels of a side take, until somebody chooses otherwise."""
 
@@ -81,7 +83,7 @@ class Docks(QObject):
     def __init__(self, window: QMainWindow) -> None:
         super().__init__(window)
         self.window = window
-        self._widths: dict[str, int] = {}
+        self._widths: dict[Side, int] = {}
         window.installEventFilter(self)
         window.setDockOptions(
             QMainWindow.DockOption.AnimatedDocks | QMainWindow.DockOption.AllowTabbedDocks
@@ -141,21 +143,41 @@ class Docks(QObject):
         if right:
             window.resizeDocks(right, [410, 290][: len(right)], Qt.Orientation.Vertical)
 
+    def _shares(self) -> dict[Side, int]:
+        """Return the width that each side has as long as nobody has moved it."""
+        part = round(SIDE * self.window.width())
+        return {LEFT: max(part, LEFT_WIDTH), RIGHT: max(part, RIGHT_WIDTH)}
+
     def _share_width(self) -> None:
         """Give both sides their part of the window's width."""
-        part = round(SIDE * self.window.width())
-        self._widths = {"boundaries": max(part, LEFT_WIDTH), "histogram": max(part, RIGHT_WIDTH)}
-        docks = [self.by_name[name] for name in self._widths]
+        self._widths = self._shares()
+        # Before the window is shown, nothing is seen yet.
+        docks = [self._seen(side) or self.by_name[FIRST[side]] for side in self._widths]
         self.window.resizeDocks(docks, list(self._widths.values()), Qt.Orientation.Horizontal)
+
+    def _seen(self, side: Side) -> QDockWidget | None:
+        """Return a dock at that side which is in front: one behind a tab keeps an old width."""
+        for dock in self.by_name.values():
+            here = self.window.dockWidgetArea(dock) == side and not dock.isFloating()
+            if here and dock.isVisible() and not dock.visibleRegion().isEmpty():
+                return dock
+        return None
+
+    def follow(self) -> None:
+        """Let the sides follow the window again if they are as wide as nobody has moved them."""
+        shares = self._shares()
+        self._widths = shares if self._as_wide_as(shares) else {}
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802
         """Let the sides follow the width of the window, as long as nobody has moved them."""
-        if event.type() == QEvent.Type.Resize and self._widths and self._unmoved():
+        resized = event.type() == QEvent.Type.Resize
+        if resized and self._widths and self._as_wide_as(self._widths):
             QTimer.singleShot(0, self, self._share_width)
         return False
 
-    def _unmoved(self) -> bool:
-        return all(abs(self.by_name[at].width() - it) < 4 for at, it in self._widths.items())
+    def _as_wide_as(self, widths: Mapping[Side, int]) -> bool:
+        seen = {side: self._seen(side) for side in widths}
+        return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
 
     def lead_to(self, name: str) -> None:
         """Bring a dock to the front."""

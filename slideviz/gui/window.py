@@ -180,6 +180,9 @@ class MainWindow(QMainWindow):
             self.restoreGeometry(geometry)
         if state is None or not self.restoreState(state):
             self.docks_.share_room()
+        else:
+            # When the docks have their places.
+            QTimer.singleShot(0, self, self.docks_.follow)
 
     def _keep_session(self, folder: Path | None) -> None:
         self.autosave: Autosave | None = None
