@@ -10,7 +10,7 @@ case=demo/passage/passage.cfg
 
 mkdir -p demo
 # Only what this script wrote: someone may keep other things in demo/.
-rm -rf demo/passage
+rm -rf demo/passage demo/passage_fixed* demo/passage_sliding*
 "$slideviz" sample passage -o demo/passage
 
 printf '\n== all outer boundaries held fixed ==\n'
@@ -22,8 +22,16 @@ printf '\n== inflow and outflow slide, periodic sides move along ==\n'
     --json demo/passage_sliding.json
 "$slideviz" quality demo/passage_sliding.su2 --reference demo/passage/mesh.su2
 
+tell() { printf '  %-31s %s\n' "demo/$1" "$2"; }
 printf '\nwritten:\n'
-ls -1 demo/*.su2 demo/*.png demo/*.json "$case"
+tell passage/mesh.su2 'the undeformed mesh'
+tell passage/passage.cfg 'the case: what moves, slides and repeats, by which method'
+for way in fixed sliding; do
+    tell "passage_$way.su2" "the deformed mesh, outer boundaries $way"
+    tell "passage_$way.png" 'its picture: cells coloured by quality'
+    tell "passage_${way}_qual.txt" 'its quality, a number for each cell (GENERATE_QUALITY= YES)'
+done
+tell passage_sliding.json 'the report of the run, for other programs'
 if [ "${WINDOW:-yes}" = no ]; then
     printf '\nthe window: %s %s\n' "$slideviz" "$case"
 elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then

@@ -110,7 +110,7 @@ def quality(arguments: argparse.Namespace) -> int:
         print(f"  {words_of(base)}")
         print(quality_lines(found))
         print("worst cells:")
-        print(table([(w["cell"], w["type"], w["quality"]) for w in report["worst"]]))
+        print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
         print("cells by quality:")
         print(histogram_lines(found))
     return INVERTED if found.inverted else DONE
@@ -158,9 +158,26 @@ def shots(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE
     from slideviz.gui.shots import shots as draw
 
-    for path in draw(arguments.output):
+    folder = arguments.output
+    if folder is None:
+        if not _is_checkout(Path.cwd()):
+            arguments.wrong_usage(
+                "this folder is no checkout of slideviz, whose screenshots/ are drawn again; "
+                "name another folder with -o DIR"
+            )
+        folder = Path("screenshots")
+    print(f"drawing into {folder}/; pictures of the same names there are replaced", flush=True)
+    for path in draw(folder):
         print(path)
     return DONE
+
+
+def _is_checkout(folder: Path) -> bool:
+    """Tell whether a folder has slideviz's own sources, and so the pictures of its README."""
+    try:
+        return 'name = "slideviz"' in (folder / "pyproject.toml").read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
 
 
 def keys(_: argparse.Namespace) -> int:

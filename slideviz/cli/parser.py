@@ -95,16 +95,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_sample(calls)
     keys = calls.add_parser("keys", help="reference of all case keys")
     keys.set_defaults(command=commands.keys)
-    shots = calls.add_parser("shots", help="draw the pictures of the window again")
-    shots.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="DIR",
-        default=Path("screenshots"),
-        help="folder (default: screenshots)",
+    shots = calls.add_parser(
+        "shots",
+        help="for developers: draw the README's pictures of the window again",
+        description="Draw the window in typical states, as the README of slideviz shows it.",
     )
-    shots.set_defaults(command=commands.shots)
+    shots.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="folder (in a checkout: screenshots)"
+    )
+    shots.set_defaults(command=commands.shots, wrong_usage=shots.error)
     return parser
 
 

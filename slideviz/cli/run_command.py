@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     elif not arguments.quiet:
         files = {"mesh": output, "quality of each cell": qualities}
         files |= {"report": arguments.json, "picture": arguments.picture}
-        files["convergence"] = arguments.history
+        files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         _print_run(report, found, files)
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
