@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, QRect, Qt
 from qtpy.QtWidgets import (
     QCheckBox,
     QFormLayout,
@@ -66,7 +66,7 @@ class MethodForm(QWidget):
     def _make_scroll(self) -> QVBoxLayout:
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
-        self.scroll = QScrollArea()
+        self.scroll = WholeScroll()
         self.scroll.setWidgetResizable(True)
         self.scroll.setFrameShape(QFrame.Shape.NoFrame)
         self.scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -140,6 +140,19 @@ class MethodForm(QWidget):
         label.setToolTip(TIPS[name])
         set_tip(field, TIPS[name])
         self.form.addRow(label, widget or field)
+
+
+class WholeScroll(QScrollArea):
+    """Shows a field whole when the tab key comes to it, not only where its cursor is."""
+
+    def focusNextPrevChild(self, forwards: bool) -> bool:
+        moved = super().focusNextPrevChild(forwards)
+        field = self.widget().focusWidget()
+        if moved and field is not None:
+            place = QRect(field.mapTo(self.widget(), QPoint(0, 0)), field.size())
+            for y in (place.bottom(), place.top()):
+                self.ensureVisible(place.left(), y, 0, 6)
+        return moved
 
 
 class StepsBox(QSpinBox):

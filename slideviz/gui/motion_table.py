@@ -74,6 +74,7 @@ class TableDialog(QDialog):
         self._soon.setInterval(CHECK_MS)
         self._soon.timeout.connect(self.check)
         self.edit.textChanged.connect(self._soon.start)
+        self.edit.setFocus()
         self.check()
 
     @property

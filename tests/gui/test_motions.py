@@ -75,7 +75,7 @@ def test_an_axis_without_direction_is_marked_and_the_rest_goes_on(block):
     axis.fields[0].selectAll()
     QTest.keyClicks(axis.fields[0], "0")
     assert [field.property("bad") for field in axis.fields] == [True] * 3
-    assert axis.fields[2].toolTip() == "an axis needs a direction: not all may be 0"
+    assert "an axis needs a direction: not all may be 0" in axis.fields[2].toolTip()
     assert block.session.case.motions[0].axis == (1.0, 0.0, 0.0)
     axis.fields[1].selectAll()
     QTest.keyClicks(axis.fields[1], "2")

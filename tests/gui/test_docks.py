@@ -1,0 +1,212 @@
+"""The docks: every control can be reached in a small window, and a layout comes back."""
+
+import pytest
+from qtpy.QtCore import QPoint, QPointF, QRect, Qt
+from qtpy.QtGui import QWheelEvent
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication, QWidget
+
+from slideviz.case.model import Reduction
+from slideviz.gui import dialogs
+from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
+from slideviz.gui.fields import Choice, NumberField
+from slideviz.gui.window import MainWindow
+from slideviz.view import changes
+
+SMALL = 1280, 800
+
+
+def settled(qtbot, window):
+    """Wait until the layout has followed."""
+    qtbot.wait(30)
+    QApplication.processEvents()
+    return window
+
+
+@pytest.fixture
+def method(driver, sample_folder, qtbot):
+    """The method panel with all its settings open and in use, in a small window."""
+    driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
+    window = driver.window
+    window.resize(*SMALL)
+    window.docks_.lead_to("method")
+    driver.window.store.change(changes.set_case, reduction=Reduction(multilevel=True))
+    driver.click(window.method.more.button)
+    settled(qtbot, window)
+    return window.method
+
+
+def seen_in(panel, widget):
+    """Return the part of a widget that is seen in the scroll area of a panel."""
+    port = panel.scroll.viewport()
+    place = QRect(widget.mapTo(port, QPoint(0, 0)), widget.size())
+    return place.intersected(port.rect())
+
+
+def is_whole(panel, widget):
+    return seen_in(panel, widget).size() == widget.size()
+
+
+def controls(panel):
+    """Return all that can be set in the panel, from the first to the last."""
+    inside = panel.scroll.widget()
+    every = [w for w in inside.findChildren(QWidget) if isinstance(w, (Choice, NumberField))]
+    every += [panel.steps, panel.reduction, panel.more.button]
+    return [w for w in every if w.isVisibleTo(inside) and w.isEnabled()]
+
+
+def run_is_seen(window):
+    button = window.run_panel.run
+    place = QRect(button.mapTo(window, QPoint(0, 0)), button.size())
+    return button.isVisible() and window.rect().contains(place) and button.height() > 20
+
+
+def test_every_setting_is_reached_with_the_tab_key_and_seen_whole(method, driver):
+    window, wanted, found = driver.window, controls(method), set()
+    assert {method.more.kernel, method.more.gamma, method.more.level_end} <= set(wanted)
+    assert method.scroll.verticalScrollBar().maximum() > 0, "not all have room at once"
+    driver.activate()
+    method.scroll.verticalScrollBar().setValue(0)
+    method.method.setFocus()
+    for _ in range(2 * len(wanted)):
+        at = QApplication.focusWidget()
+        # A spin box has the focus through the line in it.
+        at = method.steps if at is method.steps.lineEdit() else at
+        if at in wanted:
+            assert is_whole(method, at), at.objectName()
+            assert run_is_seen(window)
+            found.add(at)
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+    assert [w.objectName() for w in wanted if w not in found] == []
+
+
+def turn_wheel(widget, notches):
+    where = QPointF(widget.rect().center())
+    none = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase
+    angle = QPoint(0, 120 * notches)
+    everywhere = QPointF(widget.mapToGlobal(widget.rect().center()))
+    event = QWheelEvent(where, everywhere, QPoint(), angle, *none, False)
+    QApplication.sendEvent(widget, event)
+
+
+def test_every_setting_is_reached_with_the_wheel_which_changes_none(method, driver):
+    case, bar = driver.session.case, method.scroll.verticalScrollBar()
+    bar.setValue(0)
+    found = set()
+    for _ in range(60):
+        found |= {w for w in controls(method) if is_whole(method, w)}
+        port = method.scroll.viewport()
+        # Over whatever control is in the middle.
+        under = port.childAt(port.rect().center()) or port
+        before = bar.value()
+        turn_wheel(under, -1)
+        assert run_is_seen(driver.window)
+        if before == bar.value():
+            turn_wheel(port, -1)
+        if bar.value() == bar.maximum():
+            break
+    found |= {w for w in controls(method) if is_whole(method, w)}
+    assert set(controls(method)) == found
+    assert driver.session.case == case
+
+
+def test_no_setting_is_cut_off_at_the_side(method):
+    right = method.scroll.viewport().width()
+    for widget in controls(method):
+        edge = widget.mapTo(method.scroll.widget(), QPoint(widget.width(), 0)).x()
+        assert edge <= right, widget.objectName()
+
+
+# The layout -------------------------------------------------------------------------------
+
+
+def widths(window):
+    return {name: window.docks[name].width() for name in ("boundaries", "runs")}
+
+
+def close(window, monkeypatch):
+    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    window.close()
+
+
+@pytest.fixture
+def start(qtbot, settings, monkeypatch):
+    """Start a window with the settings of the test, as the program does."""
+
+    def make(size=None):
+        window = MainWindow(settings, multi_samples=0)
+        qtbot.addWidget(window, before_close_func=lambda w: close(w, monkeypatch))
+        if size is not None:
+            window.resize(*size)
+        with qtbot.waitExposed(window):
+            window.show()
+        return settled(qtbot, window)
+
+    return make
+
+
+def share(window, qtbot, left, right):
+    """Drag the edges of the view, as with the mouse."""
+    docks = [window.docks[name] for name in ("boundaries", "histogram")]
+    window.resizeDocks(docks, [left, right], Qt.Orientation.Horizontal)
+    settled(qtbot, window)
+
+
+def test_the_layout_comes_back_after_a_restart(start, qtbot, monkeypatch):
+    first = start(SMALL)
+    share(first, qtbot, LEFT_WIDTH + 60, RIGHT_WIDTH + 45)
+    first.docks["log"].show()
+    first.docks["sections"].hide()
+    first.docks["worst"].raise_()
+    settled(qtbot, first)
+    before = widths(first)
+    assert before["boundaries"] == pytest.approx(LEFT_WIDTH + 60, abs=3)
+    close(first, monkeypatch)
+    second = start()
+    assert (second.width(), second.height()) == SMALL
+    assert widths(second) == before
+    assert second.docks["log"].isVisible()
+    assert not second.docks["sections"].isVisibleTo(second)
+    assert not second.docks["worst"].visibleRegion().isEmpty(), "the tab in front is that again"
+
+
+def test_the_layout_can_be_put_back(start, qtbot, monkeypatch):
+    first = start(SMALL)
+    at_first = widths(first)
+    share(first, qtbot, LEFT_WIDTH + 60, RIGHT_WIDTH + 45)
+    first.docks["sections"].hide()
+    first.docks["method"].setFloating(True)
+    close(first, monkeypatch)
+    second = start()
+    assert widths(second) != at_first
+    assert second.docks["method"].isFloating()
+    second.actions_.by_name["restore_layout"].trigger()
+    settled(qtbot, second)
+    assert widths(second) == at_first
+    assert not second.docks["method"].isFloating()
+    assert second.docks["sections"].isVisibleTo(second)
+    assert not second.docks["log"].isVisible()
+    assert not second.docks["motion"].visibleRegion().isEmpty()
+
+
+def test_sides_follow_the_window_until_they_are_moved_also_after_a_restart(
+    start, qtbot, monkeypatch
+):
+    first = start(SMALL)
+    close(first, monkeypatch)
+    second = start()
+    narrow = widths(second)
+    second.resize(1800, 900)
+    settled(qtbot, second)
+    wide = widths(second)
+    assert all(wide[name] > narrow[name] + 20 for name in wide)
+    share(second, qtbot, LEFT_WIDTH + 30, RIGHT_WIDTH + 40)
+    moved = widths(second)
+    second.resize(1900, 900)
+    settled(qtbot, second)
+    assert widths(second) == pytest.approx(moved, abs=3)
+    close(second, monkeypatch)
+    third = start()
+    third.resize(1700, 900)
+    settled(qtbot, third)
+    assert widths(third) == pytest.approx(moved, abs=3)
