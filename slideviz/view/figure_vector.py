@@ -14,10 +14,13 @@ from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED
 from slideviz.view.figure import GAP, Figure, panes, title_of
+from slideviz.view.figure_sections import draw_sections
 from slideviz.view.inspect import chosen_cells
+from slideviz.view.layer_mesh import FADED, is_faded
 from slideviz.view.legend import STRIP
 from slideviz.view.look import INVERTED_COLOUR, PAPER, ROLE_COLOURS
 from slideviz.view.offscreen import TITLE
+from slideviz.view.plate import OPACITY
 from slideviz.view.state import COLOUR_BY, Session
 from slideviz.view.studio import Studio
 
@@ -125,28 +128,33 @@ def _mesh(axes: Any, session: Session, figure: Figure, point: float) -> None:
     if view.threshold is not None and not by_role:
         kept[:] = False
         kept[chosen_cells(values, view.threshold)] = True
+    # Without lines, neighbours would show a thin gap between them.
+    edge, width = (PAPER.edge, _EDGE * point) if figure.edges else ("face", 0.05)
+    lines: dict[str, Any] = {"edgecolors": edge, "linewidths": width}
+    paint: dict[str, Any] = {"facecolors": PAPER.cell}
+    if not by_role:
+        paint = {"cmap": colours, "norm": Normalize(*session.colour_range)}
+    faint: dict[str, Any] = {"alpha": FADED} if is_faded(session) else {}
     for ids, nodes in mesh.cells.by_type.values():
         here = kept[ids]
-        style: dict[str, Any] = {"facecolors": PAPER.cell}
-        if not by_role:
-            style = {
-                "array": values[ids[here]],
-                "cmap": colours,
-                "norm": Normalize(*session.colour_range),
-            }
-        # Without lines, neighbours would show a thin gap between them.
-        edge, width = (PAPER.edge, _EDGE * point) if figure.edges else ("face", 0.05)
-        style |= {"edgecolors": edge, "linewidths": width}
-        axes.add_collection(PolyCollection(list(mesh.points[nodes[here]]), **style))
+        shown = paint if by_role else {"array": values[ids[here]], **paint}
+        axes.add_collection(
+            PolyCollection(list(mesh.points[nodes[here]]), **shown, **lines, **faint)
+        )
+    draw_sections(axes, session, ({} if by_role else {"values": values}) | paint | lines, point)
     if view.undeformed:
-        lines = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
-        style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * point}
-        axes.add_collection(LineCollection(lines, **style))
+        parts = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
+        style: dict[str, Any] = {
+            "colors": PAPER.ghost,
+            "linestyles": "dashed",
+            "linewidths": 0.7 * point,
+        }
+        axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
         if name not in view.hidden:
             colour = ROLE_COLOURS[session.role(name)]
-            lines = list(_lines(mesh, name))
-            axes.add_collection(LineCollection(lines, colors=colour, linewidths=_LINE * point))
+            parts = list(_lines(mesh, name))
+            axes.add_collection(LineCollection(parts, colors=colour, linewidths=_LINE * point))
 
 
 def _lines(mesh: Mesh, name: str) -> FloatArray:
@@ -168,11 +176,30 @@ def _title(sheet: Any, session: Session, figure: Figure, middle: float) -> None:
     )
 
 
+def _plate(sheet: Any, session: Session, figure: Figure) -> None:
+    """Set the legend off from a mesh that reaches below it."""
+    from matplotlib.patches import Rectangle
+
+    if figure.background == "transparent":
+        return
+    (width, height), scale = figure.size, figure.scale
+    low, high = 0.16 - 12 * scale / height, 0.86
+    if session.view.colour_by == "role":
+        assert session.mesh is not None
+        roles = {session.role(name) for name in session.mesh.marker_names}
+        low, high = 1.0 - (29 + 24 * len(roles)) * scale / height, 1.0
+    side = STRIP * scale / width
+    plate = Rectangle((1.0 - side, low), side, high - low, transform=sheet.transFigure)
+    plate.set(facecolor=PAPER.background, alpha=OPACITY, linewidth=0, zorder=0.5, gid="plate")
+    sheet.add_artist(plate)
+
+
 def _legend(sheet: Any, session: Session, figure: Figure) -> None:
     """Draw the roles in use, or the colour bar, in the strip at the right."""
     width, height = figure.size
     scale, letters = figure.scale, _LETTERS * figure.scale * 72.0 / sheet.dpi
     left = 1.0 - (STRIP - 14) * scale / width
+    _plate(sheet, session, figure)
     if session.view.colour_by == "role":
         assert session.mesh is not None
         used = {session.role(name) for name in session.mesh.marker_names}
@@ -188,7 +215,8 @@ def _legend(sheet: Any, session: Session, figure: Figure) -> None:
 
     colours = colormaps[session.view.colour_map].with_extremes(under=INVERTED_COLOUR)
     inverted = session.frame is not None and session.frame.quality.inverted > 0
-    place = sheet.add_axes((left, 0.16, 20 * scale / width, 0.62))
+    # Above the plate, which is above the mesh.
+    place = sheet.add_axes((left, 0.16, 20 * scale / width, 0.62), zorder=1)
     scalar = ScalarMappable(Normalize(*session.colour_range), colours)
     bar = sheet.colorbar(scalar, cax=place, extend="min" if inverted else "neither")
     bar.outline.set_visible(False)

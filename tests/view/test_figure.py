@@ -13,7 +13,10 @@ from slideviz.view import changes, figure_vector, jobs_export
 from slideviz.view.figure import Figure, panes, title_of, words_of_size
 from slideviz.view.figure_vector import draw_vector, require_vector, write_vector
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
+from slideviz.view.layer_mesh import FADED
 from slideviz.view.look import ROLE_COLOURS
+from slideviz.view.section import Section
+from slideviz.view.section_cut import Cutter
 from slideviz.view.state import Frame
 from slideviz.view.studio import Studio, sees_all
 from slideviz.view.surfaces import find_surfaces
@@ -182,6 +185,42 @@ def test_only_chosen_cells_are_drawn(studio):
     studio.session = changes.set_view(studio.session, threshold=(2.0, 3.0))
     sheet = draw_vector(studio, PLAIN)
     assert sum(len(one.get_paths()) for one in sheet.axes[0].collections[:1]) == 0
+
+
+def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(studio):
+    line = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
+    circle = Section("cylinder", (2.0, 2.0, 0.0), radius=1.0, whole=True)
+    plain = draw_vector(studio, PLAIN).axes[0]
+    assert plain.collections[0].get_alpha() is None
+    studio.session = changes.set_view(studio.session, sections=(line, circle))
+    axes = draw_vector(studio, PLAIN).axes[0]
+    assert axes.collections[0].get_alpha() == FADED
+    assert axes.get_xlim() == plain.get_xlim()
+    mesh, values = studio.session.frame.mesh, studio.session.frame.quality.values
+    cutter, extra = Cutter.of(mesh), [c for c in axes.collections if 1.0 < c.get_zorder() < 2.0]
+    cut = cutter.cut(mesh.points, line)
+    whole = cutter.crinkle(mesh.points, circle)
+    arrays = [c.get_array() for c in extra if c.get_array() is not None]
+    for wanted in (values[cut.cells], values[whole.cells]):
+        assert any(np.array_equal(one, wanted) for one in arrays)
+    heights = [c.get_paths()[0].vertices for c in extra if len(c.get_paths()) == 1]
+    assert any(ends[:, 1] == pytest.approx(1.5) for ends in heights), "the line itself"
+    hidden = tuple(replace(one, shown=False) for one in (line, circle))
+    studio.session = changes.set_view(studio.session, sections=hidden)
+    assert len(draw_vector(studio, PLAIN).axes[0].collections) == len(plain.collections)
+
+
+def test_the_legend_of_a_drawing_lies_on_a_plate(studio):
+    figure = replace(PLAIN, legend=True)
+    sheet = draw_vector(studio, figure)
+    (plate,) = [one for one in sheet.artists if one.get_gid() == "plate"]
+    mesh, bar = sheet.axes
+    assert mesh.get_zorder() < plate.get_zorder() < bar.get_zorder()
+    box = plate.get_window_extent()
+    assert box.x0 < bar.get_window_extent().x0
+    assert box.y0 < bar.get_window_extent().y0 < bar.get_window_extent().y1 < box.y1
+    clear = draw_vector(studio, replace(figure, background="transparent"))
+    assert not clear.artists
 
 
 def test_whether_a_view_sees_all(studio):
