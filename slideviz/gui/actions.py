@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QMainWindow, QMenu
 from slideviz.gui.beside import fill_compare
 from slideviz.gui.icons import icon
 from slideviz.gui.theme import THEMES
-from slideviz.gui.tips import tip_of
+from slideviz.gui.tips import tip_of, wrapped
 from slideviz.gui.tool_bar import ToolBar
 from slideviz.view import changes
 from slideviz.view.state import Session
@@ -23,7 +23,7 @@ CUTS = {
 
 TOGGLES = (
     ("edges", "Mesh edges", "E", "Draw the edges of the cells."),
-    ("undeformed", "Undeformed", "U", "Draw the undeformed boundaries as a ghost."),
+    ("undeformed", "Undeformed boundaries", "U", "Draw the undeformed boundaries as a ghost."),
     ("motion_ghost", "Motion ghost", "G", "Draw where the motions take the moving boundaries."),
     ("legend", "Legend", "L", "Draw the legend of roles or the colour bar."),
     ("triad", "Axes", "T", "Draw the directions of the axes in a corner."),
@@ -58,7 +58,7 @@ class Actions:
             self._icons[name] = image
         tip = tip_of(name, text)
         act.setStatusTip(tip)
-        act.setToolTip(f"{tip} ({act.shortcut().toString()})" if keys else tip)
+        act.setToolTip(wrapped(f"{tip} ({act.shortcut().toString()})" if keys else tip))
         self.by_name[name] = act
         return act
 
@@ -140,7 +140,7 @@ class Actions:
         for name, text, keys, tip in TOGGLES:
             act = self._add(name, text, None, keys, _ICONS.get(name, name))
             act.setCheckable(True)
-            act.setToolTip(f"{tip} ({keys})")
+            act.setToolTip(wrapped(f"{tip} ({keys})"))
             act.setStatusTip(tip)
             act.toggled.connect(partial(self._toggle, name))
             menu.addAction(act)
@@ -162,7 +162,7 @@ class Actions:
         steps = self._menu(menu, "steps", "&Steps")
         player = window.player
         for name, text, function, keys in (
-            ("step_first", "Undeformed", lambda: player.go(0), "Home"),
+            ("step_first", "Undeformed mesh", lambda: player.go(0), "Home"),
             ("step_previous", "Step back", lambda: player.step(-1), "Alt+Left"),
             ("step_play", "Play or pause", player.toggle, "Space"),
             ("step_next", "Step on", lambda: player.step(1), "Alt+Right"),
@@ -211,7 +211,7 @@ class Actions:
             waits = "Wait for the end of what runs, or cancel it." if opened and busy else why
             tip = tip_of(name, act.text()) if able else waits
             act.setStatusTip(tip)
-            act.setToolTip(tip)
+            act.setToolTip(wrapped(tip))
         # Where there is nothing to play, Space belongs to the button that has the focus.
         for name in STEPS:
             self.by_name[name].setEnabled(stepped)

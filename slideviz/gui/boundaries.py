@@ -22,6 +22,7 @@ from qtpy.QtWidgets import (
 from slideviz.case.model import ROLES
 from slideviz.gui.fields import Choice
 from slideviz.gui.icons import icon, role_icon
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes
 from slideviz.view.look import ROLE_MEANING
 from slideviz.view.state import Session
@@ -127,8 +128,7 @@ class BoundariesPanel(QWidget):
             choice.setFrame(False)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
-                tip = f"{role}: {ROLE_MEANING[role]}"
-                choice.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
+            choice.explain({role: f"{role}: {ROLE_MEANING[role]}" for role in ROLES})
             choice.chosen.connect(partial(self._role_chosen, name))
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)
@@ -155,7 +155,7 @@ class BoundariesPanel(QWidget):
         told = f"{role}: {ROLE_MEANING[role]}."
         if guess:
             told += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
-        choice.setToolTip(told)
+        choice.setToolTip(wrapped(told))
 
     def _sync_selection(self, session: Session) -> None:
         wanted = set(session.view.selected)

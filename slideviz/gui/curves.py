@@ -152,7 +152,7 @@ class CurvesPanel(QWidget):
             if session.view.frame == 0:
                 return "The undeformed mesh is shown: go to a step to see how its error fell."
             return (
-                "This step used all boundary nodes. With data reduction (panel Method, More) "
+                "This step used all boundary nodes. With data reduction (panel Method) "
                 "you see here how the error falls as control nodes are added."
             )
         return ""

@@ -22,6 +22,7 @@ from qtpy.QtWidgets import (
 from slideviz.case.view_keys import MAPS
 from slideviz.gui.display_fields import Copies, Span, map_icon
 from slideviz.gui.fields import Choice
+from slideviz.gui.tips import wrapped
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes
 from slideviz.view.copies import passages_around
@@ -92,7 +93,7 @@ class DisplayPanel(QWidget):
         row.setSpacing(3)
         row.addWidget(self.range, 1)
         self.fit_range = self._button("fit_range", "Fit", self._fit_range)
-        self.reset_range = self._button("reset_range", "Auto", self._reset_range)
+        self.reset_range = self._button("reset_range", "Reset", self._reset_range)
         row.addWidget(self.fit_range)
         row.addWidget(self.reset_range)
         self.form.addRow("Range", row)
@@ -108,8 +109,10 @@ class DisplayPanel(QWidget):
     def _make_rest(self) -> None:
         self.points = self._choice("points", dict(POINTS), "points")
         self.points.setToolTip(
-            "Draw nodes as points: those of the boundaries with what they may do, or the control "
-            "nodes that the step was interpolated with."
+            wrapped(
+                "Draw nodes as points: those of the boundaries with what they may do, or the "
+                "control nodes that the step was interpolated with."
+            )
         )
         self.form.addRow("Points", self.points)
         self.copies = Copies()
@@ -124,7 +127,7 @@ class DisplayPanel(QWidget):
         for index, (name, (word, tip)) in enumerate(SHOWN.items()):
             box = QCheckBox(word)
             box.setObjectName(f"show_{name}")
-            box.setToolTip(tip)
+            box.setToolTip(wrapped(tip))
             box.toggled.connect(lambda on, name=name: self._set(**{name: on}))
             grid.addWidget(box, index // 2, index % 2)
             self.shown[name] = box
@@ -194,14 +197,14 @@ class DisplayPanel(QWidget):
         tip = (
             "A 2D mesh is always shown in parallel projection." if flat else SHOWN["perspective"][1]
         )
-        self.shown["perspective"].setToolTip(tip)
+        self.shown["perspective"].setToolTip(wrapped(tip))
 
     def _sync_copies(self, session: Session, pair: Pair | None) -> None:
         self.copies.setEnabled(pair is not None)
         self.copies_label.setEnabled(pair is not None)
         if pair is None:
-            self.copies.setToolTip(NOT_PERIODIC)
-            self.copies_label.setToolTip(NOT_PERIODIC)
+            self.copies.setToolTip(wrapped(NOT_PERIODIC))
+            self.copies_label.setToolTip(wrapped(NOT_PERIODIC))
             self.copies.setValue(0)
             return
         self.copies.set_around(passages_around(pair))
@@ -211,8 +214,8 @@ class DisplayPanel(QWidget):
             f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} repeat "
             f"by {pair.describe()}."
         )
-        self.copies.setToolTip(tip)
-        self.copies_label.setToolTip(tip)
+        self.copies.setToolTip(wrapped(tip))
+        self.copies_label.setToolTip(wrapped(tip))
 
     # Widgets to state ------------------------------------------------------------------
 

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from qtpy.QtCore import QLocale, Qt, Signal
 from qtpy.QtWidgets import QComboBox, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+
+from slideviz.gui.tips import wrapped
 
 
 def number_text(value: float) -> str:
@@ -150,7 +152,7 @@ class NumberField(QLineEdit):
 
     def mark(self, problem: str) -> None:
         """Show that the number is not valid, and why; or, with an empty text, that it is."""
-        self.setToolTip(problem or self._tip)
+        self.setToolTip(wrapped(problem or self._tip))
         if bool(self.property("bad")) != bool(problem):
             self.setProperty("bad", bool(problem))
             self.style().unpolish(self)
@@ -260,6 +262,11 @@ class Choice(QComboBox):
         index = self.findData(value)
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
+
+    def explain(self, tips: Mapping[str, str]) -> None:
+        """Explain entries, by their value, to who is about to choose one."""
+        for value, tip in tips.items():
+            self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
 
     def showPopup(self) -> None:
         # Escape leaves the list at the entry below the mouse; it would open there next time.

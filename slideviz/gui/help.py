@@ -30,6 +30,8 @@ MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
     ("Shift+Drag, middle button", "move"),
     ("Wheel", "zoom about the mouse"),
+    ("Rest on a cell", "see its quality, shape and place"),
+    ("Double click, Alt+Click", "mark the cell below the mouse"),
     ("Click", "select the boundary in front"),
     ("Ctrl+Click", "select one more, or one less"),
     ("Ctrl+Click on a run", "show it beside the one that is shown"),

@@ -51,7 +51,7 @@ class LogPanel(QPlainTextEdit):
         self.setReadOnly(True)
         self.setMaximumBlockCount(2000)
         self.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
-        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self.handler = LogHandler()
         # In a turn of its own: what Qt complains of in the middle of something comes here too.
         self.handler.bridge.wrote.connect(self.appendPlainText, Qt.ConnectionType.QueuedConnection)

@@ -19,6 +19,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.fields import Choice, NumberField, VectorField, a_direction, positive
 from slideviz.gui.method_more import MoreSettings, set_tip
+from slideviz.gui.tips import wrapped
 
 MAX_STEPS = 9999
 
@@ -42,6 +43,24 @@ TIPS = {
     "tolerance": "The largest error at the boundary that the control nodes may leave to the "
     "correction, in the mesh's length unit.",
 }
+
+SLIDING_TIPS = {
+    "none": "Nodes of sliding boundaries stay where they are.",
+    "ps": "Sliding nodes follow as inner nodes do and are put back on their boundary, in stages: "
+    "edges first, then surfaces.",
+    "ds": "That nodes stay on their boundary is part of the system, which has all components of "
+    "the displacement at once: takes longer.",
+}
+PERIODIC_TIPS = {
+    "none": "Periodic boundaries are treated as sliding ones; distances do not repeat.",
+    "periodic": "Periodic boundaries are treated as sliding ones, and distances repeat: what "
+    "moves near one side is felt at the other.",
+    "fixed": "Periodic boundaries move freely, both sides alike; the corners of the domain are "
+    "held.",
+    "moving": "Periodic boundaries move freely, both sides alike; the corners of the domain slide "
+    "in the periodic direction. Needs a sliding method.",
+}
+"""Of the entries of the lists, by their value."""
 
 
 class MethodForm(QWidget):
@@ -86,6 +105,7 @@ class MethodForm(QWidget):
             }
         )
         self.sliding = Choice({"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"})
+        self.sliding.explain(SLIDING_TIPS)
         self.periodic = Choice(
             {
                 "none": "none",
@@ -94,6 +114,7 @@ class MethodForm(QWidget):
                 "moving": "periodic, moving vertices",
             }
         )
+        self.periodic.explain(PERIODIC_TIPS)
         self.periodic_type = Choice(
             {"auto": "automatic", "translational": "translational", "rotational": "rotational"}
         )
@@ -137,7 +158,7 @@ class MethodForm(QWidget):
     def _add_row(self, title: str, name: str, widget: QWidget | None = None) -> None:
         label, field = QLabel(title), getattr(self, name)
         field.setObjectName(name)
-        label.setToolTip(TIPS[name])
+        label.setToolTip(wrapped(TIPS[name]))
         set_tip(field, TIPS[name])
         self.form.addRow(label, widget or field)
 

@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QToolButton, QVBoxLayout, QWidge
 from slideviz.case.kernels import kernel_titles
 from slideviz.case.model import Case, Reduction
 from slideviz.gui.fields import Choice, NumberField, angle_limit, positive
+from slideviz.gui.tips import wrapped
 from slideviz.view.state import Session
 
 TIPS = {
@@ -63,7 +64,7 @@ class MoreSettings(QWidget):
         self.button = QToolButton()
         self.button.setObjectName("more")
         self.button.setText("More settings")
-        self.button.setToolTip("Kernel, support radius, feature angle, and details of selection.")
+        self.button.setToolTip("Kernel, support radius, feature angle, details of data reduction.")
         self.button.setCheckable(True)
         self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.button.toggled.connect(self._show_form)
@@ -91,7 +92,7 @@ class MoreSettings(QWidget):
         for name, title in TITLES.items():
             label, field = QLabel(title), getattr(self, name)
             field.setObjectName(name)
-            label.setToolTip(TIPS[name])
+            label.setToolTip(wrapped(TIPS[name]))
             set_tip(field, TIPS[name])
             self.form.addRow(label, field)
         for name in ("kernel", "quality_metric"):
@@ -176,4 +177,4 @@ def set_tip(field: QWidget, text: str) -> None:
     """Explain a field and its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)
-    field.setToolTip(text)
+    field.setToolTip(wrapped(text))

@@ -99,7 +99,7 @@ class MotionForm(QWidget):
             "Angle (°)",
             "Factors",
             "Radius by (%)",
-            "and by",
+            "and by (length)",
             "About",
             "Point",
             "Axis",

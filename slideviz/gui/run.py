@@ -16,6 +16,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.icons import icon
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes
 from slideviz.view.advice import ended, help_for, inverted_words
 from slideviz.view.changes import is_missing
@@ -100,8 +101,8 @@ class RunPanel(QWidget):
                 f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
             )
             tip = "\n".join(missing.text for missing in self._missing)
-            self.text.setToolTip(tip)
-            self.run.setToolTip(tip)
+            self.text.setToolTip(wrapped(tip))
+            self.run.setToolTip(wrapped(tip))
             return
         self.run.setToolTip("Deform the mesh with these settings (Ctrl+R).")
         self.text.setToolTip("")
@@ -116,7 +117,7 @@ class RunPanel(QWidget):
             bad = inverted_words(run)
             text = html.escape(ended(run))
             self.text.setText(f"<b>{text}</b>" if bad else text)
-            self.text.setToolTip(help_for(run.case) if bad else "")
+            self.text.setToolTip(wrapped(help_for(run.case)) if bad else "")
         elif run is session.runs[-1]:
             self.text.setText("Settings changed since the last run.")
         else:

@@ -13,7 +13,8 @@ from slideviz.gui.dialogs import Banner
 from slideviz.gui.worker import JobRunner
 from slideviz.view import changes, jobs
 from slideviz.view.advice import help_for, inverted_words, notes_of, warnings_of
-from slideviz.view.state import Frame
+from slideviz.view.jobs import Doing
+from slideviz.view.state import Frame, Run
 from slideviz.view.store import Store
 
 log = logging.getLogger("slideviz")
@@ -44,10 +45,14 @@ class Running(QObject):
         self._next: Callable[[], None] | None = None
         self._deforms = False
         self.runner.doing.connect(self.doing)
+        self.runner.doing.connect(self._tell)
         self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
         self.runner.finished.connect(self._finished)
         self.runner.cancelled.connect(self._cancelled)
         self.runner.failed.connect(self._failed)
+
+    def _tell(self, doing: Doing) -> None:
+        self.said.emit(doing.text)
 
     def start_job(self, text: str, finish: Callable[[Any], None], function, *values) -> None:
         """Start a job beside the window; one that still runs is cancelled first."""
@@ -106,7 +111,19 @@ class Running(QObject):
         kept = f"; {steps} step{'s' if steps != 1 else ''} kept" if steps > 0 else ""
         self.said.emit(f"Cancelled{kept}")
         log.info("cancelled%s", kept)
+        if self._deforms:
+            self._log_remarks(self.store.session.runs[-1])
         self._end("cancelled")
+
+    @staticmethod
+    def _log_remarks(run: Run) -> list[str]:
+        """Write what a run remarks into the log; return what it warns of."""
+        for note in notes_of(run):
+            log.info("%s", note)
+        warnings = list(warnings_of(run))
+        for warning in warnings:
+            log.warning("%s", warning)
+        return warnings
 
     def _failed(self, error: Exception) -> None:
         self.banner.tell_error(error)
@@ -124,11 +141,7 @@ class Running(QObject):
             f"{quality.inverted} inverted"
         )
         log.info("done: %s", text)
-        for note in notes_of(run):
-            log.info("%s", note)
-        warnings = list(warnings_of(run))
-        for warning in warnings:
-            log.warning("%s", warning)
+        warnings = self._log_remarks(run)
         bad = inverted_words(run)
         if bad:
             warnings.insert(0, f"{bad}. {help_for(run.case)}")

@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QLabel, QMenu, QTreeWidgetItem, QVBoxLayout, QWidget
 from slideviz.gui.icons import icon
 from slideviz.gui.runs_actions import RunActions
 from slideviz.gui.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes
 from slideviz.view.look import Look
 from slideviz.view.runs_table import QUALITY, best, described
@@ -130,7 +131,7 @@ class RunsPanel(QWidget):
             tip += "\n\nIts minimum quality is the highest of the runs with the same motion."
         for column, text in enumerate(texts):
             item.setText(column, text)
-            item.setToolTip(column, tip)
+            item.setToolTip(column, wrapped(tip))
             if column != RUN:
                 item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
         font = item.font(MIN)

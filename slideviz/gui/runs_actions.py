@@ -13,6 +13,7 @@ from slideviz.gui import dialogs
 from slideviz.gui.beside import fill_compare
 from slideviz.gui.icons import icon
 from slideviz.gui.runs_tree import RunTree
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes
 from slideviz.view.runs_table import table_text, write_table
 from slideviz.view.runs_words import run_words
@@ -70,7 +71,7 @@ class RunActions:
     def _make_button(self, name: str, image: str, tip: str) -> QToolButton:
         button = QToolButton()
         button.setObjectName(f"runs_{name}")
-        button.setToolTip(tip)
+        button.setToolTip(wrapped(tip))
         button.setIconSize(QSize(18, 18))
         button.setProperty("image", image)
         return button

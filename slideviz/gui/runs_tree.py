@@ -18,6 +18,7 @@ from qtpy.QtWidgets import (
     QTreeWidget,
 )
 
+from slideviz.gui.tips import wrapped
 from slideviz.view.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)
@@ -129,7 +130,7 @@ class RunTree(QTreeWidget):
         self.setItemDelegate(first)
         self.setMinimumHeight(80)
         for column, tip in enumerate(TIPS):
-            self.headerItem().setToolTip(column, tip)
+            self.headerItem().setToolTip(column, wrapped(tip))
         header = self.header()
         header.setStretchLastSection(False)
         header.setMinimumSectionSize(36)

@@ -25,6 +25,7 @@ from slideviz.gui import dialogs
 from slideviz.gui.cutting import Cutting
 from slideviz.gui.icons import icon
 from slideviz.gui.section_editor import SectionEditor
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes
 from slideviz.view.cuts import can_cut
 from slideviz.view.layer_copies import Period
@@ -191,7 +192,7 @@ class SectionsPanel(QWidget):
                 state = Qt.CheckState.Checked if section.shown else Qt.CheckState.Unchecked
                 if item.text() != text:
                     item.setText(text)
-                    item.setToolTip(text)
+                    item.setToolTip(wrapped(text))
                 if item.checkState() != state or not item.flags() & Qt.ItemFlag.ItemIsUserCheckable:
                     item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
                     item.setCheckState(state)

@@ -1,4 +1,4 @@
-"""What each action does, in a sentence: for the status bar, tooltips and the list of shortcuts."""
+"""What each action does, in a sentence, and tooltips in lines that can be read."""
 
 from __future__ import annotations
 
@@ -58,6 +58,7 @@ def tip_of(name: str, text: str) -> str:
     if name.startswith("side") and name not in TIPS:
         return f"Look at the mesh from {name.removeprefix('side')}."
     return TIPS.get(name, f"{text.replace('…', '').replace('&', '')}.")
+
 
 LETTERS = 60
 """In a line of a tooltip."""

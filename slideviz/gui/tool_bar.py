@@ -54,7 +54,9 @@ class ToolBar(QToolBar):
         self.addWidget(QLabel(" Colour by "))
         self.colour = Choice(dict(COLOUR_BY))
         self.colour.setObjectName("colour_by")
-        self.colour.setToolTip("What the colours of the view say; quality is always 0 to 1.")
+        self.colour.setToolTip(
+            "What the colours of the view say; the panel Display has their range."
+        )
         self.colour.chosen.connect(lambda value: store.change(changes.set_view, colour_by=value))
         self.addWidget(self.colour)
         self.addSeparator()

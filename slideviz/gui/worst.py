@@ -195,7 +195,7 @@ class WorstPanel(QWidget):
             self.store.change(changes.mark, None)
 
     def _go_back(self) -> None:
-        self.unmark()
+        # The mark stays: that is how the cell is found in the whole mesh.
         self._fly_back()
 
     def copy_rows(self) -> None:

@@ -138,7 +138,7 @@ def test_a_mesh_that_does_not_repeat_says_why_there_are_no_neighbours(shown):
     lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
     shown.window.store.put(replace(lonely, pairs=()))
     assert not panel(shown).copies.isEnabled()
-    assert panel(shown).copies.toolTip() == NOT_PERIODIC
+    assert NOT_PERIODIC in panel(shown).copies.toolTip()
 
 
 def test_a_number_of_neighbours_can_be_typed(qtbot):

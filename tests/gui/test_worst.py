@@ -178,10 +178,11 @@ def test_a_mark_made_elsewhere_is_shown_without_flying(full, flown):
     assert flown == []
 
 
-def test_back_takes_the_mark_away_and_returns(full, flown):
+def test_back_returns_and_the_mark_stays(full, flown):
     click(full, 1)
+    cell = full.store.session.view.marked
     QTest.mouseClick(full.back, Qt.MouseButton.LeftButton)
-    assert full.store.session.view.marked is None
+    assert full.store.session.view.marked == cell is not None
     assert flown[-1] == "back"
 
 
