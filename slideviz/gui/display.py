@@ -226,11 +226,12 @@ class DisplayPanel(QWidget):
         self._set(colour_range=None)
 
     def _values(self) -> np.ndarray:
-        """Return the values of the cells of the step that is shown."""
+        """Return the values of the cells of the steps that are shown, of all views."""
         session = self.store.session
-        if session.frame is None:
-            return np.empty(0)
-        values = session.frame.values(session.view.colour_by, session.mesh)
+        shown = (session, changes.seen_beside(session))
+        what, frames = session.view.colour_by, {one.frame for one in shown}
+        found = [frame.values(what, session.mesh) for frame in frames if frame is not None]
+        values = np.concatenate([np.empty(0), *found])
         return values[np.isfinite(values)]
 
     def _fit_range(self) -> None:

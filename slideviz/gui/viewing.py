@@ -276,8 +276,12 @@ class Viewing(QWidget):
         self.render()
 
     def refit(self) -> None:
-        """Make everything fill the view again, where it did and nobody chose another camera."""
-        if self._leader.eye.fitted:
+        """Show everything again, where some left a view for which nobody chose another camera.
+
+        While everything is seen the camera stays: a jump would look like a motion of the mesh.
+        """
+        fitted = self._leader.eye.fitted
+        if fitted and any(scene.eye.loses_some() for scene in self._scenes()):
             self.fit()
 
     def fly_to(self, cell: int) -> None:

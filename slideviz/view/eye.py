@@ -183,6 +183,16 @@ class Eye:
         size = np.array(self.stage.plotter.window_size)
         return bool((seen >= -SLACK * size).all() and (seen <= (1 + SLACK) * size).all())
 
+    def loses_some(self) -> bool:
+        """Tell whether a node of what should be seen is outside the view, or below the legend."""
+        width, height = self.stage.plotter.window_size
+        free = np.array([width - self.stage.strip(), height])
+        for shape in self._shapes():
+            seen = to_display(self.stage.plotter, np.asarray(shape.points))
+            if (seen < 0).any() or (seen > free).any():
+                return True
+        return False
+
     def looks_like(self, other: Eye) -> bool:
         """Tell whether another eye looks from the same place in the same way."""
         camera, theirs = self._camera, other._camera

@@ -207,3 +207,14 @@ def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
     assert not synced
     shown.window.store.change(changes.set_view, edges=False)
     assert len(synced) == 1
+
+
+def test_the_range_fits_both_views_of_a_comparison(shown):
+    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    shown.window.start_run()
+    shown.settle()
+    shown.window.store.change(changes.show_beside, changes.UNDEFORMED)
+    shown.click(panel(shown).fit_range)
+    values = shown.session.frame.quality.values
+    assert view(shown).colour_range == pytest.approx((values.min(), 1.0), rel=1e-2)
+    assert values.max() < 0.999, "the best cells are those of the other view"

@@ -558,3 +558,20 @@ def test_the_window_closes_during_a_comparison(ran, answers):
     answers("ask_unsaved", "discard")
     ran.window.close()
     assert not ran.window.isVisible()
+
+
+def test_the_camera_moves_after_a_run_only_if_some_of_the_mesh_has_left_the_view(ran):
+    window, eye = ran.window, ran.window.scene.eye
+    window.fit()
+    before = eye.place
+    assert eye.fitted
+    shapes = [np.asarray(shape.points) for shape in window.scene._shapes()]
+    for points in shapes:
+        points[:, 0] *= 0.98
+    window._job_ended()
+    assert eye.place == before, "a camera that moves looks like a mesh that does"
+    for points in shapes:
+        points[:, 0] += 0.5 * np.ptp(points[:, 0])
+    window._job_ended()
+    assert eye.place != before
+    assert not eye.loses_some()
