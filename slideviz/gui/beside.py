@@ -8,9 +8,10 @@ from collections.abc import Callable
 
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtGui import QActionGroup
-from qtpy.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QSizePolicy, QToolButton
+from qtpy.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton
 
 from slideviz.gui.canvas import View3D
+from slideviz.gui.elided import ElidedLabel
 from slideviz.view import changes
 from slideviz.view.panes import choices, panes, show_in
 from slideviz.view.scene import Scene
@@ -77,9 +78,7 @@ class TitleBar(QFrame):
         self.setFixedHeight(26)
         row = QHBoxLayout(self)
         row.setContentsMargins(6, 0, 2, 0)
-        self.label: QLabel | QToolButton = self._drop_down(fill) if fill else QLabel()
-        if isinstance(self.label, QLabel):
-            self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.label: ElidedLabel | QToolButton = self._drop_down(fill) if fill else ElidedLabel()
         self.label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         row.addWidget(self.label, 1)
         self.close_button = QToolButton()
@@ -112,15 +111,14 @@ class TitleBar(QFrame):
         self._fit()
 
     def _fit(self) -> None:
-        drops = isinstance(self.label, QToolButton)
-        room = max(self.label.width() - (28 if drops else 4), 20)
+        if isinstance(self.label, ElidedLabel):
+            self.label.setText(self._text)
+            self.setToolTip(self._text)
+            return
+        room = max(self.label.width() - 28, 20)
         metrics = self.label.fontMetrics()
-        shown = metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room)
-        self.label.setText(shown)
-        tip = self._text if shown != self._text else ""
-        if drops:
-            tip = f"{self._text}\nClick to show something else here"
-        self.setToolTip(tip)
+        self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room))
+        self.setToolTip(f"{self._text}\nClick to show something else here")
 
     def resizeEvent(self, event) -> None:
         super().resizeEvent(event)

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from functools import partial
 
 from matplotlib.figure import Figure
-from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
 from slideviz.gui.beside import TitleBar
 from slideviz.gui.curves import CurveCanvas
+from slideviz.gui.elided import ElidedLabel
 from slideviz.gui.icons import icon
 from slideviz.gui.plot_canvas import PLOT_FILTERS, PlotArea, ask_and_write, folder_of, write_plot
 from slideviz.gui.plot_image import Draw
@@ -52,10 +53,8 @@ class CurveView(QWidget):
         self.save_button.setToolTip("Save the curve as PNG, SVG or PDF…")
         self.save_button.clicked.connect(self._save)
         self.title.layout().insertWidget(1, self.save_button)
-        self.facts = QLabel()
+        self.facts = ElidedLabel()
         self.facts.setObjectName("curve_facts")
-        self.facts.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.area = PlotArea(self.drawing, CurveCanvas)
         self.area.canvas.picked = self._picked
         self.area.canvas.setToolTip("Click to mark the cell at a place.")

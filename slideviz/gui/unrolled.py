@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QPoint, Qt, QTimer, Signal
-from qtpy.QtWidgets import QGridLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtCore import QPoint, QTimer, Signal
+from qtpy.QtWidgets import QGridLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from slideviz.gui.beside import TitleBar
 from slideviz.gui.canvas import View3D
+from slideviz.gui.elided import ElidedLabel
 from slideviz.gui.hover import CellHover
 from slideviz.gui.icons import icon
 from slideviz.gui.ruler import Ruler
@@ -45,10 +46,8 @@ class FlatView(QWidget):
         self.fit_button.setToolTip("Make the section fill this view")
         self.fit_button.clicked.connect(self.fit)
         self.title.layout().insertWidget(1, self.fit_button)
-        self.facts = QLabel()
+        self.facts = ElidedLabel()
         self.facts.setObjectName("flat_facts")
-        self.facts.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.facts.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.view = View3D(self, multi_samples=multi_samples)
         self.view.setMinimumSize(120, 80)
         self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)

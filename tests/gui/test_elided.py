@@ -1,0 +1,50 @@
+"""Labels in little room end with an ellipsis and keep their words."""
+
+import numpy as np
+import pytest
+from qtpy.QtCore import Qt
+
+from slideviz.gui.elided import ElidedLabel
+
+WORDS = "size-skew: min 0.8218, mean 0.9302; 1,608 cells cut"
+
+
+@pytest.fixture
+def label(qtbot):
+    label = ElidedLabel(WORDS)
+    qtbot.addWidget(label)
+    label.show()
+    return label
+
+
+def ink(label):
+    """The columns that something is written in."""
+    image = label.grab().toImage().convertToFormat(label.grab().toImage().Format.Format_Grayscale8)
+    rows = np.array(image.constBits()).reshape(image.height(), image.bytesPerLine())
+    pixels = rows[:, : image.width()].astype(int)
+    return np.flatnonzero(np.ptp(pixels, axis=0) > 40)
+
+
+def test_what_fits_is_shown_whole(label):
+    label.resize(600, 20)
+    assert label.shown == WORDS
+    columns = ink(label)
+    assert abs((columns[0] + columns[-1]) / 2.0 - 300) < 4, "centred"
+
+
+def test_what_does_not_fit_ends_with_an_ellipsis_within_the_label(label):
+    label.resize(150, 20)
+    assert label.text() == WORDS
+    assert label.shown.startswith("size-skew: min")
+    assert label.shown.endswith("…")
+    columns = ink(label)
+    assert columns[-1] < 150
+    # The first letters are there: nothing is cut off at the left.
+    label.setAlignment(Qt.AlignmentFlag.AlignLeft)
+    assert ink(label)[0] < 6
+
+
+def test_a_long_text_makes_nothing_wider(label):
+    label.resize(100, 20)
+    assert label.minimumSizeHint().width() <= label.sizeHint().width()
+    assert label.sizePolicy().horizontalPolicy() == label.sizePolicy().Policy.Ignored
