@@ -132,6 +132,7 @@ class FilmForm(QWidget):
             fill=self.fill.isChecked(),
             both=False,
             letters=1.25,
+            film=True,
         )
 
     def _kind_chosen(self, kind: str) -> None:

@@ -7,8 +7,8 @@ from typing import Literal
 
 from slideviz.view.legend import STRIP
 from slideviz.view.offscreen import SMALLEST, font_scale
-from slideviz.view.portrait import caption
 from slideviz.view.state import Frame, Session
+from slideviz.view.titles import LETTER_WIDTH, LONGEST, name_words, place_words, title_words
 
 Background = Literal["white", "shown", "transparent"]
 BACKGROUNDS: dict[Background, str] = {
@@ -21,8 +21,6 @@ TITLE_ROOM = 40.0
 """Pixels at the top that are the title's, at normal letter size."""
 GAP = 12.0
 """Pixels between two pictures beside each other, at normal letter size."""
-_TITLE_WIDTH = 9.6
-"""Pixels that a letter of the title takes, at normal size."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,10 @@ class Figure:
         How large letters are; 1 is 13 pixels in 620 of the height.
     dpi : float or None
         Pixels per inch on paper, for programs that place the picture.
+    film : bool
+        Whether it is an image of a film, whose title begins at the left.
+    named : bool
+        Say which run it is also without a title: it stands beside that of another.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -58,6 +60,13 @@ class Figure:
     both: bool = True
     letters: float = 1.25
     dpi: float | None = None
+    film: bool = False
+    named: bool = False
+
+    @property
+    def headed(self) -> bool:
+        """Tell whether there are words above the picture."""
+        return self.title or self.named
 
     @property
     def scale(self) -> float:
@@ -96,23 +105,20 @@ def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     first = max(round((width - strip - gap) / 2.0), 1)
     sizes = (first, height), (max(width - first - gap, 1), height)
     # Letters go by the height, which is that of the whole.
-    left, right = (replace(figure, size=size) for size in sizes)
+    left, right = (replace(figure, size=size, named=True) for size in sizes)
     return replace(left, legend=False), right
 
 
 def title_of(session: Session, figure: Figure) -> str:
-    """Return the words above a picture: run and step, quality; on two lines where it is narrow."""
+    """Return the words above a picture: run, step and quality; less where it is narrow."""
     frame: Frame | None = session.frame
     assert frame is not None
-    at = min(session.view.frame, len(session.frames) - 1)
-    name = "Undeformed"
-    if at:
-        steps = len(session.frames) - 1
-        name = f"Run {session.shown}" if len(session.runs) > 1 else "Deformed"
-        name += f", step {at} of {steps}" if at < steps else ""
-    words = caption(name, frame.quality, session.view.colour_by)
-    short = f"{name}: min {frame.quality.min:.3f}"
-    return words if len(words) * _TITLE_WIDTH * figure.scale <= figure.size[0] else short
+    steps = len(session.frames) - 1
+    at, letters = min(session.view.frame, steps), figure.size[0] / (LETTER_WIDTH * figure.scale)
+    if not figure.title:
+        return name_words(session, letters)
+    longest = LONGEST.format(steps) if figure.film else ""
+    return title_words(session, frame, place_words(at, steps), letters, longest)
 
 
 def words_of_size(figure: Figure) -> str:

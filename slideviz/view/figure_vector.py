@@ -103,7 +103,7 @@ def draw_vector(studio: Studio, figure: Figure) -> Any:
         axes.set_xlim(x, x + part.size[0] * unit)
         axes.set_ylim(*y)
         _mesh(axes, session, part, 72.0 / dpi * figure.scale)
-        if part.title:
+        if part.headed:
             _title(sheet, session, part, (start + part.size[0] / 2.0) / width)
     if figure.legend:
         _legend(sheet, studio.session, figure)

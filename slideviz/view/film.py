@@ -17,17 +17,22 @@ from slideviz.mesh.quality import quality
 from slideviz.view.encode import Pixels, Take, writer
 from slideviz.view.look import PAPER, Look
 from slideviz.view.moved import Zoom
-from slideviz.view.offscreen import LETTERS, font_scale, image_of, offscreen, write_title
-from slideviz.view.portrait import Portrait, caption
+from slideviz.view.offscreen import (
+    CAPTION_AT,
+    LETTERS,
+    font_scale,
+    image_of,
+    offscreen,
+    write_title,
+)
+from slideviz.view.portrait import Portrait
 from slideviz.view.reel import USUAL, Reel, check_film
 from slideviz.view.state import ColourBy, Frame, Session
 from slideviz.view.surfaces import Surface
+from slideviz.view.titles import LETTER_WIDTH, LONGEST, place_words, title_words
 
 if TYPE_CHECKING:
     from slideviz.view.scene import Scene
-
-CAPTION_AT = 0.02
-"""Where in the width the words above a film begin."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,8 @@ def film_of(
     frames = session.frames
     require_steps(frames, path, reel, overwrite)
     look: Look = like.look if like is not None else PAPER
+    letters = size[0] / (LETTER_WIDTH * LETTERS * font_scale(size))
+    longest = LONGEST.format(len(frames) - 1)
     with offscreen(size) as plotter:
         scene = Scene(plotter, look, LETTERS * font_scale(size))
         # The camera looks at what is there when the mesh is opened.
@@ -135,7 +142,7 @@ def film_of(
         def draw(position: float) -> Pixels:
             shot = shot_at(frames, position)
             scene.update(_showing(session, shot.frame))
-            words = caption(shot.words, shot.frame.quality, session.view.colour_by)
+            words = title_words(session, shot.frame, shot.place, letters, longest)
             write_title(plotter, words, look, CAPTION_AT)
             return image_of(plotter)
 
@@ -154,10 +161,14 @@ def _showing(session: Session, frame: Frame) -> Session:
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame, and the words for where in the film it is."""
+    """A frame, and the words for where in the film it is.
+
+    ``place`` is what stands beside the name of the run: of one step, nothing.
+    """
 
     frame: Frame
     words: str
+    place: str
 
 
 def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
@@ -200,11 +211,11 @@ def _positions(steps: int, between: int) -> Iterator[float]:
 def shot_at(frames: Sequence[Frame], position: float) -> Shot:
     """Return a step, or, between two steps, a mesh on the way from one to the next."""
     step, steps = int(position), len(frames) - 1
-    words = _words(position, steps)
+    words, place = _words(position, steps), place_words(position, steps)
     if position == step:
-        return Shot(frames[step], words)
+        return Shot(frames[step], words, place)
     frame = _blend(frames[step], frames[step + 1], position - step, frames[0])
-    return Shot(frame, f"{words}, interpolated")
+    return Shot(frame, f"{words}, interpolated", place)
 
 
 def _words(position: float, steps: int) -> str:

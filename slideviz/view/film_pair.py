@@ -10,11 +10,11 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.view.encode import Pixels
-from slideviz.view.film import CAPTION_AT, Drawn, Shot, expose, require_steps, shot_at
+from slideviz.view.film import Drawn, Shot, expose, require_steps, shot_at
 from slideviz.view.legend import STRIP
 from slideviz.view.look import PAPER
 from slideviz.view.moved import Zoom, lengths, tiny_motion
-from slideviz.view.offscreen import TITLE, font_scale, image_of, offscreen, write_title
+from slideviz.view.offscreen import CAPTION_AT, TITLE, font_scale, image_of, offscreen, write_title
 from slideviz.view.portrait import Portrait
 from slideviz.view.reel import USUAL, Reel
 from slideviz.view.state import ColourBy, Frame

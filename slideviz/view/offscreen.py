@@ -24,6 +24,8 @@ TITLE = 16
 """Height of the title's letters in pixels, at normal size."""
 _NORMAL_HEIGHT = 620
 """A picture this high has letters of normal size."""
+CAPTION_AT = 0.02
+"""Where in the width the words above a film begin."""
 LETTERS = 1.25
 """Letters of a film are this much larger than those of the view: it is often shown small."""
 

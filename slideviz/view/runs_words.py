@@ -118,6 +118,20 @@ def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
         yield f"{nodes:,} nodes", False
 
 
+def apart(run: Run, among: Sequence[Run]) -> str:
+    """Return what sets a run apart from those of a list, beside its name, in few words.
+
+    Nothing where no other is called as it is: its name or method says enough.
+    """
+    if not any(other is not run and run_words(other) == run_words(run) for other in among):
+        return ""
+    cases = [other.case for other in among]
+    words = [method_words(run.case)] if run.name else []
+    words += [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
+    words += [text for text, differs in _told(run, cases) if differs]
+    return ", ".join(filter(None, words))
+
+
 def brief(run: Run, among: Sequence[Run] = ()) -> str:
     """Return what sets a run apart, beside its method, in one short line.
 

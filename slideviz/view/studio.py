@@ -15,7 +15,16 @@ from slideviz.mesh.atomic import atomic_write
 from slideviz.view.changes import seen_beside
 from slideviz.view.figure import GAP, TITLE_ROOM, Figure, panes, title_of
 from slideviz.view.look import PAPER, Look
-from slideviz.view.offscreen import TITLE, check_png, check_size, image_of, offscreen, write_title
+from slideviz.view.offscreen import (
+    CAPTION_AT,
+    LETTERS,
+    TITLE,
+    check_png,
+    check_size,
+    image_of,
+    offscreen,
+    write_title,
+)
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 
@@ -139,13 +148,15 @@ class Studio:
         self._prepare(session, figure, aim)
         plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
-        if figure.title and session.frame is not None:
-            write_title(plotter, title_of(session, figure), self._scene.look)
-            # Of the same size as the other letters, whatever a film has.
+        if figure.headed and session.frame is not None:
+            at = CAPTION_AT if figure.film else 0.5
+            write_title(plotter, title_of(session, figure), self._scene.look, at)
+            # Of the same size as the other letters; of a film as they are there.
             title = plotter.actors["title"]
-            title.prop.SetFontSize(round(TITLE * figure.scale))
-            high = 1.0 - 0.5 * TITLE_ROOM * figure.scale / figure.size[1]
-            title.GetPositionCoordinate().SetValue(0.5, high)
+            scale = figure.scale / (LETTERS if figure.film else 1.0)
+            title.prop.SetFontSize(round(TITLE * scale))
+            high = 1.0 - 0.5 * TITLE_ROOM * scale / figure.size[1]
+            title.GetPositionCoordinate().SetValue(at, high)
         return image_of(plotter, figure.background == "transparent")
 
     def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
@@ -179,7 +190,7 @@ class Studio:
 
     def _top(self, figure: Figure) -> float:
         """Return which part of the height is the title's."""
-        return min(TITLE_ROOM * figure.scale / figure.size[1], 0.3) if figure.title else 0.0
+        return min(TITLE_ROOM * figure.scale / figure.size[1], 0.3) if figure.headed else 0.0
 
     def _keep_room(self, figure: Figure) -> None:
         """Keep the rooms of legend and title free of the mesh."""

@@ -9,12 +9,14 @@ import pytest
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, figure_vector, jobs_export
-from slideviz.view.figure import Figure, panes, title_of, words_of_size
+from slideviz.view import changes, figure_vector, film, jobs_export
+from slideviz.view import studio as studio_module
+from slideviz.view.figure import TITLE_ROOM, Figure, panes, title_of, words_of_size
 from slideviz.view.figure_vector import draw_vector, require_vector, write_vector
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.view.layer_mesh import FADED
 from slideviz.view.look import ROLE_COLOURS
+from slideviz.view.reel import Reel
 from slideviz.view.section import Section
 from slideviz.view.section_cut import Cutter
 from slideviz.view.state import Frame
@@ -85,6 +87,8 @@ def test_backgrounds(studio):
 
 
 def test_a_preview_is_the_picture_made_small(studio):
+    # With a short title: letters have whole sizes, so that a long one is not quite as small.
+    studio.session = changes.show_frame(studio.session, 0)
     figure = Figure((1200, 900), letters=1.5, legend=False, title=True)
     small = figure.within((400, 400))
     assert small.size == (400, 300)
@@ -103,12 +107,13 @@ def test_two_runs_have_the_same_room_and_the_same_scale(studio, session, square)
     assert left.size[0] + 9 + right.size[0] == 801
     assert not left.legend
     both = studio.image(replace(PLAIN, size=(800, 300)))
-    first, second = drawn(both[:, :395]), drawn(both[:, 405:])
+    low = round(TITLE_ROOM * PLAIN.scale)  # below the names of the runs
+    first, second = drawn(both[low:, :395]), drawn(both[low:, 405:])
     assert first[3] - first[2] == pytest.approx(1.05 * (second[3] - second[2]), rel=0.03)
     assert first[1] - first[0] == pytest.approx(2 * (second[1] - second[0]), rel=0.05)
     studio.session = changes.set_view(studio.session, swapped=True)
     other = studio.image(replace(PLAIN, size=(800, 300)))
-    assert drawn(other[:, 405:])[3] - drawn(other[:, 405:])[2] > second[3] - second[2]
+    assert np.ptp(drawn(other[low:, 405:])[2:]) > second[3] - second[2]
     studio.session = changes.show_beside(studio.session, changes.UNDEFORMED)
     assert studio.beside.frame is session.first
 
@@ -119,13 +124,64 @@ def test_what_is_selected_is_not_marked_in_a_picture(studio, square):
     assert (studio.image(PLAIN) == plain).all()
 
 
-def test_titles_say_run_step_and_quality(session):
-    wide, narrow = Figure((3000, 300)), Figure((200, 300))
-    assert title_of(session, wide).startswith("Deformed: min ")
+def test_titles_say_run_method_step_and_quality(session):
+    wide, narrow = Figure((3000, 300), title=True), Figure((200, 300), title=True)
+    assert title_of(session, wide).startswith("Run 1, no sliding, step 2 of 2: min ")
     assert "mean" in title_of(session, wide)
     assert "mean" not in title_of(session, narrow)
     assert "step 1 of 2" in title_of(changes.show_frame(session, 1), wide)
-    assert title_of(changes.show_frame(session, 0), wide).startswith("Undeformed")
+    assert title_of(changes.show_frame(session, 0), wide).startswith("Undeformed: min")
+    named = changes.rename_run(session, 1, "stiff blade")
+    assert title_of(named, wide).startswith("Run 1, stiff blade, step 2")
+
+
+def test_titles_of_runs_of_one_method_say_what_sets_them_apart(session):
+    session = changes.start_run(changes.set_case(session, kernel="wendland-c4"))
+    session = changes.end_run(changes.add_frames(session, session.runs[0].frames[:1]), "done")
+    wide = Figure((3000, 300), title=True)
+    assert title_of(session, wide).startswith("Run 2, no sliding, wendland-c4: min")
+    other = changes.start_run(changes.set_case(session, sliding="ps"))
+    other = changes.add_frames(other, session.runs[0].frames[:1])
+    assert title_of(other, wide).startswith("Run 3, pseudo sliding: min")
+
+
+def test_pictures_of_two_runs_name_both_also_without_titles(session, studio, monkeypatch):
+    second = changes.start_run(changes.set_case(session, sliding="ps"))
+    second = changes.end_run(changes.add_frames(second, session.runs[0].frames), "done")
+    studio.session = changes.show_beside(changes.show_run(second, 1), 2)
+    written = []
+    write = studio_module.write_title
+    monkeypatch.setattr(
+        studio_module,
+        "write_title",
+        lambda p, text, *rest: (written.append(text), write(p, text, *rest)),
+    )
+    studio.image(replace(PLAIN, size=(1600, 400)))
+    assert written == ["Run 1, no sliding", "Run 2, pseudo sliding"]
+    studio.image(replace(PLAIN, both=False))
+    assert len(written) == 2, "alone it has none"
+
+
+def test_a_film_has_the_titles_of_its_preview(session, studio, square, tmp_path, monkeypatch):
+    said = {"film": [], "studio": []}
+    for name, module in (("film", film), ("studio", studio_module)):
+        write = module.write_title
+
+        def keep(plotter, text, look, at=0.5, *, name=name, write=write):
+            said[name].append((text, at))
+            write(plotter, text, look, at)
+
+        monkeypatch.setattr(module, "write_title", keep)
+    for _ in film.film_of(
+        session, find_surfaces(square), tmp_path / "a%d.png", Reel((640, 400)), like=studio._scene
+    ):
+        pass
+    figure = Figure((640, 400), title=True, both=False, film=True)
+    for frame in range(3):
+        studio.session = changes.show_frame(session, frame)
+        studio.image(figure.within((320, 300)))
+    assert said["studio"] == said["film"]
+    assert said["film"][2][0].startswith("Run 1, no sliding, step 2 of 2: min")
 
 
 def test_sizes_in_words():
