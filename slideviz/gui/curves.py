@@ -21,6 +21,7 @@ from slideviz.gui.plot_canvas import (
     write_plot,
 )
 from slideviz.gui.plot_image import Draw
+from slideviz.gui.tips import wrapped
 from slideviz.view import changes, curves
 from slideviz.view.look import SELECTED_COLOUR
 from slideviz.view.plots import convergence, quality_by_step
@@ -51,7 +52,8 @@ class CurveCanvas(PlotCanvas):
         self.picked = lambda _value: None
 
     def mouseReleaseEvent(self, event) -> None:
-        if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
+        left = event.button() == Qt.MouseButton.LeftButton
+        if not left or self.wiped or not self.figure.axes:
             return
         self.picked(self.to_value(event.position().x()))
 
@@ -81,7 +83,7 @@ class CurvesPanel(QWidget):
         self.kind.setObjectName("curve_kind")
         for index, tip in enumerate(TIPS.values()):
             self.kind.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
-        self.kind.chosen.connect(lambda _: self.sync(self.store.session))
+        self.kind.chosen.connect(lambda _: self._other_plot())
         self.save = QPushButton("Save…")
         self.save.setToolTip("Save the plot as PNG, SVG or PDF.")
         self.save.clicked.connect(self._save)
@@ -101,12 +103,15 @@ class CurvesPanel(QWidget):
         self.what.setToolTip("The lowest or the mean quality of each layer.")
         self.coordinate = Choice({})
         self.coordinate.setToolTip(
-            "What the layers are counted along; the radius is that about the axis of the case."
+            wrapped(
+                "What the layers of the undeformed mesh are counted along; the radius is that "
+                "about the axis of the case."
+            )
         )
         row = QHBoxLayout(self.span_row)
         row.setContentsMargins(0, 0, 0, 0)
         for choice in (self.what, self.coordinate):
-            choice.chosen.connect(lambda _: self.canvas.ask())
+            choice.chosen.connect(lambda _: self._other_plot())
             row.addWidget(choice, 1)
         return self.span_row
 
@@ -180,6 +185,11 @@ class CurvesPanel(QWidget):
 
     # What the user does ----------------------------------------------------------------
 
+    def _other_plot(self) -> None:
+        """Show the plot that was chosen; not the one before meanwhile, of other axes."""
+        self.canvas.wipe()
+        self.sync(self.store.session)
+
     def _picked(self, value: float) -> None:
         """Go to the step that was clicked."""
         if self.kind.currentData() == "steps" and not self.area.empty:
@@ -239,6 +249,7 @@ def draw_span(
         )  # fmt: skip
         return
     spanwise(axes, found, what, style=style)
+    axes.yaxis.label.set_text(f"{coordinate} before deformation [mesh units]")
     if not whole:
         axes.set_xlim(close_limits(getattr(profile, what) for profile in found))
     add_legend(axes, style, loc="best")

@@ -60,6 +60,7 @@ class PlotCanvas(QWidget):
         self.drawing = drawing
         self.look = LIGHT
         self._stale = True
+        self.wiped = False
         self._last = 0.0
         self._picture = Picture()
         self._coming: Future[Picture] | None = None
@@ -98,6 +99,11 @@ class PlotCanvas(QWidget):
             since = (time.monotonic() - self._last) * 1000.0
             self._timer.start(max(0, round(self._rest_ms() - since)))
 
+    def wipe(self) -> None:
+        """Show nothing until the next drawing is there: what is shown is another plot."""
+        self.wiped = True
+        self.update()
+
     def _rest_ms(self) -> float:
         """Return the time between two drawings: the view needs the processors, too."""
         return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
@@ -121,6 +127,8 @@ class PlotCanvas(QWidget):
         self._look_after.stop()
         self._last = time.monotonic()
         self._picture = coming.result()
+        # One that was asked for before it was wiped is still the other plot.
+        self.wiped = self.wiped and self._stale
         self.update()
         self.drawn.emit()
         if self._stale:
@@ -166,7 +174,11 @@ class PlotCanvas(QWidget):
         painter = QPainter(self)
         pixels = self._picture.pixels
         high, wide = pixels.shape[:2]
-        if wide > 1:
+        if self.wiped:
+            painter.fillRect(self.rect(), QColor(self.look.background))
+            painter.setPen(QColor(self.look.text))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "Drawing…")
+        elif wide > 1:
             image = QImage(pixels, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
             painter.drawImage(self.rect(), image)
         else:

@@ -159,3 +159,21 @@ def test_the_plot_is_saved(full, tmp_path, answers):
     QTest.mouseClick(full.save, Qt.MouseButton.LeftButton)
     assert asked[0][1].name == "quality_by_step.png"
     assert b"<svg" in (tmp_path / "steps.svg").read_bytes()
+
+
+def test_another_plot_does_not_show_the_one_before_meanwhile(full, qtbot):
+    canvas, gone_to = full.canvas, []
+    before = full.grab().toImage()
+    with qtbot.waitSignal(canvas.drawn):
+        choose(full, "span")
+        assert canvas.wiped
+        canvas.picked = gone_to.append
+        QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=QPoint(150, 100))
+        assert not gone_to, "its axes are no longer there"
+        shown, ground = canvas.grab().toImage(), canvas.look.background
+        corners = {shown.pixelColor(x, y).name() for x in (3, 290) for y in range(20, 90, 7)}
+        assert corners <= {ground, canvas.look.background_top}, "nothing of the old plot"
+        assert full.grab().toImage() != before
+    qtbot.waitUntil(lambda: not canvas.wiped)
+    (axes,) = canvas.figure.axes
+    assert axes.get_ylabel().endswith("before deformation [mesh units]")
