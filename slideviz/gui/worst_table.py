@@ -18,8 +18,8 @@ COLUMNS = ("Cell", "Quality", "Worse\nsince")
 CELL, QUALITY, SINCE = range(3)
 """The first columns; the coordinates follow, and the type where there are several."""
 LAST = "Type"
-ARROW = 14
-"""Pixels of the sign of the order in a header."""
+ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
+"""Pixels of the sign of the order in a header, and what is between it and the words."""
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
@@ -92,7 +92,10 @@ class WorstModel(QAbstractTableModel):
             return "Element type" if self.headers[section] == LAST else TIPS.get(section, place)
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return self._alignment(section)
-        return self.headers[section] if role == Qt.ItemDataRole.DisplayRole else None
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        # Qt draws the sign of the order right behind the letters.
+        return self.headers[section] + (GAP if section == QUALITY == self._by else "")
 
     def data(self, index, role=Qt.ItemDataRole.DisplayRole):
         at = self.order[index.row()]

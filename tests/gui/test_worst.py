@@ -376,3 +376,12 @@ def test_columns_share_the_width_unless_somebody_chose_others(full):
     table.resize(700, 300)
     QApplication.processEvents()
     assert table.columnWidth(1) == 140
+
+
+def test_the_sign_of_the_order_does_not_touch_the_word(full):
+    header = full.table.horizontalHeader()
+    words = full.model.headerData(QUALITY, Qt.Orientation.Horizontal)
+    assert words == "Quality\N{NO-BREAK SPACE}"
+    assert header.fontMetrics().horizontalAdvance(words) + 14 < full.table.columnWidth(QUALITY)
+    full.table.sortByColumn(CELL, Qt.SortOrder.AscendingOrder)
+    assert full.model.headerData(QUALITY, Qt.Orientation.Horizontal) == "Quality"
