@@ -21,6 +21,12 @@ from slideviz.view.unroll import plane_axes
 
 BESIDE_PX = 1000
 """Width from which on the flat view is put beside the 3D view; below it otherwise."""
+_SHARE = 9 / 20
+"""Part of the window's middle that the flat view gets."""
+_LONG = 1.5
+"""A section that is so many times larger below the view than beside it is put there."""
+_FRAME_PX = 110
+"""Height of title, rulers and air around a flat section."""
 
 
 class Cutting(QSplitter):
@@ -50,7 +56,7 @@ class Cutting(QSplitter):
         self.wants_handle = False
         self.handle: PlaneHandle | FlatHandle | None = None
         self.flats: Flats | None = None
-        self._compared = False
+        self._kind: tuple[object, ...] = ()
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
 
@@ -179,24 +185,28 @@ class Cutting(QSplitter):
         if self.flats is None:
             self.flats = Flats(self.viewing, self.look, self._multi_samples)
             self.flats.closed.connect(lambda: self.want_flat(False))
-        compared = beside(session) is not None
-        if made or compared != self._compared:
-            self._compared = compared
-            self._arrange(self.flats)
+        whole = self.viewing.scene.sees_all()
+        if made:
+            self.addWidget(self.flats)
         self.flats.show_section(session, section)
+        # Another radius may not make the views change places.
+        compared = beside(session) is not None
+        kind = (session.mesh, compared, section.kind, section.direction, session.view.copies)
+        if made or kind != self._kind:
+            self._kind = kind
+            self._arrange(self.flats.extent, compared)
+            if whole:
+                self.viewing.fit()
 
-    def _arrange(self, flats: Flats) -> None:
-        """Put the flat view beside the view where there is room; below two, and so a curve."""
-        whole, mesh = self.viewing.scene.sees_all(), self.store.session.mesh
-        solid = mesh is not None and mesh.dim == 3
-        wide = self.width() >= BESIDE_PX and solid and not self._compared
+    def _arrange(self, extent: tuple[float, float] | None, compared: bool) -> None:
+        """Put the flat view where its section is large; below two views, and so a curve."""
+        wide, share = False, _SHARE
+        if extent is not None and not compared:
+            wide, share = place_for(extent, (self.width(), self.height()))
         self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
-        if self.indexOf(flats) < 0:
-            self.addWidget(flats)
         size = self.width() if wide else self.height()
-        self.setSizes([size * 11 // 20, size * 9 // 20])
-        if whole:
-            self.viewing.fit()
+        flat = round(share * size)
+        self.setSizes([size - flat, flat])
 
     def _drop_flats(self) -> None:
         flats, self.flats = self.flats, None
@@ -223,6 +233,26 @@ class Cutting(QSplitter):
             self.flats.close_views()
             self.flats = None
         self.wants_handle = False
+
+
+def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
+    """Tell whether a flat section goes beside the 3D view, else below, and its part of the room.
+
+    Parameters
+    ----------
+    extent : (float, float)
+        Width and height of the section, in the mesh's length unit.
+    room : (int, int)
+        Those of both views together, in pixels.
+    """
+    (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(room, 1)
+    beside_scale = min(_SHARE * width / wide, height / high)
+    below_scale = min(width / wide, _SHARE * height / high)
+    if width >= BESIDE_PX and below_scale < _LONG * beside_scale:
+        return True, _SHARE
+    # What a strip cannot fill is left to the view.
+    needed = (high / wide * width + _FRAME_PX) / height
+    return False, float(np.clip(needed, 0.6 * _SHARE, _SHARE))
 
 
 def flat_one(sections: Sequence[Section]) -> int | None:

@@ -67,6 +67,15 @@ class Flats(QWidget):
         self.second.show_section(theirs[0], section, called(theirs[0]))
         self.first.refit()
 
+    @property
+    def extent(self) -> tuple[float, float] | None:
+        """Return width and height of the flat section; None of a curve, or where nothing is cut."""
+        box = self.first.scene.bounds() if isinstance(self.first, FlatView) else None
+        if box is None:
+            return None
+        width, height = (box[1] - box[0]).tolist()
+        return width, height
+
     def _show_curve(self, shown: list, section: Section) -> None:
         if not isinstance(self.first, CurveView):
             self.first = CurveView(self.viewing.store, self.look)

@@ -62,13 +62,16 @@ class Ruler(QWidget):
         if self.upright:
             y = high * (1.0 - share)
             painter.drawLine(wide - 4, round(y), wide - 1, round(y))
-            if 7 <= y <= high - 7:
-                painter.drawText(QRectF(14, y - 8, wide - 20, 16), right, text)
+            top = min(max(y - 8.0, 0.0), high - 16.0)
+            painter.drawText(QRectF(14, top, wide - 20, 16), right, text)
         else:
             x = wide * share
             painter.drawLine(round(x), 0, round(x), 3)
-            if 20 <= x <= wide - 20:
-                painter.drawText(QRectF(x - 35, 3, 70, 15), Qt.AlignmentFlag.AlignCenter, text)
+            # At the ends, where half a number would be cut off, it stands beside its tick.
+            half = painter.fontMetrics().horizontalAdvance(text) / 2.0 + 1.0
+            middle = min(max(x, half), wide - half)
+            box = QRectF(middle - 35, 3, 70, 15)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
     def _draw_name(self, painter: QPainter) -> None:
         centre = Qt.AlignmentFlag.AlignCenter

@@ -12,6 +12,9 @@ from slideviz.view.section import Section, Triple
 from slideviz.view.state import Session
 from slideviz.view.surfaces import padded
 
+_LAYER = 1e-4
+"""Part of the span of a mesh within which nodes are on one layer."""
+
 
 def cell_points(mesh: Mesh) -> FloatArray:
     """Return the nodes of the cells, (u, 3): what a section can reach."""
@@ -30,7 +33,7 @@ def first_plane(session: Session) -> Section:
 
 
 def first_cylinder(session: Session, pair: Pair | None) -> Section:
-    """Return a cylinder about the axis of the machine, halfway between the radii of the mesh.
+    """Return a cylinder about the axis of the machine, about halfway between the radii of the mesh.
 
     The axis is that of the period, where it is a rotation; otherwise that of the case. In 2D it
     is a circle, about the middle of what moves where no rotation has an axis in the mesh's plane.
@@ -45,8 +48,22 @@ def first_cylinder(session: Session, pair: Pair | None) -> Section:
         axis, origin = case.axis, case.origin
     at, way = _triple(np.asarray(origin)), _triple(np.asarray(axis))
     section = Section("cylinder", at, way, 1.0, whole=mesh.dim == 2)
-    low, high = section.reach(cell_points(mesh))
-    return replace(section, radius=(low + high) / 2.0 or 1.0)
+    local = section.frame(cell_points(mesh))
+    return replace(section, radius=_beside_layer(np.hypot(local[:, 0], local[:, 1])) or 1.0)
+
+
+def _beside_layer(radii: FloatArray) -> float:
+    """Return the middle of radii (n,); where a layer of nodes lies there, the middle of cells.
+
+    On a layer rounding decides which cells are cut: those on one side, on the other, or both.
+    """
+    low, high = float(radii.min()), float(radii.max())
+    middle, near = (low + high) / 2.0, _LAYER * (high - low)
+    # Scattered nodes are that near to it by chance, but only so many of them.
+    if np.count_nonzero(np.abs(radii - middle) <= near) <= max(10 * _LAYER * len(radii), 3):
+        return middle
+    beyond = radii[radii > middle + near]
+    return (middle + float(beyond.min())) / 2.0 if len(beyond) else middle
 
 
 def _middle_of_moving(session: Session) -> FloatArray:

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.case.samples import write_sample
 from slideviz.gui import dialogs
-from slideviz.gui.cutting import followed
+from slideviz.gui.cutting import followed, place_for
 from slideviz.gui.ruler import Ruler, nice_ticks, tick_text
 from slideviz.view import changes
 from slideviz.view.pick import to_display
@@ -543,6 +543,22 @@ def test_the_chosen_section_stays_chosen(index, old, new, wanted):
     assert followed(index, old, new) == wanted
 
 
+@pytest.mark.parametrize(
+    ("extent", "room", "wide"),
+    [
+        ((0.35, 0.015), (1170, 980), False),
+        ((0.015, 0.35), (1170, 980), True),
+        ((0.3, 0.3), (1170, 980), True),
+        ((0.3, 0.3), (900, 980), False),
+    ],
+)
+def test_a_long_strip_lies_below_the_view_and_is_larger_there(extent, room, wide):
+    found, share = place_for(extent, room)
+    assert found == wide
+    thin = extent[1] < 0.1 * extent[0]
+    assert (share < 0.35) == thin, "what a strip does not need is left to the view"
+
+
 def test_rulers_have_round_numbers():
     assert nice_ticks(-0.012, 0.031, 4) == pytest.approx([0.0, 0.02])
     assert nice_ticks(0.0, 1.0, 4) == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
@@ -561,3 +577,22 @@ def test_a_ruler_writes_its_numbers(qtbot):
     empty = ruler.grab().toImage()
     ruler.show_range(0.1, 1.1, "z")
     assert ruler.grab().toImage() != empty
+
+
+def test_a_tick_at_the_end_of_a_ruler_has_its_number(qtbot):
+    for upright, ends in (
+        (False, (slice(6, 17), slice(-30, None))),
+        (True, (slice(0, 14), slice(10, -6))),
+    ):
+        ruler = Ruler(upright=upright)
+        qtbot.addWidget(ruler)
+        ruler.resize(*((58, 400) if upright else (400, 34)))
+        ruler.show_range(0.0, 0.2, "")
+        image = ruler.grab().toImage()
+        grey = np.array(
+            [
+                [image.pixelColor(x, y).lightness() for x in range(image.width())]
+                for y in range(image.height())
+            ]
+        )
+        assert np.ptp(grey[ends]) > 60, "0.20 stands at the end of the ruler"
