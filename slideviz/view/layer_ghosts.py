@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray
 from slideviz.view import actors
 from slideviz.view.look import CLASH_COLOUR, ROLE_COLOURS
@@ -23,6 +24,11 @@ DEEPER = 330.0
 """Units of depth that faces of ghosts are drawn behind where they are, and their rims before: of
 the 65536 from the nearest to the furthest point. A boundary that slides within its surface would
 show through its ghost in patches."""
+ON_TOP = 70000.0
+"""As many units that the rim of a motion's ghost is before everything: one that goes into the solid,
+behind opaque boundaries, would not be seen at all."""
+ARRIVED = 0.01
+"""Part of its displacement by which a boundary may miss its ghost and still cover it."""
 
 
 class GhostLayer:
@@ -76,15 +82,24 @@ class GhostLayer:
             surface = self._surfaces.get(name)
             if surface is None:
                 continue
-            # In the same place there is nothing to tell.
-            at = session.mesh.points[surface.nodes]
-            moves = np.abs(points - at).max() > STILL * np.ptp(at, axis=0).max()
+            key = f"motion:{name}"
+            if not shown or name in view.hidden or not self._leaves(surface, points):
+                for part in (key, f"{key}{RIM}"):
+                    if part in self._actors:
+                        self._actors[part].visibility = False
+                continue
             colour = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
-            for actor, shape in self._parts(f"motion:{name}", surface, 0.55):
+            for actor, shape in self._parts(key, surface, 0.55):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
                 actor.prop.line_width = 4.5 if session.clash else 2.5
-                actor.visibility = bool(shown and moves and name not in view.hidden)
+                actor.visibility = True
+
+    def _leaves(self, surface: Surface, points: FloatArray) -> bool:
+        """Tell whether a boundary is elsewhere at points (u, d)."""
+        assert self._session.mesh is not None
+        at = self._session.mesh.points[surface.nodes]
+        return bool(np.abs(points - at).max() > STILL * np.ptp(at, axis=0).max())
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
         """Return a colour that is seen on that of the boundary itself."""
@@ -105,7 +120,9 @@ class GhostLayer:
                 actor.prop.color = self.stage.look.ghost
                 actor.visibility = shown and moves and name not in view.hidden
 
-    def _parts(self, key: str, surface: Surface, opacity: float) -> list[tuple[Any, Any]]:
+    def _parts(
+        self, key: str, surface: Surface, opacity: float, nearer: float = DEEPER
+    ) -> list[tuple[Any, Any]]:
         """Return actor and shape of what a ghost is made of: lines; or faces, and their rim."""
         faces = self._part(key, lambda at, lift: actors.surface_shape(surface, at, lift))
         if surface.flat:
@@ -117,7 +134,7 @@ class GhostLayer:
             return [faces]
         rim = self._part(f"{key}{RIM}", lambda at, lift: actors.rim_shape(surface, at, lift))
         rim[0].prop.opacity = min(opacity + 0.35, 1.0)
-        _shift_depth(rim[0], -DEEPER)
+        _shift_depth(rim[0], -nearer)
         return [faces, rim]
 
     def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> tuple[Any, Any]:
@@ -141,12 +158,36 @@ def _shift_depth(actor: Any, units: float) -> None:
     mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, units)
 
 
+def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
+    """Tell whether the ghost of a boundary, at points (u, d), is elsewhere than what is shown.
+
+    A run takes its boundary there but for the tolerance of the data reduction; the two would
+    flicker in the same place.
+    """
+    mesh = session.mesh
+    assert mesh is not None
+    at = mesh.points[surface.nodes]
+    way = float(np.abs(points - at).max())
+    still = STILL * float(np.ptp(at, axis=0).max())
+    if session.view.frame == 0 or session.frame is None:
+        return way > still
+    left = float(np.abs(points - session.frame.mesh.points[surface.nodes]).max())
+    return left > max(still, ARRIVED * way)
+
+
 def is_planned(session: Session) -> bool:
     """Tell whether a view should say where motions will take boundaries.
 
-    Of the undeformed mesh it should, but not beside a run, which shows that better; of the steps
-    of a run, where settings have changed since.
+    Of the undeformed mesh it should; of the steps of a run, where settings have changed since.
+    Two views beside each other say the same, or a ghost would look like a difference between
+    runs: they say it of motions that no run has shown yet.
     """
-    if session.view.frame == 0:
-        return session.view.beside is None
-    return session.outdated
+    if session.view.beside is not None:
+        now = _motion(session.case)
+        return all(_motion(run.case) != now for run in session.runs)
+    return session.view.frame == 0 or session.outdated
+
+
+def _motion(case: Case) -> tuple[object, ...]:
+    """Return what moves in a case, and how."""
+    return frozenset(case.markers_with("moving")), tuple(case.motions)

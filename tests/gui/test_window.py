@@ -941,7 +941,7 @@ def test_nothing_is_asked_when_nothing_changed(opened):
 
 def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar(opened):
     bar = opened.window.actions_
-    opened.choose(bar.colour, "skew")
+    opened.choose(bar.bar.colour, "skew")
     assert opened.session.view.colour_by == "skew"
     for name in ("edges", "undeformed", "motion_ghost", "legend"):
         before = getattr(opened.session.view, name)
