@@ -25,8 +25,8 @@ DEEPER = 330.0
 the 65536 from the nearest to the furthest point. A boundary that slides within its surface would
 show through its ghost in patches."""
 ON_TOP = 70000.0
-"""As many units that the rim of a motion's ghost is before everything: one that goes into the solid,
-behind opaque boundaries, would not be seen at all."""
+"""As many units that the rim of a motion's ghost is before everything: one that goes into the
+solid, behind opaque boundaries, would not be seen at all."""
 ARRIVED = 0.01
 """Part of its displacement by which a boundary may miss its ghost and still cover it."""
 
@@ -83,23 +83,18 @@ class GhostLayer:
             if surface is None:
                 continue
             key = f"motion:{name}"
-            if not shown or name in view.hidden or not self._leaves(surface, points):
+            # In the same place there is nothing to tell.
+            if not shown or name in view.hidden or not is_apart(points, surface, session):
                 for part in (key, f"{key}{RIM}"):
                     if part in self._actors:
                         self._actors[part].visibility = False
                 continue
             colour = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
-            for actor, shape in self._parts(key, surface, 0.55):
+            for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
                 actor.prop.line_width = 4.5 if session.clash else 2.5
                 actor.visibility = True
-
-    def _leaves(self, surface: Surface, points: FloatArray) -> bool:
-        """Tell whether a boundary is elsewhere at points (u, d)."""
-        assert self._session.mesh is not None
-        at = self._session.mesh.points[surface.nodes]
-        return bool(np.abs(points - at).max() > STILL * np.ptp(at, axis=0).max())
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
         """Return a colour that is seen on that of the boundary itself."""

@@ -117,3 +117,61 @@ def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
     assert ghost.visibility
     scene.set_motion_ghosts({})
     assert not any(name.startswith("motion:") for name in scene.plotter.actors)
+
+
+def moving_top(cube, scene):
+    """A session whose upper side moves, opened in the scene and seen from above."""
+    top = side_of(cube, (0, 0, 1))
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_role(session, (top,), "moving")
+    session = changes.set_view(session, edges=False, legend=False, triad=False)
+    scene.open(session, find_surfaces(cube))
+    return top, session
+
+
+def ran_to(session, *meshes):
+    frames = [Frame(mesh, quality(mesh)) for mesh in meshes]
+    return changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
+
+
+def test_a_boundary_that_goes_into_the_solid_is_seen_through_what_is_before_it(scene, cube):
+    top, _ = moving_top(cube, scene)
+    scene.look_from("-y")
+    before = image(scene)
+    inwards = cube.points[cube.marker(top).nodes] - np.array([0.0, 0.0, 0.4 * cube.extent / 3])
+    scene.set_motion_ghosts({top: inwards})
+    changed = np.abs(image(scene) - before).max(axis=2) > 25
+    across = changed.sum(axis=1)
+    assert across.max() > 100, "the rim is a line over the whole side"
+    assert (across > 100).sum() < 8
+
+
+def test_a_ghost_is_not_drawn_over_the_boundary_that_has_arrived(scene, cube):
+    top, session = moving_top(cube, scene)
+    half = cube.with_points(cube.points * (1.0, 1.0, 1.2))
+    whole = cube.with_points(cube.points * (1.0, 1.0, 1.4))
+    scene.set_motion_ghosts({top: whole.points[cube.marker(top).nodes]})
+    session = ran_to(session, half, whole)
+    session = changes.set_case(session, steps=session.case.steps + 1)
+    assert session.outdated
+    ghost = scene.plotter.actors[f"motion:{top}"]
+    for frame, seen in ((1, True), (2, False), (0, True)):
+        scene.update(changes.show_frame(session, frame))
+        assert bool(ghost.visibility) == seen
+
+
+def test_runs_beside_each_other_both_have_a_motion_ghost_or_none(scene, cube):
+    top, session = moving_top(cube, scene)
+    moved = cube.with_points(cube.points * (1.0, 1.0, 1.2))
+    scene.set_motion_ghosts({top: cube.points[cube.marker(top).nodes] + cube.extent})
+    ghost = scene.plotter.actors[f"motion:{top}"]
+    for sliding in ("ps", "ds"):
+        session = ran_to(changes.set_case(session, sliding=sliding), moved)
+    session = changes.show_beside(session, 1)
+    for state in (session, changes.seen_beside(session)):
+        scene.update(state)
+        assert not ghost.visibility, "both runs have this motion"
+    session = changes.set_role(session, (top,), "fixed")
+    for state in (session, changes.seen_beside(session)):
+        scene.update(state)
+        assert ghost.visibility, "no run has shown this yet"
