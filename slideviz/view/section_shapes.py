@@ -66,6 +66,8 @@ def shapes_of(
         linewidths=np.clip(_PART * thickness, _THINNEST, _THICKEST) if edges else 0.15,
     )
     shapes.set_joinstyle("round")
+    # Moved to whole pixels, each by its own line's width, neighbours would not meet.
+    shapes.set_snap(False)
     shapes.set_rasterized(len(rings) > MANY)
     return shapes
 

@@ -177,6 +177,8 @@ def test_thin_cells_have_thin_lines_and_lines_can_be_left_out():
     widths = shapes.get_linewidths()
     sizes = [np.ptp(path.vertices[:, 0]) for path in shapes.get_paths()]
     assert widths[np.argmin(sizes)] < 0.3 * widths[np.argmax(sizes)]
+    # Moved to whole pixels by the widths of their own lines, neighbours would not meet.
+    assert shapes.get_snap() is False
     _, bare, _ = drawn(squeezed, section, edges=False)
     assert bare.get_edgecolor() == pytest.approx(bare.get_facecolor())
 
