@@ -92,6 +92,8 @@ make_venv() {
     fi
     choose_python
     require_venv_module
+    # A link to the environment of another copy: that one is not ours to clear.
+    if [ -L $VENV ]; then rm $VENV; fi
     say "making $VENV with $("$python" --version)"
     "$python" -m venv --clear $VENV
 }
