@@ -20,7 +20,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.case.model import ROLES
-from slideviz.gui.fields import Choice
+from slideviz.gui.choice import Choice
 from slideviz.gui.icons import icon, role_icon
 from slideviz.gui.tips import wrapped
 from slideviz.view import changes

@@ -11,7 +11,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.fields import Choice
+from slideviz.gui.choice import Choice
 from slideviz.gui.plot_canvas import (
     PLOT_FILTERS,
     PlotArea,

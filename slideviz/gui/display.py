@@ -20,8 +20,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.case.view_keys import MAPS
+from slideviz.gui.choice import Choice
 from slideviz.gui.display_fields import Copies, Span, map_icon
-from slideviz.gui.fields import Choice
 from slideviz.gui.tips import wrapped
 from slideviz.mesh.periodic import Pair
 from slideviz.view import changes

@@ -21,7 +21,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.fields import Choice
+from slideviz.gui.choice import Choice
 from slideviz.gui.pixmaps import copy_image, drawn_for, fitted, framed, to_image
 from slideviz.view.figure import BACKGROUNDS, Figure, words_of_size
 from slideviz.view.figure_vector import MOST_CELLS

@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from qtpy.QtCore import QLocale, Qt, Signal
-from qtpy.QtWidgets import QComboBox, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from slideviz.gui.tips import wrapped
 
@@ -242,39 +242,6 @@ class VectorField(QWidget):
         """Explain the field."""
         for field in self.fields:
             field.set_tip(text)
-
-
-class Choice(QComboBox):
-    """A drop-down of values with words; the wheel scrolls the panel instead of changing it."""
-
-    chosen = Signal(object)
-
-    def __init__(self, words: dict[object, str]) -> None:
-        super().__init__()
-        self.words = dict(words)
-        for value, text in words.items():
-            self.addItem(text, value)
-        self.setMinimumContentsLength(8)
-        self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
-
-    def show_value(self, value: object) -> None:
-        """Show a value without telling."""
-        index = self.findData(value)
-        if index >= 0 and index != self.currentIndex():
-            self.setCurrentIndex(index)
-
-    def explain(self, tips: Mapping[str, str]) -> None:
-        """Explain entries, by their value, to who is about to choose one."""
-        for value, tip in tips.items():
-            self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
-
-    def showPopup(self) -> None:
-        # Escape leaves the list at the entry below the mouse; it would open there next time.
-        self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
-        super().showPopup()
-
-    def wheelEvent(self, event) -> None:
-        event.ignore()
 
 
 def positive(value: float) -> str:

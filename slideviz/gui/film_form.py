@@ -15,7 +15,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.fields import Choice
+from slideviz.gui.choice import Choice
 from slideviz.view.figure import Figure
 from slideviz.view.offscreen import LARGEST, SMALLEST
 from slideviz.view.reel import FPS, SIZES, Reel, check_film

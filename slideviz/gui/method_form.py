@@ -17,7 +17,8 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.fields import Choice, NumberField, VectorField, a_direction, positive
+from slideviz.gui.choice import Choice
+from slideviz.gui.fields import NumberField, VectorField, a_direction, positive
 from slideviz.gui.method_more import MoreSettings, set_tip
 from slideviz.gui.tips import wrapped
 

@@ -10,7 +10,8 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QToolButton, QVBoxLayout, QWidge
 
 from slideviz.case.kernels import kernel_titles
 from slideviz.case.model import Case, Reduction
-from slideviz.gui.fields import Choice, NumberField, angle_limit, positive
+from slideviz.gui.choice import Choice
+from slideviz.gui.fields import NumberField, angle_limit, positive
 from slideviz.gui.tips import wrapped
 from slideviz.view.state import Session
 

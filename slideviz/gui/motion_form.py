@@ -11,7 +11,8 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.fields import Choice, NumberField, VectorField, a_direction, not_zero
+from slideviz.gui.choice import Choice
+from slideviz.gui.fields import NumberField, VectorField, a_direction, not_zero
 from slideviz.gui.motion_kinds import KINDS
 
 ABOUT = {"centroid": "its centroid", "axis": "the machine's axis", "point": "a point"}

@@ -9,7 +9,8 @@ from qtpy.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QSlider, QWidget
 
 from slideviz.errors import CaseError
-from slideviz.gui.fields import Choice, NumberField, VectorField
+from slideviz.gui.choice import Choice
+from slideviz.gui.fields import NumberField, VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.view import section_start
 from slideviz.view.section import Section, Triple

@@ -8,7 +8,7 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction
 from qtpy.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
 
-from slideviz.gui.fields import Choice
+from slideviz.gui.choice import Choice
 from slideviz.view import changes
 from slideviz.view.state import COLOUR_BY, Session
 
