@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import traceback
@@ -17,6 +18,8 @@ DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
+    # It reports fonts for formulas that it replaces, a line for each, where its cache is new.
+    logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
         from slideviz.cli.progress import compiling_told

@@ -97,6 +97,7 @@ def compare(arguments: argparse.Namespace) -> int:
     warm({one.method for one in wanted if one not in cannot})
     say(terminal_head())
     rows, files = _computed(arguments, (case, mesh, wanted, cannot), folder, say)
+    say("drawing plots" + ("" if arguments.no_pictures else " and pictures"))
     files += _drawn(arguments, case, mesh, rows, folder)
     say("\n".join(map(str, files)))
     if not any(row.result for row in rows):

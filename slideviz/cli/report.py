@@ -179,11 +179,16 @@ def histogram_lines(quality: Quality, bins: int = 10, width: int = 40) -> str:
     return table(rows)
 
 
-def quality_lines(quality: Quality) -> str:
+def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
     """Return minimum, mean and the counts of cells as a table."""
-    rows: list[tuple[str, object]] = [
-        ("minimum quality", quality.min),
-        ("mean quality", quality.mean),
+
+    def beside(value: float) -> tuple[str, ...]:
+        return () if undeformed is None else (f"undeformed {_cell(value)}",)
+
+    before = undeformed or quality
+    rows: list[tuple[object, ...]] = [
+        ("minimum quality", quality.min, *beside(before.min)),
+        ("mean quality", quality.mean, *beside(before.mean)),
         ("cells", len(quality)),
         ("valid", quality.valid),
         ("inverted", quality.inverted),

@@ -47,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     last = steps[-1]
     seconds["quality"] = -time.perf_counter()
     found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
+    before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     write(output, last.mesh, overwrite=arguments.force, cell_data=cell_data(output, found))
@@ -61,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         picture(named, arguments.picture, mesh, found, size, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
     report = run_report(case, mesh, steps, found, seconds)
+    report["quality"]["undeformed"] = {"min": before.min, "mean": before.mean}
     if arguments.history:
         save_history(arguments.history, report)
     text = save_json(arguments.json, report) if arguments.json else None
@@ -70,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
         files = {"mesh": output, "quality of each cell": qualities}
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
-        _print_run(report, found, files)
+        _print_run(report, (found, before), files)
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
     if found.inverted:
@@ -174,14 +176,15 @@ def _write_qualities(path: Path, found: Quality) -> None:
         file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
 
 
-def _print_run(report: dict, found: Quality, files: dict[str, Path | None]) -> None:
+def _print_run(report: dict, found: tuple[Quality, Quality], files: dict[str, Path | None]) -> None:
+    """Print the summary of a run; ``found`` is the quality after it and before."""
     from slideviz.cli.report import counted, quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
     print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
     print(f"sliding {report['sliding']}, periodic {report['periodic']}")
-    print(quality_lines(found))
+    print(quality_lines(*found))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
     print(table(rows))

@@ -54,7 +54,7 @@ def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
     shots_states.section(window, tmp_path)
     (cut,) = window.store.session.view.sections
     assert cut.kind == "cylinder"
-    assert cut.radius == pytest.approx(0.275, abs=1e-3)
+    assert cut.radius == pytest.approx(0.275, abs=5e-3)  # within a cell of mid-span
     assert window.cutting.flat is not None
     assert window.cutting.flat.isVisible()
 
