@@ -19,9 +19,10 @@ from slideviz.case.clash import clash, jump
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
+from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
-from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_boundary, find_fans
+from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, classify, directions
@@ -135,7 +136,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     """
     require_valid(case, mesh)
     _require_finite(mesh)
-    boundary = find_boundary(mesh)
+    boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs = _pairs(case, mesh)
     frame = make_frame(mesh.points, pairs, periodic_distance=case.periodic != "none")

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from itertools import chain
 
 import numpy as np
@@ -12,6 +13,8 @@ from pyvistaqt import QtInteractor
 from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
 from qtpy.QtWidgets import QApplication
 from vtkmodules.vtkRenderingCore import vtkProp
+
+from slideviz.gui.one_paint import OnePaint
 
 PART_CELLS = 10_000
 """Faces that are handed to the graphics in one turn."""
@@ -56,26 +59,16 @@ class View3D(QtInteractor):
         self.told = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        # Not 0: that would wait for every other timer that is due, one that plays for example.
-        self._soon.setInterval(1)
-        self._soon.timeout.connect(self.render)
+        self._one_paint = OnePaint(self)
         self._veiled: list[list[vtkProp]] = []
 
     def render(self) -> None:
         """Schedule one repaint; pyvista calls this everywhere."""
-        if not getattr(self, "_closed", True):
+        if hasattr(self, "_one_paint") and not self._closed:
             self._rendered = True
-            self.update()
+            self._one_paint.ask()
 
-    def render_soon(self) -> None:
-        """Repaint in the next turn of the event loop.
-
-        Clicks and timers come between what changed the scene and the drawing of it, which takes
-        as long again where no graphics card draws.
-        """
-        self._soon.start()
+    render_soon = render
 
     def unveil(self) -> None:
         """Draw what is new in the scene part by part, one in each turn of the event loop.
@@ -97,9 +90,11 @@ class View3D(QtInteractor):
             cells += size
             parts[-1].append(actor)
         self._veiled = parts[1:]
+        self.render()
+
+    def _veil(self) -> None:
         for actor in chain(*self._veiled):
             actor.SetVisibility(False)
-        self.render_soon()
 
     def _unveil_next(self) -> None:
         if not self._veiled:
@@ -112,9 +107,21 @@ class View3D(QtInteractor):
         self.render()
 
     def paintGL(self) -> None:
+        # What changed the scene meanwhile knows nothing of the veil.
+        self._veil()
         super().paintGL()
         if self._veiled:
             QTimer.singleShot(0, self._unveil_next)
+
+    def close(self) -> None:
+        """Give the graphics back; nothing is painted any more."""
+        # Its parent may be gone already, and have closed it.
+        with contextlib.suppress(RuntimeError):
+            self._one_paint.end()
+        super().close()
+        # Of Qt's surface, which ends now, PySide knows the address only: as long as it is named
+        # here, whatever has that address later is taken for it, an action for example.
+        self._surface = None
 
     def snapshot(self) -> np.ndarray:
         """Return what the view shows now, (height, width, 3)."""

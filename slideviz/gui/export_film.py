@@ -12,11 +12,11 @@ from qtpy.QtWidgets import (
     QDialogButtonBox,
     QHBoxLayout,
     QLabel,
-    QProgressBar,
     QVBoxLayout,
     QWidget,
 )
 
+from slideviz.gui.bar import QuietBar
 from slideviz.gui.film_form import FilmForm
 from slideviz.gui.pixmaps import drawn_for, fitted, framed, to_image
 from slideviz.view import changes
@@ -63,7 +63,7 @@ class FilmDialog(QDialog):
         self.words = QLabel()
         self.words.setWordWrap(True)
         outer.addWidget(self.words)
-        self.bar = QProgressBar()
+        self.bar = QuietBar()
         outer.addWidget(self.bar)
         outer.addWidget(self._make_buttons())
         self._turn, self._soon = QTimer(self), QTimer(self)

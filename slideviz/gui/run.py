@@ -8,13 +8,13 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import (
     QHBoxLayout,
     QLabel,
-    QProgressBar,
     QPushButton,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
 
+from slideviz.gui.bar import QuietBar
 from slideviz.gui.icons import icon
 from slideviz.gui.tips import wrapped
 from slideviz.view import changes
@@ -66,7 +66,7 @@ class RunPanel(QWidget):
         row.addWidget(self.cancel)
         row.addWidget(self.text, 1)
         layout.addLayout(row)
-        self.bar = QProgressBar()
+        self.bar = QuietBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(6)

@@ -10,6 +10,7 @@ from typing import Any
 import pyvista as pv
 from qtpy.QtCore import QObject, QTimer, Signal
 
+from slideviz.gui.worker import stand_back
 from slideviz.view import warmup
 from slideviz.view.actors import VALUES
 from slideviz.view.stage import Stage
@@ -70,6 +71,8 @@ class WarmUp(QObject):
         self.blockSignals(True)
 
     def _run(self) -> None:
+        # Numba's threads begin here, and stay as far back as this one.
+        stand_back()
         warmup.warm_up(self._begun, self._stop.is_set)
         # What was imported stays: to look through all of it for garbage takes 100 ms each time.
         gc.freeze()

@@ -13,7 +13,9 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from threading import Event, Lock, Thread, get_native_id
+from threading import enumerate as enumerate_threads
 from typing import Any
 
 from qtpy.QtCore import QObject, Qt, QTimer, Signal
@@ -26,7 +28,11 @@ NEWS_S = 0.1
 CLOSING_S = 1.0
 """How long a window that closes waits for its job."""
 NICENESS = 5
-"""How far a job stands back behind the window where both want the processor."""
+"""How far a job stands back behind the window where both want the processor.
+
+Not further: while it keeps the interpreter, the window waits for it, and where other programs are
+busy, too, it would hardly go on.
+"""
 log = logging.getLogger("slideviz")
 
 
@@ -151,13 +157,36 @@ class JobRunner(QObject):
             self.failed.emit(value)
 
 
-def stand_back() -> None:
-    """Let the window go before this thread, and before those that it starts.
+def stand_back(thread: int | None = None) -> None:
+    """Let the window go before a thread (default: this one), and before those that it starts.
 
     Without a graphics card the picture is drawn by the same processor that computes.
+
+    Parameters
+    ----------
+    thread : int, optional
+        Its number in the system.
     """
     if sys.platform == "linux":  # only there it is for one thread, not for the whole program
-        thread = get_native_id()
+        thread = get_native_id() if thread is None else thread
         with contextlib.suppress(OSError):
             before = os.getpriority(os.PRIO_PROCESS, thread)
             os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
+
+
+def hold_libraries_back() -> None:
+    """Let the window go before the threads in which libraries compute, BLAS for example.
+
+    They are as many as there are processors, begin when the library is imported, and bear the name
+    of the program, unlike those of Qt and of the graphics. Called once.
+    """
+    tasks = Path("/proc/self/task")
+    if not tasks.is_dir():
+        return
+    pythons = {thread.native_id for thread in enumerate_threads()}
+    name = (tasks / str(get_native_id()) / "comm").read_text()
+    for task in tasks.iterdir():
+        # A thread may have ended meanwhile.
+        with contextlib.suppress(OSError):
+            if int(task.name) not in pythons and (task / "comm").read_text() == name:
+                stand_back(int(task.name))

@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.rows import row_groups
 
 FEATURE_ANGLE_DEG = 40.0
 
@@ -135,8 +136,7 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     # repeated node is the same one on both sides: make it the largest.
     if mesh.dim == 3:
         table = _canonical_triangles(table)
-    _, group = np.unique(table, axis=0, return_inverse=True)
-    group = group.ravel()
+    group = row_groups(table)
     cell_of_group = np.full(group.max(initial=-1) + 1, -1, np.int64)
     cell_of_group[group[len(facets) :]] = np.concatenate([np.empty(0, np.int64), *cells])
     owner = cell_of_group[group[: len(facets)]]

@@ -9,12 +9,12 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
+from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.topology import Fans, find_fans
 from slideviz.rbf.classify import classify
 from slideviz.view.look import ROLE_COLOURS
 from slideviz.view.state import Session
-from slideviz.view.surfaces import boundary_of
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"

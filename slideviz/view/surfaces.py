@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.topology import Boundary, find_boundary
-
-_BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
+from slideviz.mesh.rows import row_groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,19 +64,6 @@ def facet_connectivity(facets: IntArray) -> IntArray:
     return table[keep]
 
 
-def boundary_of(mesh: Mesh) -> Boundary:
-    """Return the oriented boundary of a mesh, found once as long as the mesh is there.
-
-    Raises
-    ------
-    MeshError
-        A marker element is no side of any cell.
-    """
-    if mesh not in _BOUNDARIES:
-        _BOUNDARIES[mesh] = find_boundary(mesh)
-    return _BOUNDARIES[mesh]
-
-
 def find_surfaces(mesh: Mesh) -> tuple[Surface, ...]:
     """Return every boundary of the mesh.
 
@@ -105,5 +90,8 @@ def _rim(facets: IntArray) -> IntArray:
         return np.empty((0, 2), np.int64)
     edges = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = edges[edges[:, 0] != edges[:, 1]]
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return unique[count == 1]
+    group = row_groups(edges)
+    once = np.bincount(group) == 1
+    rim = np.empty((len(once), 2), np.int64)
+    rim[group] = edges
+    return rim[once]

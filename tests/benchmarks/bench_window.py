@@ -58,11 +58,11 @@ class Bench:
     """A window, the beat of its event loop, and what waits for it."""
 
     def __init__(self, app, folder: Path) -> None:
-        import slideviz.staircase  # noqa: F401  (as `launch` does: once, before any thread)
-        from slideviz.gui.app import be_quick
+        from slideviz.gui.app import be_quick, ready_numerics
         from slideviz.gui.warm import prepare_drawing
         from slideviz.gui.window import MainWindow
 
+        ready_numerics()
         self.app = app
         settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
         self.window = MainWindow(settings, kept=folder / "sessions")

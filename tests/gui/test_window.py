@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QTimerEvent, QUrl
 from qtpy.QtGui import QDragEnterEvent, QDropEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QMenu
@@ -14,6 +14,7 @@ from qtpy.QtWidgets import QApplication, QMenu
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
+from slideviz.gui import player as player_module
 from slideviz.gui.player import step_ms
 from slideviz.gui.step_numbers import plain, result_parts
 from slideviz.mesh.quality import INVERTED
@@ -584,20 +585,42 @@ def test_playing_ends_at_the_last_step(ready):
     ready.qtbot.waitUntil(lambda: not player.playing)
 
 
-@pytest.mark.slow  # waits for real time, which a busy machine does not give
-def test_playing_in_a_loop_begins_again(ready):
+class OneStepEachTick:
+    """A clock by which every tick of a player comes when the next step is due."""
+
+    def __init__(self, player):
+        self.player = player
+
+    def start(self):
+        pass
+
+    def restart(self):
+        return step_ms(len(self.player.store.session.frames) - 1, self.player.speed)
+
+
+def test_playing_in_a_loop_begins_again(ready, monkeypatch):
     run(ready)
     player = ready.window.player
-    player.set_speed(4.0)
+    monkeypatch.setattr(player_module, "TICK_MS", 10**8)  # by itself it does not tick
+    player._clock = OneStepEachTick(player)
     told = []
     ready.window.store.listen(lambda _old, new: told.append(new.view.frame))
+
+    def tick():
+        QApplication.sendEvent(player._timer, QTimerEvent(player._timer.timerId()))
+
     ready.click(player.buttons["loop"])
     ready.click(player.buttons["play"])
-    ready.qtbot.waitUntil(lambda: told[-3:] == [3, 0, 1])
+    for _ in range(5):
+        tick()
+    assert told == [0, 1, 2, 3, 0, 1]
     assert player.playing
     ready.click(player.buttons["loop"])
-    ready.qtbot.waitUntil(lambda: not player.playing)
-    assert ready.session.view.frame == 3
+    tick()
+    assert player.playing
+    tick()
+    assert not player.playing
+    assert told[-2:] == [2, 3]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from slideviz.staircase import deform
 from slideviz.view import changes
 from slideviz.view.node_types import NODE_WORDS, NOTHING, NodeTypes
 from slideviz.view.state import Frame
+from slideviz.view.surfaces import find_surfaces
 
 
 def session_of(one, **view):
@@ -110,12 +111,14 @@ def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passag
 
 
 def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
-    from slideviz.view import surfaces
+    from slideviz.mesh import found as kept
 
     mesh, found = replace(passage.mesh, name="another"), []
-    real = surfaces.find_boundary
-    monkeypatch.setattr(surfaces, "find_boundary", lambda m: found.append(m) or real(m))
+    real = kept.find_boundary
+    monkeypatch.setattr(kept, "find_boundary", lambda m: found.append(m) or real(m))
     session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), passage.case)
-    surfaces.find_surfaces(mesh)
+    find_surfaces(mesh)
     NodeTypes().of(changes.set_view(session, points="types"))
+    for _ in range(2):
+        next(deform(passage.case, mesh))
     assert found == [mesh]

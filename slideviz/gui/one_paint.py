@@ -1,0 +1,62 @@
+"""One picture of the window for all that changed in it."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from qtpy.QtCore import QCoreApplication, QEvent, QObject, QTimer
+from qtpy.QtWidgets import QWidget
+
+SOON_MS = 1
+"""Not 0: that would wait for every other timer that is due, one that plays for example."""
+
+
+class OnePaint(QObject):
+    """Paints a view in the next turn of the event loop, and the widgets around it together with it.
+
+    Clicks and timers come between what changed a scene and the drawing of it, which takes as long
+    again where no graphics card draws. The labels around the view, which tell of the same change,
+    would be painted before: but around a view drawn by OpenGL the whole window goes to the screen
+    for each of them, 10 to 20 ms each time.
+    """
+
+    def __init__(self, view: QWidget) -> None:
+        super().__init__(view)
+        self._view = view
+        self._window: QWidget | None = None
+        self._held = False
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(SOON_MS)
+        self._timer.timeout.connect(self._paint)
+
+    def ask(self) -> None:
+        """Paint soon."""
+        window = self._view.window()
+        if window is not self._window:
+            self._let_go()
+            window.installEventFilter(self)
+            self._window = window
+        if not self._timer.isActive():
+            self._timer.start()
+
+    def end(self) -> None:
+        """Paint no more; the window is painted as any other."""
+        self._timer.stop()
+        self._let_go()
+
+    def _paint(self) -> None:
+        self._view.update()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        if self._held:
+            self._held = False
+            QCoreApplication.postEvent(self._window, QEvent(QEvent.Type.UpdateRequest))
+
+    def eventFilter(self, _window: QObject, event: QEvent) -> bool:
+        if event.type() != QEvent.Type.UpdateRequest or not self._timer.isActive():
+            return False
+        # Asked for again in a millisecond: Qt takes it for done, and asks for none meanwhile.
+        self._held = True
+        return True

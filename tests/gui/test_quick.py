@@ -1,0 +1,211 @@
+"""What keeps the window answering: priorities, garbage, and painting once instead of twice."""
+
+import gc
+import subprocess
+import sys
+import weakref
+
+import pytest
+from qtpy.QtCore import QEvent, QObject
+from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
+
+from slideviz.gui.bar import QuietBar
+from slideviz.gui.canvas import View3D
+from slideviz.gui.tidy import YOUNG, Tidy
+
+
+class Painted(QObject):
+    """Counts what is painted."""
+
+    def __init__(self, *widgets):
+        super().__init__()
+        self.widgets = []
+        for widget in widgets:
+            widget.installEventFilter(self)
+
+    def eventFilter(self, widget, event):  # noqa: N802
+        if event.type() == QEvent.Type.Paint:
+            self.widgets.append(widget)
+        return False
+
+
+def turns(count=30):
+    for _ in range(count):
+        QApplication.processEvents()
+
+
+@pytest.fixture
+def framed_view(qtbot):
+    """A view with a label below it, shown and at rest."""
+    frame = QWidget()
+    layout = QVBoxLayout(frame)
+    frame.view, frame.label = View3D(multi_samples=0), QLabel("before")
+    layout.addWidget(frame.view)
+    layout.addWidget(frame.label)
+    frame.resize(300, 300)
+    qtbot.addWidget(frame, before_close_func=lambda one: one.view.close())
+    with qtbot.waitExposed(frame):
+        frame.show()
+    qtbot.wait(50)
+    return frame
+
+
+def test_what_tells_of_a_change_is_painted_together_with_the_view(framed_view, qtbot):
+    frame = framed_view
+    painted = Painted(frame, frame.view, frame.label)
+    for order in (0, 1):
+        painted.widgets.clear()
+        if order:
+            frame.view.render()
+        frame.label.update()
+        if not order:
+            frame.view.render()
+        assert not painted.widgets, "not at once"
+        qtbot.waitUntil(lambda: frame.view in painted.widgets)
+        turns()
+        assert painted.widgets.count(frame) == 1, "the window went to the screen once"
+        assert painted.widgets.count(frame.label) == 1
+        assert painted.widgets.count(frame.view) == 1
+
+
+def test_a_window_is_painted_though_its_view_goes_before_it_was(framed_view, qtbot):
+    frame = framed_view
+    painted = Painted(frame.label)
+    frame.view._one_paint._timer.setInterval(10**6)
+    frame.view.render()
+    frame.label.update()
+    turns()
+    assert not painted.widgets, "it waits for the view"
+    frame.view.close()
+    qtbot.waitUntil(lambda: frame.label in painted.widgets)
+
+
+def test_a_closed_view_names_nothing_of_qt_that_is_gone(framed_view):
+    view = framed_view.view
+    surface = view._surface
+    assert surface is not None
+    known = sys.getrefcount(surface)
+    view.close()
+    assert view._surface is None
+    assert sys.getrefcount(surface) == known - 1
+    view.close()
+
+
+def test_a_progress_bar_is_painted_in_the_next_turn(qtbot):
+    bar = QuietBar()
+    bar.setRange(0, 1000)
+    qtbot.addWidget(bar)
+    with qtbot.waitExposed(bar):
+        bar.show()
+    turns()
+    painted = Painted(bar)
+    for value in (500, 800):
+        bar.setValue(value)
+        assert not painted.widgets, "not at once"
+        assert bar.value() == value
+    qtbot.waitUntil(lambda: bool(painted.widgets))
+
+
+class Ring:
+    """An object that only a search for garbage ends."""
+
+    def __init__(self):
+        self.itself = self
+
+
+@pytest.fixture
+def tidy(qtbot):
+    made = Tidy()
+    made.start()
+    yield made
+    made.end()
+    assert gc.isenabled()
+
+
+def test_garbage_is_looked_for_in_the_windows_thread_only(tidy, qtbot):
+    assert not gc.isenabled()
+    gc.collect()
+    gone = weakref.ref(Ring())
+    tidy.look()
+    assert gone() is not None, "for little, nobody looks"
+    much = [[] for _ in range(2 * YOUNG)]
+    assert gone() is not None
+    qtbot.waitUntil(lambda: gone() is None)
+    assert len(much) == 2 * YOUNG
+
+
+def test_old_garbage_is_found_too(tidy):
+    ring = Ring()
+    gone = weakref.ref(ring)
+    for _ in range(3):
+        gc.collect()
+    del ring
+    much = [[] for _ in range(2 * YOUNG)]
+    tidy.look()
+    assert gone() is None
+    assert much
+
+
+BACK = """
+import _thread, os, threading, time
+from slideviz.gui import worker
+
+numbers = {}
+
+def wait(name):
+    numbers[name] = threading.get_native_id()
+    time.sleep(60)
+
+_thread.start_new_thread(wait, ("library",))
+threading.Thread(target=wait, args=("python",), daemon=True).start()
+while len(numbers) < 2:
+    time.sleep(0.01)
+def read():
+    mine = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    return [os.getpriority(os.PRIO_PROCESS, numbers[name]) - mine for name in ("library", "python")]
+before = read()
+worker.hold_libraries_back()
+print(before, read(), worker.NICENESS)
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has priorities of threads")
+def test_the_window_goes_before_threads_of_libraries():
+    done = subprocess.run(
+        [sys.executable, "-c", BACK], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert done.stdout.strip() == "[0, 0] [5, 0] 5"
+
+
+NUMERICS = """
+from slideviz.gui import app
+
+app.ready_numerics()
+from threadpoolctl import threadpool_info
+blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
+numpys = [one["num_threads"] for one in blas if "numpy.libs" in one["filepath"]]
+print(len(blas) > len(numpys) > 0, numpys)
+"""
+
+
+def test_numpy_multiplies_in_the_thread_that_asks():
+    done = subprocess.run(
+        [sys.executable, "-c", NUMERICS], capture_output=True, text=True, timeout=120, check=True
+    )
+    apart, threads = done.stdout.strip().split(" ", 1)
+    if apart != "True":
+        pytest.skip("NumPy and SciPy share a BLAS here")
+    assert set(threads.strip("[]").split(", ")) == {"1"}
+
+
+def test_the_warm_up_stands_back(window, qtbot, monkeypatch):
+    from slideviz.gui import warm
+
+    order = []
+    monkeypatch.setattr(warm, "stand_back", lambda: order.append("back"))
+    monkeypatch.setattr(warm.warmup, "warm_up", lambda *_: order.append("warm"))
+    window.warm_up.start()
+    qtbot.waitUntil(lambda: len(order) == 2)
+    assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"
+    gc.unfreeze()
