@@ -15,17 +15,10 @@ from qtpy.QtWidgets import QApplication
 from vtkmodules.vtkRenderingCore import vtkProp
 
 from slideviz.gui.one_paint import OnePaint
+from slideviz.view.pieces import PART_CELLS, portions
 
-PART_CELLS = 10_000
-"""Faces that are handed to the graphics in one turn."""
 ONE_LIGHT = 0.95
 """How bright one light is that stands for five."""
-
-
-def _cells_of(actor: vtkProp) -> int:
-    """Return how many cells an actor draws; 0 for letters and the like."""
-    data = getattr(getattr(actor, "mapper", None), "dataset", None)
-    return 0 if data is None else int(data.GetNumberOfCells())
 
 
 def one_light() -> pv.Light:
@@ -78,18 +71,7 @@ class View3D(QtInteractor):
         """
         while self._veiled:
             self._unveil_next()
-        parts: list[list[vtkProp]] = [[]]
-        cells = 0
-        for actor in self.renderer.actors.values():
-            if not actor.GetVisibility():
-                continue
-            size = _cells_of(actor)
-            if cells and cells + size > PART_CELLS:
-                parts.append([])
-                cells = 0
-            cells += size
-            parts[-1].append(actor)
-        self._veiled = parts[1:]
+        self._veiled = portions(self.renderer.actors.values(), PART_CELLS)[1:]
         self.render()
 
     def _veil(self) -> None:

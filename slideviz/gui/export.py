@@ -5,14 +5,13 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from qtpy.QtCore import QObject, Qt
-from qtpy.QtWidgets import QApplication
+from qtpy.QtCore import QObject
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
 from slideviz.gui.export_film import FilmDialog
 from slideviz.gui.export_picture import LETTERS, PictureDialog
-from slideviz.gui.pixmaps import copy_image, to_image
+from slideviz.gui.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.view import changes, jobs_export
 from slideviz.view.figure import Figure
 from slideviz.view.figure_vector import MOST_CELLS, SUFFIXES, write_vector
@@ -37,12 +36,7 @@ class Exports(QObject):
 
     def _studio(self) -> Studio:
         viewing = self.window.viewing
-        # A large mesh takes a second or two.
-        QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
-        try:
-            return Studio(self._session, viewing.surfaces, viewing.scene)
-        finally:
-            QApplication.restoreOverrideCursor()
+        return Studio(self._session, viewing.surfaces, viewing.scene)
 
     # Pictures --------------------------------------------------------------------------
 
@@ -68,10 +62,11 @@ class Exports(QObject):
 
     def _write_picture(self, studio: Studio, figure: Figure, path: Path) -> None:
         try:
-            if path.suffix.lower() in SUFFIXES:
-                write_vector(studio, figure, path)
-            else:
-                studio.write(figure, path)
+            with wait_cursor():
+                if path.suffix.lower() in SUFFIXES:
+                    write_vector(studio, figure, path)
+                else:
+                    studio.write(figure, path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return
@@ -86,7 +81,7 @@ class Exports(QObject):
         larger = max(COPIED_WIDTH / width, 1.0)
         size = round(larger * width), round(larger * height)
         shown = self._session.view
-        with self._studio() as studio:
+        with self._studio() as studio, wait_cursor():
             figure = Figure(
                 size,
                 legend=shown.legend,

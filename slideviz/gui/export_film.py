@@ -19,16 +19,20 @@ from qtpy.QtWidgets import (
 from slideviz.gui.bar import QuietBar
 from slideviz.gui.film_form import FilmForm
 from slideviz.gui.pixmaps import drawn_for, fitted, framed, to_image
-from slideviz.view import changes
+from slideviz.gui.turns import Turns, raise_again
+from slideviz.view.exposure import Drawn
 from slideviz.view.figure import Figure
-from slideviz.view.film import Drawn, film_of
+from slideviz.view.film import filming_of
+from slideviz.view.pieces import Beside
+from slideviz.view.reel import Reel
+from slideviz.view.scene import Scene
 from slideviz.view.studio import Studio
 
 PREVIEW = (360, 225)
 
 
 class FilmDialog(QDialog):
-    """Asks how a film is made and makes it, one image in each turn of the event loop.
+    """Asks how a film is made and makes it, a piece in each turn of the event loop.
 
     Parameters
     ----------
@@ -53,8 +57,12 @@ class FilmDialog(QDialog):
         self.setWindowTitle("Export film")
         self.studio = studio
         self._ask = ask
-        self._film: Generator[Drawn, None, None] | None = None
         self._file: Path | None = None
+        self._turns, self._previewing = Turns(self), Turns(self)
+        self._turns.came.connect(self._came)
+        self._turns.done.connect(self._done)
+        self._turns.failed.connect(self._failed)
+        self._previewing.failed.connect(raise_again)
         self.form = FilmForm(studio)
         self.form.changed.connect(self._changed)
         outer = QVBoxLayout(self)
@@ -66,8 +74,7 @@ class FilmDialog(QDialog):
         self.bar = QuietBar()
         outer.addWidget(self.bar)
         outer.addWidget(self._make_buttons())
-        self._turn, self._soon = QTimer(self), QTimer(self)
-        self._turn.timeout.connect(self._pull)
+        self._soon = QTimer(self)
         self._soon.setSingleShot(True)
         self._soon.setInterval(120)
         self._soon.timeout.connect(self._draw)
@@ -111,25 +118,26 @@ class FilmDialog(QDialog):
         self._soon.start()
 
     def _draw(self) -> None:
-        """Draw the first and the last image, from one place."""
-        if self._film is not None:
-            return
-        whole = self.studio.session
-        figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
-        self._pose(figure)
-        for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
-            self.studio.session = changes.show_frame(whole, frame)
-            image = to_image(self.studio.image(figure, aim=False))
-            label.setPixmap(framed(fitted(image, PREVIEW)))
-        self.studio.session = whole
+        if not self.filming:
+            self._previewing.start(self._drawing())
 
-    def _pose(self, figure: Figure) -> Any:
+    def _drawing(self) -> Generator[object, Any, None]:
+        """Draw the first and the last image, from one place, in pieces."""
+        figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
+        yield from self._pose(figure)
+        for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
+            pixels = yield from self.studio.picturing(figure, aim=False, frame=frame)
+            label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
+
+    def _pose(self, figure: Figure) -> Generator[object, Any, Scene]:
         """Return the scene as the film sees it: the step that needs most room is seen whole."""
-        whole = self.studio.session
-        widest = max(range(self.form.frames), key=lambda k: whole.frames[k].mesh.extent)
-        self.studio.session = changes.show_frame(whole, widest)
-        scene = self.studio.pose(figure)
-        self.studio.session = whole
+        yield from self.studio.arranging()
+        frames = self.studio.session.frames
+        widest = yield Beside(
+            lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent)
+        )
+        scene = self.studio.pose(figure, widest)
+        yield None
         return scene
 
     # Filming ---------------------------------------------------------------------------
@@ -137,55 +145,44 @@ class FilmDialog(QDialog):
     @property
     def filming(self) -> bool:
         """Tell whether a film is being made."""
-        return self._film is not None
+        return self._turns.busy
 
     def _start(self) -> None:
         file = self._ask(self.form.kind.currentData())
         if file is None:
             return
-        figure, whole = self.form.figure, self.studio.session
-        scene = self._pose(figure)
+        self._previewing.stop()
         self._file = file
-        self._film = film_of(
-            figure.showing(whole),
-            self.studio.surfaces,
-            file,
-            self.form.reel,
-            like=scene,
-            overwrite=True,
-        )
+        self._turns.start(self._filming(file, self.form.figure, self.form.reel))
         self._show_filming(True)
-        self._turn.start(0)
 
-    def _pull(self) -> None:
-        """Draw one image."""
-        assert self._film is not None
-        try:
-            drawn = next(self._film)
-        except StopIteration:
-            self._end()
-            self.made.emit(self._file)
-            self.accept()
-        except Exception as error:
-            # Whatever it is: a generator that raised would look like one that is done.
-            self._end()
-            self.failed.emit(error)
-        else:
-            self.bar.setRange(0, drawn.total)
-            self.bar.setValue(drawn.done)
-            self.words.setText(f"Image {drawn.done} of {drawn.total} of {self._file.name}")
+    def _filming(self, file: Path, figure: Figure, reel: Reel) -> Generator[object, Any, None]:
+        session = figure.showing(self.studio.session)
+        scene = yield from self._pose(figure)
+        yield from filming_of(session, self.studio.surfaces, file, reel, like=scene, overwrite=True)
+
+    def _came(self, drawn: Drawn) -> None:
+        self.bar.setRange(0, drawn.total)
+        self.bar.setValue(drawn.done)
+        self.words.setText(f"Image {drawn.done} of {drawn.total} of {self._file.name}")
+
+    def _done(self, _: object) -> None:
+        self._end()
+        self.made.emit(self._file)
+        self.accept()
+
+    def _failed(self, error: Exception) -> None:
+        self._end()
+        self.failed.emit(error)
 
     def cancel(self) -> None:
         """Stop filming, if it goes on; no file is left."""
-        if self._film is not None:
-            film = self._film
+        if self.filming:
+            self._turns.stop()
             self._end()
-            film.close()
             self.stopped.emit()
 
     def _end(self) -> None:
-        self._turn.stop()
-        self._film = None
         self._show_filming(False)
         self._changed()
 
@@ -200,5 +197,6 @@ class FilmDialog(QDialog):
         """Close; a film that goes on is stopped."""
         self.cancel()
         self._soon.stop()
+        self._previewing.stop()
         super().done(result)
         self.studio.close()

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Generator
 from dataclasses import asdict, replace
+from typing import Any
 
 from qtpy.QtCore import QSize, Qt, QTimer
 from qtpy.QtWidgets import (
@@ -22,7 +24,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.choice import Choice
-from slideviz.gui.pixmaps import copy_image, drawn_for, fitted, framed, to_image
+from slideviz.gui.pixmaps import copy_image, drawn_for, fitted, framed, to_image, wait_cursor
+from slideviz.gui.turns import Turns, raise_again
 from slideviz.view.figure import BACKGROUNDS, Figure, words_of_size
 from slideviz.view.figure_vector import MOST_CELLS
 from slideviz.view.offscreen import LARGEST, SMALLEST, font_scale
@@ -96,6 +99,8 @@ class PictureDialog(QDialog):
         self._timer.setSingleShot(True)
         self._timer.setInterval(PREVIEW_MS)
         self._timer.timeout.connect(self._draw)
+        self._turns = Turns(self)
+        self._turns.failed.connect(raise_again)
         self._take(kept)
         self._changed()
 
@@ -258,11 +263,20 @@ class PictureDialog(QDialog):
     # Picture ---------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        image = to_image(self.studio.image(self.figure.within(drawn_for(self.studio, PREVIEW))))
-        self.preview.setPixmap(framed(fitted(image, PREVIEW)))
+        self._turns.start(self._drawing())
+
+    def _drawing(self) -> Generator[object, Any, None]:
+        """Draw the preview in pieces: of a large mesh, all at once would take a second."""
+        figure = self.figure.within(drawn_for(self.studio, PREVIEW))
+        pixels = yield from self.studio.picturing(figure)
+        self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     def _copy(self) -> None:
-        copy_image(to_image(self.studio.image(self.figure)))
+        if self._turns.busy:  # a preview in pieces: nothing else may be drawn meanwhile
+            self._turns.stop()
+            self._timer.start()
+        with wait_cursor():
+            copy_image(to_image(self.studio.image(self.figure)))
         self.words.setText("Copied to the clipboard.")
 
     def showEvent(self, event) -> None:
@@ -273,6 +287,7 @@ class PictureDialog(QDialog):
     def done(self, result: int) -> None:
         """Close; nothing is drawn any more."""
         self._timer.stop()
+        self._turns.stop()
         super().done(result)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
@@ -50,6 +53,16 @@ def framed(image: QImage) -> QPixmap:
     painter.drawRect(0, 0, out.width() - 1, out.height() - 1)
     painter.end()
     return out
+
+
+@contextmanager
+def wait_cursor() -> Iterator[None]:
+    """Show that the window does not answer for a moment: a large mesh takes a second or two."""
+    QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+    try:
+        yield
+    finally:
+        QApplication.restoreOverrideCursor()
 
 
 def copy_image(image: QImage) -> None:

@@ -7,14 +7,15 @@ leaves no file. They must be pulled in the thread that may draw.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view.encode import Pixels, Take, writer
+from slideviz.view.encode import Pixels
+from slideviz.view.exposure import Drawn, expose, exposing, told
 from slideviz.view.look import PAPER, Look
 from slideviz.view.moved import Zoom
 from slideviz.view.offscreen import (
@@ -25,6 +26,7 @@ from slideviz.view.offscreen import (
     offscreen,
     write_title,
 )
+from slideviz.view.pieces import Beside, GoingOn, appearing, never
 from slideviz.view.portrait import Portrait
 from slideviz.view.reel import USUAL, Reel, check_film
 from slideviz.view.state import ColourBy, Frame, Session
@@ -33,14 +35,6 @@ from slideviz.view.titles import LETTER_WIDTH, LONGEST, place_words, title_words
 
 if TYPE_CHECKING:
     from slideviz.view.scene import Scene
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """How far a film is: images written, of so many in all."""
-
-    done: int
-    total: int
 
 
 def film(
@@ -102,6 +96,22 @@ def film_of(
 ) -> Generator[Drawn, None, None]:
     """Yield after each image of a film of what a view shows, step by step.
 
+    Parameters and errors as of `filming_of`.
+    """
+    yield from told(filming_of(session, surfaces, file, reel, like=like, overwrite=overwrite))
+
+
+def filming_of(
+    session: Session,
+    surfaces: Sequence[Surface],
+    file: str | Path,
+    reel: Reel = USUAL,
+    *,
+    like: Scene | None = None,
+    overwrite: bool = False,
+) -> Generator[object, Any, None]:
+    """Yield `Drawn` after each image of a film of what a view shows, and between its pieces.
+
     Parameters
     ----------
     session : Session
@@ -131,22 +141,26 @@ def film_of(
     letters = size[0] / (LETTER_WIDTH * LETTERS * font_scale(size))
     longest = LONGEST.format(len(frames) - 1)
     with offscreen(size) as plotter:
+        yield None
+        plotter.render_window.Render()  # begins with the graphics
         scene = Scene(plotter, look, LETTERS * font_scale(size))
         # The camera looks at what is there when the mesh is opened.
-        widest = max(frames, key=lambda frame: frame.mesh.extent)
-        scene.open(_showing(session, widest), surfaces)
+        widest = yield Beside(lambda _: max(frames, key=lambda frame: frame.mesh.extent))
+        yield from scene.opening(_showing(session, widest), surfaces)
         if like is not None:
             scene.set_motion_ghosts(like.motion_ghosts)
             scene.take_camera(like)
+        yield from appearing(plotter)
 
-        def draw(position: float) -> Pixels:
-            shot = shot_at(frames, position)
+        def draw(position: float) -> Generator[object, Any, Pixels]:
+            shot = yield Beside(lambda going_on: shot_at(frames, position, going_on))
             scene.update(_showing(session, shot.frame))
             words = title_words(session, shot.frame, shot.place, letters, longest)
             write_title(plotter, words, look, CAPTION_AT)
+            yield None
             return image_of(plotter)
 
-        yield from expose(len(frames), path, reel, draw)
+        yield from exposing(len(frames), path, reel, draw)
 
 
 def _showing(session: Session, frame: Frame) -> Session:
@@ -178,43 +192,13 @@ def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bo
     check_film(file, reel, frames=len(frames), overwrite=overwrite)
 
 
-def expose(
-    frames: int, file: Path, reel: Reel, draw: Callable[[float], Pixels]
-) -> Generator[Drawn, None, None]:
-    """Yield after each image that the encoder took.
-
-    Parameters
-    ----------
-    frames : int
-        The undeformed mesh and every step.
-    file : Path
-    reel : Reel
-    draw : callable
-        Draws a position in the film: the number of a step, or something between two.
-    """
-    total, pace = reel.count(frames), reel.pace(frames)
-    samples = sorted({0, frames // 2, frames - 1})
-    take = Take(reel.pixels(file), total, pace, lambda: [draw(float(at)) for at in samples])
-    with writer(file, take) as add:
-        for done, position in enumerate(_positions(frames - 1, reel.between), start=1):
-            add(draw(position), 1.0 / pace if done < total else max(reel.hold, 1.0 / pace))
-            yield Drawn(done, total)
-
-
-def _positions(steps: int, between: int) -> Iterator[float]:
-    """Yield the steps and what lies between them."""
-    for step in range(steps):
-        yield from (step + k / (between + 1) for k in range(between + 1))
-    yield float(steps)
-
-
-def shot_at(frames: Sequence[Frame], position: float) -> Shot:
+def shot_at(frames: Sequence[Frame], position: float, going_on: GoingOn = never) -> Shot:
     """Return a step, or, between two steps, a mesh on the way from one to the next."""
     step, steps = int(position), len(frames) - 1
     words, place = _words(position, steps), place_words(position, steps)
     if position == step:
         return Shot(frames[step], words, place)
-    frame = _blend(frames[step], frames[step + 1], position - step, frames[0])
+    frame = _blend(frames[step], frames[step + 1], position - step, frames[0], going_on)
     return Shot(frame, f"{words}, interpolated", place)
 
 
@@ -224,9 +208,9 @@ def _words(position: float, steps: int) -> str:
     return f"step {position:.{0 if position == int(position) else 2}f} of {steps}"
 
 
-def _blend(start: Frame, end: Frame, part: float, first: Frame) -> Frame:
+def _blend(start: Frame, end: Frame, part: float, first: Frame, going_on: GoingOn) -> Frame:
     """Return the mesh on the way from one frame to the next, with its own quality."""
     points = (1.0 - part) * start.mesh.points + part * end.mesh.points
     mesh = end.mesh.with_points(points)
-    found = quality(mesh, reference=first.mesh, metric=end.quality.metric)
+    found = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
     return Frame(mesh, found, end.step)

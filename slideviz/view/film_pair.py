@@ -10,7 +10,8 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.view.encode import Pixels
-from slideviz.view.film import Drawn, Shot, expose, require_steps, shot_at
+from slideviz.view.exposure import Drawn, expose
+from slideviz.view.film import Shot, require_steps, shot_at
 from slideviz.view.legend import STRIP
 from slideviz.view.look import PAPER
 from slideviz.view.moved import Zoom, lengths, tiny_motion

@@ -95,6 +95,11 @@ def write_title(
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
 
 
+def resize(plotter: Any, size: tuple[int, int]) -> None:
+    """Give the next image of a plotter another size; pyvista's way would draw one at once."""
+    plotter.render_window.SetSize(*size)
+
+
 def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
     """Return what the plotter shows, (height, width, 3), or 4 when ``transparent``."""
     plotter.render()

@@ -7,7 +7,7 @@ that owns the plotter.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,11 @@ class Scene:
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh; the camera sees all of it."""
+        for _ in self.opening(session, surfaces):
+            pass
+
+    def opening(self, session: Session, surfaces: Sequence[Surface]) -> Iterator[None]:
+        """Draw another mesh, and yield between the pieces of that."""
         self.clear()
         if session.mesh is None:
             return
@@ -99,6 +104,7 @@ class Scene:
         for layer in self.layers:
             layer.open(session, surfaces)
             layer.update(None, session)
+            yield
         self.look_from("+z" if session.mesh.dim == 2 else "iso")
 
     def clear(self) -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.mesh.atomic import atomic_write
-from slideviz.view.changes import seen_beside
+from slideviz.view.changes import seen_beside, show_frame
 from slideviz.view.figure import GAP, TITLE_ROOM, Figure, panes, title_of
 from slideviz.view.look import PAPER, Look
 from slideviz.view.offscreen import (
@@ -23,8 +23,10 @@ from slideviz.view.offscreen import (
     check_size,
     image_of,
     offscreen,
+    resize,
     write_title,
 )
+from slideviz.view.pieces import appearing, whole
 from slideviz.view.state import Session
 from slideviz.view.surfaces import Surface
 
@@ -49,17 +51,35 @@ class Studio:
     def __init__(
         self, session: Session, surfaces: Sequence[Surface], like: Scene | None = None
     ) -> None:
-        from slideviz.view.scene import Scene
-
         self.session = session
         self.surfaces = surfaces
         self.like = like
         self._stack = ExitStack()
+        self._plotter: Any = None
+        self._scene: Any = None
+        self._making = self._make()
+
+    def arranging(self) -> Iterator[None]:
+        """Yield between the pieces of what has to be done before the first picture.
+
+        Where nobody pulls all of it, the first picture does the rest at once.
+        """
+        # Not "yield from": whoever stops pulling would end it.
+        for _ in self._making:
+            yield
+
+    def _make(self) -> Iterator[None]:
+        from slideviz.view.scene import Scene
+
         self._plotter = self._stack.enter_context(offscreen((640, 400)))
+        yield
+        self._plotter.render_window.Render()  # begins with the graphics
+        yield
         self._scene = Scene(self._plotter, PAPER)
-        self._scene.open(Figure().showing(session), surfaces)
-        if like is not None:
-            self._scene.set_motion_ghosts(like.motion_ghosts)
+        yield from self._scene.opening(Figure().showing(self.session), self.surfaces)
+        if self.like is not None:
+            self._scene.set_motion_ghosts(self.like.motion_ghosts)
+        yield from appearing(self._plotter)
 
     def __enter__(self) -> Studio:
         return self
@@ -84,38 +104,59 @@ class Studio:
             return None
         return seen_beside(self.session)
 
-    def image(self, figure: Figure, aim: bool = True) -> Pixels:
+    def image(self, figure: Figure) -> Pixels:
         """Return the picture, (height, width, 3), or 4 when it is transparent.
-
-        Without ``aim`` the camera stays where it was for the last picture.
 
         Raises
         ------
         SlidevizError
             The size cannot be drawn.
         """
+        return whole(self.picturing(figure))
+
+    def picturing(
+        self, figure: Figure, aim: bool = True, frame: int | None = None
+    ) -> Generator[None, None, Pixels]:
+        """Return what `image` does, and yield between the pieces of that.
+
+        Nothing else may be drawn meanwhile.
+
+        Parameters
+        ----------
+        figure : Figure
+        aim : bool
+            Whether to aim the camera; else it stays where it was for the last picture.
+        frame : int, optional
+            Another step than the session shows.
+        """
         check_size(figure.size)
+        shown = self.session if frame is None else show_frame(self.session, frame)
+        yield from self.arranging()
         other = self.beside if figure.both else None
         if other is None:
-            return self._pane(self.session, figure, aim)
+            return (yield from self._pane(shown, figure, aim))
         gap = max(round(GAP * figure.scale), 1)
         first, second = panes(figure, gap)
         swapped = self.session.view.swapped
-        pair = (other, self.session) if swapped else (self.session, other)
-        left = self._pane(pair[0], first, aim)
+        pair = (other, shown) if swapped else (shown, other)
+        left = yield from self._pane(pair[0], first, aim)
         # The same camera, so that a length is as long in both.
-        right = self._pane(pair[1], second, aim=False)
+        right = yield from self._pane(pair[1], second, aim=False)
         between = np.repeat(left[:, -1:], gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
-    def pose(self, figure: Figure) -> Scene:
+    def pose(self, figure: Figure, frame: int | None = None) -> Scene:
         """Return the scene, its camera and colours as for a picture; for a film like it."""
-        self._prepare(self.session, figure)
-        return self._scene
+        shown = self.session if frame is None else show_frame(self.session, frame)
+        for _ in self.arranging():
+            pass
+        self._prepare(shown, figure)
+        scene: Scene = self._scene
+        return scene
 
     def window(self, figure: Figure) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return from where to where a picture of a 2D mesh reaches in x and in y."""
-        self._prepare(self.session, figure)
+        self.pose(figure)
         camera, (width, height) = self._plotter.camera, figure.size
         unit = 2.0 * camera.parallel_scale / height
         found = []
@@ -144,8 +185,11 @@ class Studio:
         with atomic_write(file) as out:
             out.write(data.getvalue())
 
-    def _pane(self, session: Session, figure: Figure, aim: bool = True) -> Pixels:
+    def _pane(
+        self, session: Session, figure: Figure, aim: bool = True
+    ) -> Generator[None, None, Pixels]:
         self._prepare(session, figure, aim)
+        yield
         plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
         if figure.headed and session.frame is not None:
@@ -161,7 +205,7 @@ class Studio:
 
     def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
         plotter, scene = self._plotter, self._scene
-        plotter.window_size = list(figure.size)
+        resize(plotter, figure.size)
         scene.stage.font_scale = figure.scale
         scene.stage.has_legend = figure.legend
         scene.stage.has_plate = figure.background != "transparent"

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,8 @@ from slideviz.gui.export_picture import PictureDialog
 from slideviz.gui.film_form import length_words
 from slideviz.gui.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, jobs, jobs_export
+from slideviz.view import changes, exposure, jobs, jobs_export, pieces
+from slideviz.view import film as film_module
 from slideviz.view.figure import Figure
 from slideviz.view.reel import Reel
 from slideviz.view.studio import Studio
@@ -363,6 +366,77 @@ def test_first_and_last_image_are_previewed(film, qtbot):
     qtbot.waitUntil(lambda: all(not one.pixmap().isNull() for one in film.previews))
     first, last = (one.pixmap().toImage() for one in film.previews)
     assert first != last
+
+
+def test_images_in_between_are_measured_and_written_beside_the_window(
+    ran, film, answers, tmp_path, monkeypatch, qtbot
+):
+    threads = {"measured": set(), "written": set()}
+    measure, write = film_module.quality, exposure.writer
+
+    def spy_quality(*values, **named):
+        threads["measured"].add(threading.current_thread())
+        return measure(*values, **named)
+
+    @contextmanager
+    def spy_writer(*values):
+        with write(*values) as add:
+
+            def spy_add(*image):
+                threads["written"].add(threading.current_thread())
+                add(*image)
+
+            yield spy_add
+
+    monkeypatch.setattr(film_module, "quality", spy_quality)
+    monkeypatch.setattr(exposure, "writer", spy_writer)
+    answers("ask_save", tmp_path / "out.gif")
+    film.form.kind.show_value(".gif")
+    film.form.between.setValue(1)
+    with qtbot.waitSignal(film.made, timeout=30_000):
+        film.make.click()
+    for where in threads.values():
+        assert where
+        assert threading.main_thread() not in where
+
+
+def test_a_preview_appears_in_pieces(opened, qtbot, monkeypatch):
+    monkeypatch.setattr(pieces.portions, "__defaults__", (100,))
+    ticks = []
+    timer = QTimer()
+    timer.timeout.connect(lambda: ticks.append(1))
+
+    def look(dialog):
+        timer.start(0)
+        qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
+        timer.stop()
+        assert len(ticks) > 15, "the event loop went on"
+        before = dialog.preview.pixmap().toImage()
+        dialog.options["title"].toggle()
+        qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != before)
+        return False
+
+    in_dialog(look)
+    opened.window.actions_.by_name["save_picture"].trigger()
+    assert ticks
+
+
+def test_a_copy_while_the_preview_is_drawn_is_whole_and_so_is_the_preview(opened, qtbot):
+    pictures = []
+
+    def look(dialog):
+        qtbot.waitUntil(lambda: dialog._turns.busy)
+        dialog._copy()
+        pictures.append(QApplication.clipboard().image().size())
+        assert dialog.preview.pixmap().isNull()
+        qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
+        pictures.append(dialog.figure.size)
+        return False
+
+    in_dialog(look)
+    opened.window.actions_.by_name["save_picture"].trigger()
+    copied, chosen = pictures
+    assert (copied.width(), copied.height()) == tuple(chosen)
 
 
 def test_one_film_at_a_time(ran, film):
