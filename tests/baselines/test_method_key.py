@@ -112,6 +112,6 @@ def test_the_terminal_names_the_method_and_what_may_help(tmp_path, capsys):
     words = ["run", str(tmp_path / "square.cfg"), "--set", "METHOD=idw", "--set", "STEPS=1"]
     run([*words, "-o", str(tmp_path / "out.su2")])
     told = capsys.readouterr()
-    assert "1 steps, method idw, sliding ps, periodic moving" in told.out
+    assert "1 step, method idw, sliding ps, periodic moving" in told.out
     assert "inverted" in told.err
     assert "METHOD= rbf" in told.err
