@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import gc
 import logging
 import os
@@ -25,11 +23,6 @@ from slideviz.gui.worker import hold_libraries_back
 
 WARM_UP_MS = 300
 """The window is drawn first: compilation slows everything down a little."""
-
-M_MMAP_THRESHOLD = -3
-"""As in ``malloc.h``."""
-LARGE_BYTES = 1 << 20
-"""Arrays from this size on are large: those of every cell of a large mesh."""
 
 SWITCH_S = 0.00005
 """How long a thread may keep the interpreter to itself when another wants it."""
@@ -104,7 +97,6 @@ def be_quick() -> Tidy:
     Tidy
         Looks for garbage from now on; it belongs to the application.
     """
-    _give_memory_back()
     # The modules live as long as the window, and need not be searched for garbage.
     gc.collect()
     gc.freeze()
@@ -114,17 +106,6 @@ def be_quick() -> Tidy:
     tidy = Tidy(QCoreApplication.instance())
     tidy.start()
     return tidy
-
-
-def _give_memory_back() -> None:
-    """Let the system have the memory of large arrays as soon as they are gone.
-
-    GNU's C library keeps more and more of it once large arrays were freed, up to 32 MB each: with
-    20 steps of 240,000 cells a tenth of all.
-    """
-    if sys.platform == "linux":
-        with contextlib.suppress(AttributeError, OSError):
-            ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE_BYTES)
 
 
 def _folder(place: QStandardPaths.StandardLocation) -> Path:
