@@ -127,7 +127,7 @@ def test_what_fails_later_has_a_line_and_the_reason_once(square, tmp_path, capsy
     def through(case, mesh):
         raise DeformError("the motion puts BLOCK through RIGHT")
 
-    monkeypatch.setattr("slideviz.view.compare.make_plan", through)
+    monkeypatch.setattr("slideviz.view.compare.combinations.make_plan", through)
     assert run([*argv, "-o", str(out), "--no-pictures"]) == 1
     printed = capsys.readouterr().out
     assert "2 combinations" in printed
@@ -175,7 +175,7 @@ def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_pa
 
 def test_the_help_names_every_method(capsys):
     from slideviz.case.model import PERIODIC_MODES
-    from slideviz.view.compare import METHODS
+    from slideviz.view.compare.combinations import METHODS
 
     assert run(["compare", "--help"]) == 0
     text = capsys.readouterr().out

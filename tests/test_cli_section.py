@@ -12,7 +12,7 @@ from slideviz.case.samples import sample, write_sample
 from slideviz.case.view_keys import MAPS as WINDOW_MAPS
 from slideviz.cli import run
 from slideviz.cli.section_options import COLOURS, MAPS, cylinder, glued, plane
-from slideviz.view.section_paint import PAINT_BY
+from slideviz.view.sections.paint import PAINT_BY
 from tests.builders import cube, passage, square
 
 
@@ -103,7 +103,7 @@ def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, 
 
 
 def title_of(folder, monkeypatch, mesh, *options):
-    from slideviz.view import section_picture
+    from slideviz.view.sections import picture as section_picture
 
     seen = []
     monkeypatch.setattr(section_picture, "write_title", lambda *words: seen.append(words))

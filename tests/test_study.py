@@ -10,7 +10,7 @@ from PIL import Image
 from slideviz.case.cfg import set_key
 from slideviz.case.model import PERIODIC_MODES, Case
 from slideviz.case.samples import SAMPLES, VARIANTS
-from slideviz.view.compare import METHODS
+from slideviz.view.compare.combinations import METHODS
 from tools.study import __main__ as study
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense

@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.cli import DONE, INVERTED
     from slideviz.cli.report import run_report, save_history, save_json
     from slideviz.errors import CaseError
-    from slideviz.view.moved import require_detail
+    from slideviz.view.motions.moved import require_detail
 
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
     if arguments.picture:
-        from slideviz.view.picture import SIZE, picture
+        from slideviz.view.pictures.picture import SIZE, picture
 
         named = replace(last.mesh, name=output.name)
         size = arguments.picture_size or SIZE
@@ -87,8 +87,8 @@ def _require_places(arguments: argparse.Namespace, output: Path, qualities: Path
 
     require_mesh_file(output)
     if arguments.picture:
-        from slideviz.view.offscreen import check_png, check_size
-        from slideviz.view.picture import SIZE
+        from slideviz.view.pictures.offscreen import check_png, check_size
+        from slideviz.view.pictures.picture import SIZE
 
         check_png(arguments.picture)
         check_size(arguments.picture_size or SIZE)

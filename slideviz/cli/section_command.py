@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
-    from slideviz.view.section import Section
+    from slideviz.view.sections.model import Section
 
 
 def section(arguments: argparse.Namespace) -> int:
@@ -23,11 +23,11 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
     from slideviz.view.copies import show_passages
-    from slideviz.view.polygons import joined
-    from slideviz.view.section_around import surroundings
-    from slideviz.view.section_cut import Cutter
-    from slideviz.view.section_paint import paint
-    from slideviz.view.section_picture import SectionStyle, require_picture_name, section_picture
+    from slideviz.view.drawing.polygons import joined
+    from slideviz.view.sections.around import surroundings
+    from slideviz.view.sections.cut import Cutter
+    from slideviz.view.sections.paint import paint
+    from slideviz.view.sections.picture import SectionStyle, require_picture_name, section_picture
 
     _check_usage(arguments)
     require_picture_name(arguments.output)

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from slideviz.view.section import Section
+    from slideviz.view.sections.model import Section
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
 COLOURS = ("size-skew", "size", "skew", "displacement")
-"""As of `slideviz.case.view_keys` and `slideviz.view.section_paint`, which load too much here."""
+"""As of `slideviz.case.view_keys` and `slideviz.view.sections.paint`, which load too much here."""
 
 MOST_COPIES = 100
 """On each side: more could neither be told apart nor be drawn in reasonable time."""
@@ -181,7 +181,7 @@ def _section(
 ) -> Section:
     """Return a section, whose mistakes are those of the command line."""
     from slideviz.errors import CaseError
-    from slideviz.view.section import Section
+    from slideviz.view.sections.model import Section
 
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0
     a, b, c, *_ = *direction, 0.0, 0.0, 0.0

@@ -7,13 +7,13 @@ from functools import partial
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMainWindow, QMenu
 
-from slideviz.gui.beside import fill_compare
-from slideviz.gui.icons import icon
+from slideviz.gui.canvas.beside import fill_compare
 from slideviz.gui.theme import THEMES
-from slideviz.gui.tips import tip_of, wrapped
 from slideviz.gui.tool_bar import ToolBar
-from slideviz.view import changes
-from slideviz.view.state import Session
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import tip_of, wrapped
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
 
 CUTS = {
     3: {"add_plane": "&Cut by a plane", "add_cylinder": "Cut by a c&ylinder"},

@@ -15,9 +15,9 @@ from qtpy.QtWidgets import QApplication
 from threadpoolctl import ThreadpoolController
 
 from slideviz.gui.faults import caught, crash_log
-from slideviz.gui.icons import logo
 from slideviz.gui.tidy import Tidy
 from slideviz.gui.warm import prepare_drawing
+from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
 from slideviz.gui.worker import hold_libraries_back
 

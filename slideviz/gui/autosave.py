@@ -24,9 +24,9 @@ from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.worker import JobRunner
-from slideviz.view.keep import Camera, keep_view
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.view.session.keep import Camera, keep_view
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 DELAY_MS = 5000
 """The session is written so long after the first change that is not in the file yet."""

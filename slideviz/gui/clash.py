@@ -7,9 +7,9 @@ import logging
 from qtpy.QtCore import QObject, QTimer
 
 from slideviz.gui.worker import JobRunner
-from slideviz.view import clashes
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.view.motions import clashes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 DELAY_MS = 200
 log = logging.getLogger("slideviz")

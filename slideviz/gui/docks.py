@@ -9,17 +9,17 @@ from typing import Any
 from qtpy.QtCore import QEvent, QObject, Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
-from slideviz.gui.boundaries import BoundariesPanel
-from slideviz.gui.curves import CurvesPanel
-from slideviz.gui.display import DisplayPanel
-from slideviz.gui.histogram import HistogramPanel
-from slideviz.gui.log import LogPanel
-from slideviz.gui.method import MethodPanel
-from slideviz.gui.motions import MotionPanel
+from slideviz.gui.panels.boundaries import BoundariesPanel
+from slideviz.gui.panels.curves import CurvesPanel
+from slideviz.gui.panels.display import DisplayPanel
+from slideviz.gui.panels.histogram import HistogramPanel
+from slideviz.gui.panels.log import LogPanel
+from slideviz.gui.panels.method import MethodPanel
+from slideviz.gui.panels.motions import MotionPanel
+from slideviz.gui.panels.runs import RunsPanel
+from slideviz.gui.panels.sections import sections_panel
+from slideviz.gui.panels.worst import WorstPanel
 from slideviz.gui.run import RunPanel
-from slideviz.gui.runs import RunsPanel
-from slideviz.gui.sections import sections_panel
-from slideviz.gui.worst import WorstPanel
 
 Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea

@@ -13,9 +13,10 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
-from slideviz.view import changes, jobs, jobs_sample
+from slideviz.view import jobs, jobs_sample
 from slideviz.view.formats import left_out
-from slideviz.view.keep import keep_view
+from slideviz.view.session import changes
+from slideviz.view.session.keep import keep_view
 
 log = logging.getLogger("slideviz")
 RECENT = 10

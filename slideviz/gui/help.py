@@ -23,7 +23,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.faults import versions
-from slideviz.gui.icons import logo
+from slideviz.gui.widgets.icons import logo
 
 LOG_LINES = 40
 MOUSE = (

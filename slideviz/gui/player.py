@@ -8,11 +8,11 @@ from qtpy.QtCore import QElapsedTimer, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
-from slideviz.gui.icons import icon
 from slideviz.gui.step_numbers import Results, result_parts
-from slideviz.view import changes
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.gui.widgets.icons import icon
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 FILM_MS = 3000
 """What all steps take together at the usual speed, where no limit for one step is reached."""

@@ -14,7 +14,7 @@ from slideviz.gui.autosave import Autosave, Found, find_sessions
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.faults import old_crashes
 from slideviz.view import jobs
-from slideviz.view.keep import restored
+from slideviz.view.session.keep import restored
 
 log = logging.getLogger("slideviz")
 

@@ -14,16 +14,16 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.bar import QuietBar
-from slideviz.gui.icons import icon
-from slideviz.gui.tips import wrapped
-from slideviz.view import changes
+from slideviz.gui.widgets.bar import QuietBar
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import wrapped
 from slideviz.view.advice import ended, help_for, inverted_words
-from slideviz.view.changes import is_missing
+from slideviz.view.drawing.look import Look
 from slideviz.view.jobs import Doing
-from slideviz.view.look import Look
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.view.session import changes
+from slideviz.view.session.changes import is_missing
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 LONG = 100
 SETTINGS = "settings"

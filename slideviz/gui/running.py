@@ -11,11 +11,12 @@ from qtpy.QtCore import QObject, Signal
 
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.worker import JobRunner
-from slideviz.view import changes, jobs
+from slideviz.view import jobs
 from slideviz.view.advice import help_for, inverted_words, notes_of, warnings_of
 from slideviz.view.jobs import Doing
-from slideviz.view.state import Frame, Run
-from slideviz.view.store import Store
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame, Run
+from slideviz.view.session.store import Store
 
 log = logging.getLogger("slideviz")
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from slideviz.case.model import Case, Motion, Rotate, Translate
 from slideviz.case.samples import sample, write_sample
 from slideviz.gui.shots import settle
-from slideviz.view import changes
-from slideviz.view.section import Section
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -78,7 +78,7 @@ def roles(window: MainWindow, place: Path) -> None:
     """Bring up a blade passage whose roles are guesses, and a menu that gives another one."""
     from qtpy.QtCore import QPoint
 
-    from slideviz.gui.boundaries import boundary_menu
+    from slideviz.gui.panels.boundaries import boundary_menu
 
     _open(window, _stator(place).with_name("mesh.su2"))
     store = window.store
@@ -158,9 +158,9 @@ def film_of_passage(path: Path) -> Path:
     """Write a film of the passage that the dark picture shows, and return its path."""
     from slideviz.mesh.quality import quality as quality_of
     from slideviz.staircase import deform
-    from slideviz.view.film import film
-    from slideviz.view.reel import Reel
-    from slideviz.view.state import Frame
+    from slideviz.view.pictures.film import film
+    from slideviz.view.pictures.reel import Reel
+    from slideviz.view.session.state import Frame
 
     made = sample("passage", 24)
     steps = deform(made.case.change(motions=FAR), made.mesh)

@@ -21,8 +21,8 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.cards import SIZE, card
-from slideviz.gui.icons import icon, logo
+from slideviz.gui.widgets.cards import SIZE, card
+from slideviz.gui.widgets.icons import icon, logo
 
 WIDEST = 860
 """Pixels: longer lines would be hard to read."""

@@ -9,7 +9,7 @@ from qtpy.QtGui import QTextDocument
 from qtpy.QtWidgets import QLabel, QSizePolicy
 
 from slideviz.gui.theme import alarm
-from slideviz.view.state import Session
+from slideviz.view.session.state import Session
 
 SEPARATOR = "&nbsp;· "
 """Between the numbers of a step."""

@@ -8,7 +8,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QPalette
 from qtpy.QtWidgets import QApplication, QToolTip
 
-from slideviz.view.look import DARK, LIGHT, Look
+from slideviz.view.drawing.look import DARK, LIGHT, Look
 
 THEMES = ("system", "light", "dark")
 

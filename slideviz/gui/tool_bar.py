@@ -8,9 +8,9 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction
 from qtpy.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
 
-from slideviz.gui.choice import Choice
-from slideviz.view import changes
-from slideviz.view.state import COLOUR_BY, Session
+from slideviz.gui.widgets.choice import Choice
+from slideviz.view.session import changes
+from slideviz.view.session.state import COLOUR_BY, Session
 
 FIRST = ("open", "save_mesh", "save_case", "save_picture")
 SHOWN = ("edges", "undeformed", "motion_ghost", "legend", "perspective")

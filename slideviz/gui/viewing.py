@@ -7,19 +7,20 @@ from __future__ import annotations
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from slideviz.gui.beside import CameraLink, TitleBar, fill_pane
-from slideviz.gui.boundaries import boundary_menu
-from slideviz.gui.canvas import View3D
-from slideviz.gui.hover import CellHover
-from slideviz.view import changes, jobs
-from slideviz.view.cuts import Cuts
-from slideviz.view.ghosts import Ghosts
+from slideviz.gui.canvas.beside import CameraLink, TitleBar, fill_pane
+from slideviz.gui.canvas.canvas import View3D
+from slideviz.gui.canvas.hover import CellHover
+from slideviz.gui.panels.boundaries import boundary_menu
+from slideviz.view import jobs
+from slideviz.view.drawing.look import Look
+from slideviz.view.drawing.panes import choices, close_pane, panes
 from slideviz.view.legend import STRIP
-from slideviz.view.look import Look
-from slideviz.view.panes import choices, close_pane, panes
+from slideviz.view.motions.ghosts import Ghosts
 from slideviz.view.scene import Scene
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.view.sections.cuts import Cuts
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 
 class Viewing(QWidget):

@@ -12,8 +12,8 @@ from qtpy.QtCore import QObject, QTimer, Signal
 
 from slideviz.gui.worker import stand_back
 from slideviz.view import warmup
-from slideviz.view.actors import VALUES
-from slideviz.view.stage import Stage
+from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.stage import Stage
 
 
 def prepare_drawing(view: Any, stage: Stage) -> None:

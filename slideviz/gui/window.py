@@ -13,11 +13,11 @@ from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidge
 from slideviz.gui import theme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
+from slideviz.gui.canvas.cutting import Cutting
 from slideviz.gui.clash import ClashWatch
-from slideviz.gui.cutting import Cutting
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.docks import Docks
-from slideviz.gui.export import Exports
+from slideviz.gui.export.exporter import Exports
 from slideviz.gui.faults import Faults
 from slideviz.gui.files import Files
 from slideviz.gui.help import Help
@@ -27,8 +27,9 @@ from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewing import Viewing
 from slideviz.gui.warm import WarmUp
-from slideviz.view import changes, jobs
-from slideviz.view.store import Store
+from slideviz.view import jobs
+from slideviz.view.session import changes
+from slideviz.view.session.store import Store
 
 log = logging.getLogger("slideviz")
 

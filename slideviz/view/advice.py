@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from slideviz.case.model import Case
 from slideviz.errors import Note
-from slideviz.view.state import Run
+from slideviz.view.session.state import Run
 
 
 def ended(run: Run) -> str:

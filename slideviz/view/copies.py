@@ -11,11 +11,11 @@ from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair, axis_basis, find_pairs, pair_up
+from slideviz.view.drawing.polygons import Polygons
+from slideviz.view.drawing.surfaces import padded
 from slideviz.view.guess import guess_by_name
-from slideviz.view.polygons import Polygons
-from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter
-from slideviz.view.surfaces import padded
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
 
 WHOLE_NUMBER = 1e-3
 """A wheel may miss a whole number of passages by this much."""

@@ -9,20 +9,20 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
-from slideviz.view import pick_cell
 from slideviz.view.copies import keeps, moved
-from slideviz.view.cuts import Cuts
-from slideviz.view.layer_copies import Period, matrices
-from slideviz.view.layer_mark import IN_FRONT
-from slideviz.view.look import LIGHT, SELECTED_COLOUR, Look
-from slideviz.view.polygon_actor import PolygonActor, plain_colour
-from slideviz.view.polygons import Polygons
-from slideviz.view.section import Section
-from slideviz.view.section_paint import Paint
-from slideviz.view.stage import Stage
-from slideviz.view.state import COLOUR_BY, Session
-from slideviz.view.twins import Twins
-from slideviz.view.unroll import Label, flat_labels, flatten, plane_axes
+from slideviz.view.drawing import pick_cell
+from slideviz.view.drawing.look import LIGHT, SELECTED_COLOUR, Look
+from slideviz.view.drawing.polygon_actor import PolygonActor, plain_colour
+from slideviz.view.drawing.polygons import Polygons
+from slideviz.view.drawing.stage import Stage
+from slideviz.view.layers.copies import Period, matrices
+from slideviz.view.layers.mark import IN_FRONT
+from slideviz.view.motions.twins import Twins
+from slideviz.view.sections.cuts import Cuts
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.paint import Paint
+from slideviz.view.sections.unroll import Label, flat_labels, flatten, plane_axes
+from slideviz.view.session.state import COLOUR_BY, Session
 
 FILL = 0.94
 """How much of the height or width a section takes."""

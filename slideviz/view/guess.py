@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from slideviz.case.model import Case, Role
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.view.state import Guess
+from slideviz.view.session.state import Guess
 
 NAMES: tuple[tuple[Role, str], ...] = (
     ("periodic", r"per|period|periodic|cyclic|pitchwise"),

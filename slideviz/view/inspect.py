@@ -18,8 +18,8 @@ from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, UNPROVEN, corner_jacobians
-from slideviz.view.state import ColourBy, Frame
-from slideviz.view.surfaces import padded
+from slideviz.view.drawing.surfaces import padded
+from slideviz.view.session.state import ColourBy, Frame
 
 WORST = 100
 """Cells in the list of the worst."""
@@ -101,7 +101,8 @@ def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray
     Parameters
     ----------
     values : (m,) float64
-        As `slideviz.view.actors.shown_values` gives them: not a number for an inverted cell.
+        As `slideviz.view.drawing.actors.shown_values` gives them: not a number for an inverted
+        cell.
     threshold : (float, float)
         Lowest and highest value. From 0 or below, inverted cells are chosen too.
     """

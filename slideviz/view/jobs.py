@@ -15,12 +15,12 @@ from slideviz.errors import Cancelled, CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
-from slideviz.view.changes import open_mesh
+from slideviz.view.drawing.surfaces import Surface, find_surfaces
 from slideviz.view.formats import holds_quality
-from slideviz.view.ghosts import Ghosts
-from slideviz.view.keep import Camera, kept_camera
-from slideviz.view.state import Frame, Session
-from slideviz.view.surfaces import Surface, find_surfaces
+from slideviz.view.motions.ghosts import Ghosts
+from slideviz.view.session.changes import open_mesh
+from slideviz.view.session.keep import Camera, kept_camera
+from slideviz.view.session.state import Frame, Session
 
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]

@@ -13,7 +13,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED, UNPROVEN
 from slideviz.view.jobs import Doing, Report, Stopped, require_going, save_mesh
-from slideviz.view.state import Frame
+from slideviz.view.session.state import Frame
 
 STATUS = {INVERTED: "inverted", UNPROVEN: "unproven"}
 _ROWS = 5_000

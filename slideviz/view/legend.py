@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Role
-from slideviz.view.look import ROLE_COLOURS, Look
-from slideviz.view.plate import Rect
-from slideviz.view.ticks import tick_format, ticks
+from slideviz.view.drawing.look import ROLE_COLOURS, Look
+from slideviz.view.drawing.plate import Rect
+from slideviz.view.plots.ticks import tick_format, ticks
 
 STRIP = 104
 """Pixels at the right edge that are kept free of the mesh, at normal letter size."""

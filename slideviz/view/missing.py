@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from slideviz.case.model import FromFile
-from slideviz.view.state import Session
+from slideviz.view.session.state import Session
 
 Place = Literal["open", "boundaries", "motion", "method"]
 

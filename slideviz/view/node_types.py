@@ -13,8 +13,8 @@ from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.topology import Fans, find_fans
 from slideviz.rbf.classify import classify
-from slideviz.view.look import ROLE_COLOURS
-from slideviz.view.state import Session
+from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.view.session.state import Session
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"

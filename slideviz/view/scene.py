@@ -1,8 +1,8 @@
 """What is drawn: boundaries, cells, ghosts and legend in a plotter that it is given.
 
 The plotter may be the window's or an off-screen one. A scene is made of layers, one for each
-kind of thing; only they, and `slideviz.view.actors`, make VTK objects, all of it in the thread
-that owns the plotter.
+kind of thing; only they, and `slideviz.view.drawing.actors`, make VTK objects, all of it in the
+thread that owns the plotter.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import Any
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.view import pick, pick_cell
-from slideviz.view.actors import Drawn
-from slideviz.view.eye import Eye
+from slideviz.view.drawing import pick, pick_cell
+from slideviz.view.drawing.actors import Drawn
+from slideviz.view.drawing.eye import Eye
+from slideviz.view.drawing.look import LIGHT, Look
+from slideviz.view.drawing.stage import Layer, Stage
+from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.inspect import cell_at, chosen_cells, surroundings
-from slideviz.view.layer_chosen import ChosenLayer
-from slideviz.view.layer_copies import CopyLayer
-from slideviz.view.layer_ghosts import GhostLayer
-from slideviz.view.layer_legend import LegendLayer
-from slideviz.view.layer_mark import MarkLayer
-from slideviz.view.layer_mesh import BoundaryLayer, CellLayer
-from slideviz.view.layer_points import PointLayer
-from slideviz.view.layer_sections import SectionLayer
-from slideviz.view.layer_triad import TriadLayer
-from slideviz.view.look import LIGHT, Look
-from slideviz.view.stage import Layer, Stage
-from slideviz.view.state import Session
-from slideviz.view.store import tell_all
-from slideviz.view.surfaces import Surface
+from slideviz.view.layers.chosen import ChosenLayer
+from slideviz.view.layers.copies import CopyLayer
+from slideviz.view.layers.ghosts import GhostLayer
+from slideviz.view.layers.legend import LegendLayer
+from slideviz.view.layers.mark import MarkLayer
+from slideviz.view.layers.mesh import BoundaryLayer, CellLayer
+from slideviz.view.layers.points import PointLayer
+from slideviz.view.layers.sections import SectionLayer
+from slideviz.view.layers.triad import TriadLayer
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import tell_all
 
 NEAR = 8.0
 """Sizes of a cell that the height of the view shows after flying to it."""
@@ -158,7 +158,7 @@ class Scene:
     # Camera and mouse -------------------------------------------------------------------
 
     def look_from(self, side: str) -> None:
-        """Look at all of the mesh from a side: a key of `slideviz.view.eye.SIDES`."""
+        """Look at all of the mesh from a side: a key of `slideviz.view.drawing.eye.SIDES`."""
         self.eye.look_from(side, self._parallel())
 
     def _parallel(self) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, Marker, Mesh
 from slideviz.mesh.periodic import in_axis_frame
-from slideviz.view.state import Session
+from slideviz.view.session.state import Session
 
 NEAR = 4
 """Nodes of a boundary whose elements are looked at for the nearest point."""

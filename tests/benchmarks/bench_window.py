@@ -22,7 +22,7 @@ if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
 from qtpy.QtCore import QSettings, Qt, QTimer
 
 from slideviz.case.samples import write_sample
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 TICK_MS = 10
 STEPS = 20
@@ -133,7 +133,7 @@ def test_colouring(benchmark, bench):
 
 
 def test_cutting(benchmark, bench):
-    from slideviz.view.section import Section
+    from slideviz.view.sections.model import Section
 
     store = bench.window.store
 

@@ -13,7 +13,7 @@ else:
     from slideviz.case.samples import write_sample
     from slideviz.gui import dialogs
     from slideviz.gui.window import MainWindow
-    from slideviz.view.pick import to_display
+    from slideviz.view.drawing.pick import to_display
 
 
 DIALOGS = (

@@ -12,7 +12,7 @@ from slideviz.case.model import Case
 from slideviz.gui import autosave, dialogs
 from slideviz.gui.autosave import find_sessions
 from slideviz.gui.window import MainWindow
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 
 @pytest.fixture
@@ -246,7 +246,7 @@ from pathlib import Path
 from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QApplication
 from slideviz.gui.window import MainWindow
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 import slideviz.staircase  # as `launch` does, before any thread
 

@@ -8,12 +8,12 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
-from slideviz.gui import plot_canvas
-from slideviz.gui.curves import CurvesPanel
-from slideviz.view import changes
-from slideviz.view.look import DARK
-from slideviz.view.state import Session
-from slideviz.view.store import Store
+from slideviz.gui.panels.curves import CurvesPanel
+from slideviz.gui.widgets import plot_canvas
+from slideviz.view.drawing.look import DARK
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
 
 
 @pytest.fixture
@@ -130,7 +130,7 @@ def test_along_the_span_the_shown_step_others_and_the_undeformed_mesh(full, qtbo
 
 def test_a_coordinate_that_the_mesh_does_not_have_is_told_in_the_plot(full, qtbot, monkeypatch):
     from slideviz.errors import SlidevizError
-    from slideviz.gui import curves
+    from slideviz.gui.panels import curves
 
     def refuse(*_):
         raise SlidevizError("the mesh has no extent along r; choose another")

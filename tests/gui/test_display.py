@@ -9,11 +9,11 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
 from slideviz.case.samples import write_sample
-from slideviz.gui.display import NOT_PERIODIC, ROLES_ONLY, SHOWN
-from slideviz.gui.display_fields import MOST_COPIES, Copies
-from slideviz.view import changes
-from slideviz.view.layer_copies import CopyLayer
-from slideviz.view.pick import to_display
+from slideviz.gui.panels.display import NOT_PERIODIC, ROLES_ONLY, SHOWN
+from slideviz.gui.panels.display_fields import MOST_COPIES, Copies
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.layers.copies import CopyLayer
+from slideviz.view.session import changes
 
 
 @pytest.fixture

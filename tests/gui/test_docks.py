@@ -8,11 +8,11 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.case.model import Reduction
 from slideviz.gui import dialogs
-from slideviz.gui.choice import Choice
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
-from slideviz.gui.fields import NumberField
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 SMALL = 1280, 800
 

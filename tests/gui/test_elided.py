@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import Qt
 
-from slideviz.gui.elided import ElidedLabel
+from slideviz.gui.widgets.elided import ElidedLabel
 
 WORDS = "size-skew: min 0.8218, mean 0.9302; 1,608 cells cut"
 

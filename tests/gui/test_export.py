@@ -15,17 +15,20 @@ from qtpy.QtWidgets import QApplication, QDialog
 
 from slideviz import read
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs, export
-from slideviz.gui.export_film import FilmDialog
-from slideviz.gui.export_picture import PictureDialog
-from slideviz.gui.film_form import length_words
-from slideviz.gui.pixmaps import fitted, framed, to_image
+from slideviz.gui import dialogs
+from slideviz.gui.export import exporter as export
+from slideviz.gui.export.film import FilmDialog
+from slideviz.gui.export.film_form import length_words
+from slideviz.gui.export.picture import PictureDialog
+from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, exposure, jobs, jobs_export, pieces
-from slideviz.view import film as film_module
-from slideviz.view.figure import Figure
-from slideviz.view.reel import Reel
-from slideviz.view.studio import Studio
+from slideviz.view import jobs, jobs_export
+from slideviz.view.drawing import exposure, pieces
+from slideviz.view.pictures import film as film_module
+from slideviz.view.pictures.figure import Figure
+from slideviz.view.pictures.reel import Reel
+from slideviz.view.pictures.studio import Studio
+from slideviz.view.session import changes
 
 
 @pytest.fixture
@@ -543,7 +546,7 @@ def test_saved_quality_is_in_the_vtu(ran, tmp_path):
 
 
 def test_a_drawing_of_another_ending_is_refused(studio):
-    from slideviz.view.figure_vector import require_vector
+    from slideviz.view.pictures.figure_vector import require_vector
 
     with pytest.raises(SlidevizError, match="end the name so"):
         require_vector(studio.session, Path("a.png"))

@@ -12,8 +12,9 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import CaseError
 from slideviz.gui import dialogs, faults
-from slideviz.view import changes, jobs
-from slideviz.view.store import Store, tell_all
+from slideviz.view import jobs
+from slideviz.view.session import changes
+from slideviz.view.session.store import Store, tell_all
 
 
 @pytest.fixture

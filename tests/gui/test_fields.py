@@ -7,8 +7,8 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui import theme
-from slideviz.gui.choice import Choice
-from slideviz.gui.fields import NumberField, VectorField, short_text
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, VectorField, short_text
 
 THIRD = 0.005596983152812345
 

@@ -6,14 +6,15 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
-from slideviz.gui import dialogs, plot_canvas
-from slideviz.gui.histogram import HistogramPanel
+from slideviz.gui import dialogs
+from slideviz.gui.panels.histogram import HistogramPanel
+from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view import changes
+from slideviz.view.drawing.look import DARK
 from slideviz.view.inspect import ONLY_INVERTED
-from slideviz.view.look import DARK
-from slideviz.view.state import Frame
-from slideviz.view.store import Store
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
+from slideviz.view.session.store import Store
 
 
 @pytest.fixture
@@ -254,7 +255,7 @@ def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeyp
 
 
 def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
-    from slideviz.view import session_histogram
+    from slideviz.view.plots import session_histogram
 
     asked = []
     real = session_histogram.distribution

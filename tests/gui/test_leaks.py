@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from qtpy.QtCore import QCoreApplication, QEvent
 
-from slideviz.gui.plot_image import THREAD
+from slideviz.gui.widgets.plot_image import THREAD
 from slideviz.gui.window import MainWindow
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 1e6
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 REDUCTION = ("selection", "levels", "level_end", "gamma")
 

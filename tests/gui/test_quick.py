@@ -9,9 +9,9 @@ import pytest
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from slideviz.gui.bar import QuietBar
-from slideviz.gui.canvas import View3D
+from slideviz.gui.canvas.canvas import View3D
 from slideviz.gui.tidy import YOUNG, Tidy
+from slideviz.gui.widgets.bar import QuietBar
 
 
 class Painted(QObject):

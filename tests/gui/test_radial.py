@@ -7,7 +7,7 @@ from qtpy.QtTest import QTest
 
 from slideviz.case.model import Radial, Rotate
 from slideviz.case.samples import write_sample
-from slideviz.view import changes
+from slideviz.view.session import changes
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from slideviz.mesh.files import read
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, jobs
+from slideviz.view import jobs
+from slideviz.view.session import changes
 
 
 @pytest.fixture
@@ -159,7 +160,7 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
 
 
 def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeypatch):
-    from slideviz.gui import canvas
+    from slideviz.gui.canvas import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -171,7 +172,7 @@ def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeyp
 
 
 def test_a_picture_of_a_mesh_that_is_still_appearing_is_whole(driver, case_file, monkeypatch):
-    from slideviz.gui import canvas
+    from slideviz.gui.canvas import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -183,7 +184,7 @@ def test_a_picture_of_a_mesh_that_is_still_appearing_is_whole(driver, case_file,
 
 
 def test_what_is_hidden_meanwhile_stays_hidden(driver, case_file, monkeypatch):
-    from slideviz.gui import canvas
+    from slideviz.gui.canvas import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -208,7 +209,7 @@ opened = MainWindow.show_opened
 
 def then_run(window, *values):
     opened(window, *values)
-    from slideviz.view import changes
+    from slideviz.view.session import changes
     window.store.change(changes.set_case, steps=5000)
     QTimer.singleShot(0, window.start_run)
     QTimer.singleShot(int(sys.argv[2]), window.close)

@@ -11,11 +11,11 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.case.samples import write_sample
 from slideviz.gui import dialogs
-from slideviz.gui.cutting import followed, place_for
-from slideviz.gui.ruler import Ruler, nice_ticks, tick_text
-from slideviz.view import changes
-from slideviz.view.pick import to_display
-from slideviz.view.section import Section
+from slideviz.gui.canvas.cutting import followed, place_for
+from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from qtpy.QtWidgets import QApplication
 from slideviz.case.samples import SAMPLES
 from slideviz.errors import Cancelled
 from slideviz.gui import files
-from slideviz.gui.cards import _DRAWINGS, SIZE, card
 from slideviz.gui.start import COLUMNS, RECENT, StartPage, changed_words
+from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
 from slideviz.view import jobs_sample
 
 

@@ -7,8 +7,8 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui import theme
 from slideviz.gui.step_numbers import result_parts
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.state import Frame
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 from tests.builders import square
 
 

@@ -18,9 +18,10 @@ from slideviz.gui import player as player_module
 from slideviz.gui.player import step_ms
 from slideviz.gui.step_numbers import plain, result_parts
 from slideviz.mesh.quality import INVERTED
-from slideviz.view import changes, jobs, opening
+from slideviz.view import jobs
 from slideviz.view.advice import ended
-from slideviz.view.runs_table import described
+from slideviz.view.session import changes, opening
+from slideviz.view.session.runs_table import described
 
 
 @pytest.fixture
@@ -301,7 +302,7 @@ def test_a_scaling(opened):
 
 
 def test_a_clash_is_told_while_the_motion_is_typed(opened):
-    from slideviz.view.look import CLASH_COLOUR, ROLE_COLOURS
+    from slideviz.view.drawing.look import CLASH_COLOUR, ROLE_COLOURS
 
     window, panel = opened.window, opened.window.run_panel
     # Periodic sides that move along may be passed; others may not.
@@ -326,7 +327,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
 
 
 def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
-    from slideviz.view import clashes
+    from slideviz.view.motions import clashes
 
     window, asked = opened.window, []
 
@@ -884,7 +885,7 @@ def test_a_case_that_cannot_be_written_is_told(opened, answers, tmp_path):
 def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
     from PIL import Image
 
-    from slideviz.gui.export_picture import PictureDialog
+    from slideviz.gui.export.picture import PictureDialog
 
     def accept(dialog):
         dialog.width_px.setValue(1280)

@@ -4,8 +4,8 @@ import pytest
 from slideviz.case.samples import sample
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view.changes import open_mesh
-from slideviz.view.state import Frame
+from slideviz.view.session.changes import open_mesh
+from slideviz.view.session.state import Frame
 
 
 def square_mesh(n=4):

@@ -8,7 +8,7 @@ from slideviz.case.model import Case
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.staircase import deform
 from slideviz.view.advice import ended, help_for, inverted_words
-from slideviz.view.state import Frame, Run
+from slideviz.view.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")

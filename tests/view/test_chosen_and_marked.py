@@ -9,16 +9,16 @@ import pyvista as pv
 from slideviz.case.samples import sample
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.actors import VALUES
+from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.look import INVERTED_COLOUR, SELECTED_COLOUR
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.inspect import ONLY_INVERTED, nodes_of
-from slideviz.view.layer_chosen import part_shape
-from slideviz.view.layer_mark import DOT, FACES, OUTLINE
-from slideviz.view.look import INVERTED_COLOUR, SELECTED_COLOUR
-from slideviz.view.pick import to_display
+from slideviz.view.layers.chosen import part_shape
+from slideviz.view.layers.mark import DOT, FACES, OUTLINE
 from slideviz.view.scene import Scene
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 @pytest.fixture

@@ -10,15 +10,15 @@ import pytest
 import slideviz as sv
 from slideviz.case.samples import sample
 from slideviz.errors import Cancelled, DeformError
-from slideviz.view import compare as comparing
-from slideviz.view.compare import (
+from slideviz.view.compare import combinations as comparing
+from slideviz.view.compare.combinations import (
     METHODS,
     Combination,
     bounded,
     compare,
 )
-from slideviz.view.compare_table import csv_text, terminal_head, terminal_line
-from slideviz.view.compare_wanted import (
+from slideviz.view.compare.table import csv_text, terminal_head, terminal_line
+from slideviz.view.compare.wanted import (
     KEYS,
     announcement,
     combinations,

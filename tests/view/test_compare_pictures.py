@@ -12,12 +12,12 @@ from PIL import Image
 from slideviz.case.model import Reduction, Translate
 from slideviz.case.samples import sample
 from slideviz.errors import CaseError
-from slideviz.view.compare import METHODS, MODES, compare
-from slideviz.view.compare_panels import panels, profiler
-from slideviz.view.compare_plots import figures, save_figure, steps_name
-from slideviz.view.compare_sheets import NOT_KEPT, sheet
-from slideviz.view.compare_table import history_text
-from slideviz.view.compare_wanted import combinations
+from slideviz.view.compare.combinations import METHODS, MODES, compare
+from slideviz.view.compare.panels import panels, profiler
+from slideviz.view.compare.plots import figures, save_figure, steps_name
+from slideviz.view.compare.sheets import NOT_KEPT, sheet
+from slideviz.view.compare.table import history_text
+from slideviz.view.compare.wanted import combinations
 
 
 @pytest.fixture(scope="module")

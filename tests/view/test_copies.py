@@ -14,8 +14,8 @@ from slideviz.view.copies import (
     passages_around,
     show_passages,
 )
-from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
 from tests.builders import cube, grid, passage, ring, sector
 from tests.oracles.sections import cut_cells
 

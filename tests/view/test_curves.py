@@ -9,9 +9,10 @@ import pytest
 from slideviz.case.model import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, curves
-from slideviz.view.spanwise import along, along_radius
-from slideviz.view.state import Frame
+from slideviz.view.plots import curves
+from slideviz.view.plots.spanwise import along, along_radius
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 def run_of(session, sizes, history=()):

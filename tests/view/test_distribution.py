@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle, StepPatch
 
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.distribution import BINS, distribution
-from slideviz.view.look import PAPER
-from slideviz.view.plots import ON_DARK, PRINT
-from slideviz.view.plots_histogram import BAND, draw_distribution
-from slideviz.view.plots_series import Bars, Distribution, Outline
-from slideviz.view.state import Frame
+from slideviz.view.drawing.look import PAPER
+from slideviz.view.plots.distribution import BINS, distribution
+from slideviz.view.plots.draw import ON_DARK, PRINT
+from slideviz.view.plots.histogram import BAND, draw_distribution
+from slideviz.view.plots.series import Bars, Distribution, Outline
+from slideviz.view.session.state import Frame
 
 
 @pytest.fixture(scope="module")

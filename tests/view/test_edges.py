@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.view.actors import VALUES
-from slideviz.view.look import DARK, LIGHT
-from slideviz.view.stage import Stage
+from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.look import DARK, LIGHT
+from slideviz.view.drawing.stage import Stage
 
 SIZE = 240
 

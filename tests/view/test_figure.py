@@ -9,19 +9,21 @@ import pytest
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, figure_vector, film, jobs_export
-from slideviz.view import studio as studio_module
-from slideviz.view.figure import TITLE_ROOM, Figure, panes, title_of, words_of_size
-from slideviz.view.figure_vector import draw_vector, require_vector, write_vector
+from slideviz.view import jobs_export
+from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
-from slideviz.view.layer_mesh import FADED
-from slideviz.view.look import ROLE_COLOURS
-from slideviz.view.reel import Reel
-from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter
-from slideviz.view.state import Frame
-from slideviz.view.studio import Studio, sees_all
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.layers.mesh import FADED
+from slideviz.view.pictures import figure_vector, film
+from slideviz.view.pictures import studio as studio_module
+from slideviz.view.pictures.figure import TITLE_ROOM, Figure, panes, title_of, words_of_size
+from slideviz.view.pictures.figure_vector import draw_vector, require_vector, write_vector
+from slideviz.view.pictures.reel import Reel
+from slideviz.view.pictures.studio import Studio, sees_all
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 PLAIN = Figure((400, 300), legend=False)
 

@@ -8,11 +8,11 @@ from slideviz.case.samples import sample
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.staircase import deform
-from slideviz.view import film_pair as module
-from slideviz.view.film_pair import Told, film_pair, pair_size
-from slideviz.view.offscreen import font_scale
-from slideviz.view.reel import Reel
-from slideviz.view.state import Frame
+from slideviz.view.pictures import film_pair as module
+from slideviz.view.pictures.film_pair import Told, film_pair, pair_size
+from slideviz.view.pictures.offscreen import font_scale
+from slideviz.view.pictures.reel import Reel
+from slideviz.view.session.state import Frame
 
 SIZE = (800, 400)
 USUAL = Reel(SIZE)

@@ -9,8 +9,8 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.view import inspect
-from slideviz.view.actors import shown_values
-from slideviz.view.state import Frame
+from slideviz.view.drawing.actors import shown_values
+from slideviz.view.session.state import Frame
 
 
 def frame_of(mesh, move):

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from slideviz.case.model import Case
 from slideviz.case.view_keys import MAPS, read_sections, write_sections
 from slideviz.errors import CaseError
-from slideviz.view import changes
-from slideviz.view.keep import keep_view, kept_camera, kept_view
-from slideviz.view.section import Section
-from slideviz.view.state import COLOUR_BY, POINTS, ViewState
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
+from slideviz.view.session.keep import keep_view, kept_camera, kept_view
+from slideviz.view.session.state import COLOUR_BY, POINTS, ViewState
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)

@@ -8,10 +8,10 @@ import pyvista as pv
 
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.scene import Scene
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 @pytest.fixture

@@ -12,20 +12,22 @@ from slideviz.case.samples import sample
 from slideviz.errors import Cancelled, CaseError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, section_picture, section_start
-from slideviz.view.actors import VALUES
 from slideviz.view.copies import find_period, moved
-from slideviz.view.cuts import KEPT, Cuts
+from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.look import INVERTED_COLOUR, LIGHT
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.drawing.polygon_actor import plain_colour
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.flat_scene import FlatScene
-from slideviz.view.layer_mesh import looks_inside
-from slideviz.view.look import INVERTED_COLOUR, LIGHT
-from slideviz.view.pick import to_display
-from slideviz.view.polygon_actor import plain_colour
+from slideviz.view.layers.mesh import looks_inside
 from slideviz.view.scene import Scene
-from slideviz.view.section import Section
-from slideviz.view.section_job import Paper, save_section, state_words
-from slideviz.view.state import Frame, Session
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.sections import picture as section_picture
+from slideviz.view.sections import start as section_start
+from slideviz.view.sections.cuts import KEPT, Cuts
+from slideviz.view.sections.job import Paper, save_section, state_words
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame, Session
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
 

@@ -6,10 +6,12 @@ import pyvista as pv
 
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
+from slideviz.view.drawing.look import DARK, LIGHT, ROLE_COLOURS
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.inspect import middles
-from slideviz.view.layer_chosen import ChosenLayer
-from slideviz.view.layer_copies import (
+from slideviz.view.layers.chosen import ChosenLayer
+from slideviz.view.layers.copies import (
     CHOSEN,
     PALER,
     CopyLayer,
@@ -17,13 +19,11 @@ from slideviz.view.layer_copies import (
     matrices,
     outermost,
 )
-from slideviz.view.layer_triad import COLOURS, SIZE
-from slideviz.view.look import DARK, LIGHT, ROLE_COLOURS
+from slideviz.view.layers.triad import COLOURS, SIZE
 from slideviz.view.node_types import NODE_COLOURS
-from slideviz.view.pick import to_display
 from slideviz.view.scene import Scene
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 LEFT = np.array([-0.004, 0.0])
 

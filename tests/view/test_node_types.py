@@ -9,10 +9,10 @@ from slideviz.case.model import Reduction, Translate
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
 from slideviz.staircase import deform
-from slideviz.view import changes
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.node_types import NODE_WORDS, NOTHING, NodeTypes
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 def session_of(one, **view):

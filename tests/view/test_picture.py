@@ -5,9 +5,9 @@ from PIL import Image
 
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view.look import COLOUR_MAP
-from slideviz.view.moved import Detail, half_of, tiny_motion
-from slideviz.view.picture import picture
+from slideviz.view.drawing.look import COLOUR_MAP
+from slideviz.view.motions.moved import Detail, half_of, tiny_motion
+from slideviz.view.pictures.picture import picture
 
 
 def pixels(path):

@@ -7,12 +7,13 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, pieces
-from slideviz.view.figure import Figure
-from slideviz.view.pieces import Beside, appearing, here, portions, whole
-from slideviz.view.state import Frame
-from slideviz.view.studio import Studio
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.drawing import pieces
+from slideviz.view.drawing.pieces import Beside, appearing, here, portions, whole
+from slideviz.view.drawing.surfaces import find_surfaces
+from slideviz.view.pictures.figure import Figure
+from slideviz.view.pictures.studio import Studio
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 PLAIN = Figure((300, 200))
 

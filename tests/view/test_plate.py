@@ -5,14 +5,14 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
+from slideviz.view.drawing.look import DARK, LIGHT
+from slideviz.view.drawing.plate import OPACITY
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.legend import STRIP
-from slideviz.view.look import DARK, LIGHT
-from slideviz.view.plate import OPACITY
+from slideviz.view.pictures.studio import Figure, Studio
 from slideviz.view.scene import Scene
-from slideviz.view.state import Frame
-from slideviz.view.studio import Figure, Studio
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 SIZE = (500, 400)
 

@@ -7,11 +7,11 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.motion_words import describe, motion_labels
-from slideviz.view.panes import choices
-from slideviz.view.runs_words import brief, run_words
-from slideviz.view.state import Frame, Run, Session
+from slideviz.view.drawing.panes import choices
+from slideviz.view.motions.words import describe, motion_labels
+from slideviz.view.session import changes
+from slideviz.view.session.runs_words import brief, run_words
+from slideviz.view.session.state import Frame, Run, Session
 
 BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
 

@@ -5,13 +5,13 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.layer_mesh import is_closed
-from slideviz.view.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
-from slideviz.view.pick import to_display
+from slideviz.view.drawing.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
+from slideviz.view.drawing.pick import to_display
+from slideviz.view.drawing.surfaces import facet_connectivity, find_surfaces
+from slideviz.view.layers.mesh import is_closed
 from slideviz.view.scene import Scene
-from slideviz.view.state import Frame
-from slideviz.view.surfaces import facet_connectivity, find_surfaces
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 @pytest.fixture
@@ -256,7 +256,7 @@ def test_triangles_and_quadrilaterals_become_vtk_faces():
 
 
 def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session, monkeypatch):
-    from slideviz.view import layer_legend as module
+    from slideviz.view.layers import legend as module
 
     session, made = opened(scene, session), []
     for name in ("add_role_legend", "add_colour_bar"):

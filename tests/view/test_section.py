@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.view.polygons import CELL, joined
-from slideviz.view.section import Section
-from slideviz.view.section_cases import cut_cases
-from slideviz.view.section_cut import Cutter
+from slideviz.view.drawing.polygons import CELL, joined
+from slideviz.view.sections.cases import cut_cases
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
 from tests.builders import cube, passage, permuted, square
 from tests.oracles.sections import cut_cells, height
 

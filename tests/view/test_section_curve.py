@@ -7,13 +7,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view import changes, section_around
-from slideviz.view.curves import UNDEFORMED, look_of
-from slideviz.view.cuts import Cuts
-from slideviz.view.look import COLOUR_MAP
-from slideviz.view.section import Section
-from slideviz.view.section_around import surroundings, window
-from slideviz.view.section_curve import (
+from slideviz.view.drawing.look import COLOUR_MAP
+from slideviz.view.plots.curves import UNDEFORMED, look_of
+from slideviz.view.sections import around as section_around
+from slideviz.view.sections.around import surroundings, window
+from slideviz.view.sections.curve import (
     Colours,
     Curve,
     CurveRow,
@@ -22,11 +20,14 @@ from slideviz.view.section_curve import (
     position_label,
     steps,
 )
-from slideviz.view.section_cut import Cutter
-from slideviz.view.section_paint import paint
-from slideviz.view.section_picture import SectionStyle, draw_section
-from slideviz.view.section_rows import CurveRows, colours_of, facts_of, labels_of
-from slideviz.view.state import Frame
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.cuts import Cuts
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.paint import paint
+from slideviz.view.sections.picture import SectionStyle, draw_section
+from slideviz.view.sections.rows import CurveRows, colours_of, facts_of, labels_of
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 from tests.builders import cube, square
 
 EYE = {0: np.eye(4)}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter
-from slideviz.view.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
 from tests.builders import cube, grid, passage, ring
 from tests.view.test_section import areas
 

@@ -12,15 +12,15 @@ from PIL import Image
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
-from slideviz.view import section_shapes
 from slideviz.view.copies import passages, show_passages
-from slideviz.view.look import COLOUR_MAP, INVERTED_COLOUR
-from slideviz.view.section import Section
-from slideviz.view.section_cut import Cutter
-from slideviz.view.section_layout import inches_of, lay_out
-from slideviz.view.section_paint import PAINT_BY, paint
-from slideviz.view.section_picture import SectionStyle, draw_section, section_picture
-from slideviz.view.section_space import in_space
+from slideviz.view.drawing.look import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.view.sections import shapes as section_shapes
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.layout import inches_of, lay_out
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.paint import PAINT_BY, paint
+from slideviz.view.sections.picture import SectionStyle, draw_section, section_picture
+from slideviz.view.sections.space import in_space
 from tests.builders import cube, passage, square
 
 

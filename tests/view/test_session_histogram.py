@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.plots import ON_LIGHT
-from slideviz.view.session_histogram import MOST, Counts, compared, draw_histogram
-from slideviz.view.state import Frame, Run
+from slideviz.view.plots.draw import ON_LIGHT
+from slideviz.view.plots.session_histogram import MOST, Counts, compared, draw_histogram
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")

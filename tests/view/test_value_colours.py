@@ -5,17 +5,17 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.cuts import Cuts
-from slideviz.view.figure import Figure
-from slideviz.view.figure_vector import draw_vector
+from slideviz.view.drawing.look import INVERTED_COLOUR
+from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.flat_scene import FlatScene
-from slideviz.view.look import INVERTED_COLOUR
+from slideviz.view.pictures.figure import Figure
+from slideviz.view.pictures.figure_vector import draw_vector
+from slideviz.view.pictures.studio import Studio
 from slideviz.view.scene import Scene
-from slideviz.view.section import Section
-from slideviz.view.state import Frame
-from slideviz.view.studio import Studio
-from slideviz.view.surfaces import find_surfaces
+from slideviz.view.sections.cuts import Cuts
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 
 
 @pytest.fixture

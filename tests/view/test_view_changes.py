@@ -6,11 +6,11 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Rotate, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view import changes, opening
 from slideviz.view.inspect import ONLY_INVERTED
-from slideviz.view.section import Section
-from slideviz.view.state import Frame, Session, essence
-from slideviz.view.store import Store
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes, opening
+from slideviz.view.session.state import Frame, Session, essence
+from slideviz.view.session.store import Store
 
 
 def moved(session, by=0.25):
@@ -231,7 +231,7 @@ def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
 
 
 def test_the_range_of_the_displacement_ends_at_a_round_number():
-    from slideviz.view.state import round_above
+    from slideviz.view.session.state import round_above
 
     for value, wanted in ((0.0202, 0.025), (1.0, 1.0), (9.1, 10.0), (3e-7, 3e-7), (0.0, 0.0)):
         assert round_above(value) == pytest.approx(wanted, rel=1e-12)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from slideviz.case.model import ROLES, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view import changes
-from slideviz.view.state import COLOUR_BY, Frame, Session, ViewState
-from slideviz.view.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
+from slideviz.view.session import changes
+from slideviz.view.session.state import COLOUR_BY, Frame, Session, ViewState
+from slideviz.view.session.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
 
 
 class Clock:

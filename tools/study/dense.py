@@ -12,8 +12,8 @@ from slideviz.case.cfg import set_key
 from slideviz.case.samples import sample
 from slideviz.rbf.problem import Cycle
 from slideviz.staircase import deform
-from slideviz.view.compare_plots import WIDTH, save_figure
-from slideviz.view.plots import GreedyRun, convergence
+from slideviz.view.compare.plots import WIDTH, save_figure
+from slideviz.view.plots.draw import GreedyRun, convergence
 from tools.study.cases import GREEDY, Greedy
 
 TOLERANCE = 1e-6

@@ -1,0 +1,1 @@
+"""The 3D view and the flat ones beside it, with the handles in them."""

@@ -1,0 +1,1 @@
+"""The dialogs through which pictures, films and meshes leave the window."""

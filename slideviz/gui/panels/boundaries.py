@@ -1,0 +1,235 @@
+"""The boundaries panel: a row per marker with visibility, elements and role."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from qtpy.QtCore import QItemSelectionModel, Qt
+from qtpy.QtGui import QAction, QBrush
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.case.model import ROLES
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.icons import icon, role_icon
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.drawing.look import ROLE_MEANING
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
+
+NAME, COUNT, ROLE = 0, 1, 2
+
+
+class BoundariesPanel(QWidget):
+    """Shows the roles of the boundaries and lets them be changed, several at once."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._names: tuple[str, ...] = ()
+        self._choices: list[Choice] = []
+        self._syncing = False
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 4)
+        layout.setSpacing(4)
+        self.table = self._make_table()
+        layout.addWidget(self.table, 1)
+        layout.addLayout(self._make_guess_line())
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_table(self) -> QTableWidget:
+        table = QTableWidget(0, 3)
+        table.setObjectName("boundaries")
+        table.setHorizontalHeaderLabels(["Boundary", "Elements", "Role"])
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(28)
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(COUNT, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(ROLE, QHeaderView.ResizeMode.Fixed)
+        header.resizeSection(ROLE, 136)
+        header.setHighlightSections(False)
+        name = table.horizontalHeaderItem(NAME)
+        name.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        table.setShowGrid(False)
+        table.setAlternatingRowColors(True)
+        table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        table.setMinimumHeight(90)
+        table.itemSelectionChanged.connect(self._selection_changed)
+        table.itemChanged.connect(self._item_changed)
+        table.customContextMenuRequested.connect(self._menu_wanted)
+        return table
+
+    def _make_guess_line(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self.guess_text = QLabel()
+        self.guess_text.setWordWrap(True)
+        self.guess_text.setProperty("hint", True)
+        self.keep = QPushButton("Keep all")
+        self.keep.setObjectName("keep")
+        self.keep.setToolTip("Take every guessed role as right.")
+        self.keep.clicked.connect(lambda: self.store.change(changes.confirm))
+        row.addWidget(self.guess_text, 1)
+        row.addWidget(self.keep)
+        return row
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session; the only place that fills the table."""
+        self._syncing = True
+        try:
+            names = session.mesh.marker_names if session.mesh else ()
+            if names != self._names or len(self._choices) != len(names):
+                self._fill(session, names)
+            elif session.mesh is not None:
+                self._count(session)
+            for row, name in enumerate(names):
+                self._sync_row(session, row, name)
+            self._sync_selection(session)
+        finally:
+            self._syncing = False
+        count = len(session.guesses)
+        self.keep.setVisible(count > 0)
+        self.guess_text.setVisible(count > 0 or (session.mesh is not None and not names))
+        self.guess_text.setText(
+            f"{count} {'roles are guesses' if count > 1 else 'role is a guess'} (marked ?)."
+            if count
+            else "This mesh has no named boundaries."
+        )
+
+    def _fill(self, session: Session, names: tuple[str, ...]) -> None:
+        self._names, self._choices = names, []
+        self.table.setRowCount(0)
+        self.table.setRowCount(len(names))
+        for row, name in enumerate(names):
+            item = QTableWidgetItem(name)
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+            self.table.setItem(row, NAME, item)
+            count = QTableWidgetItem()
+            count.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.table.setItem(row, COUNT, count)
+            choice = Choice({role: role for role in ROLES})
+            choice.setFrame(False)
+            for index, role in enumerate(ROLES):
+                choice.setItemIcon(index, role_icon(role))
+            choice.explain({role: f"{role}: {ROLE_MEANING[role]}" for role in ROLES})
+            choice.chosen.connect(partial(self._role_chosen, name))
+            self.table.setCellWidget(row, ROLE, choice)
+            self._choices.append(choice)
+        self._count(session)
+
+    def _count(self, session: Session) -> None:
+        for row, name in enumerate(self._names):
+            text = f"{len(session.mesh.marker(name).cells):,}"
+            self.table.item(row, COUNT).setText(text)
+
+    def _sync_row(self, session: Session, row: int, name: str) -> None:
+        role, guess = session.role(name), session.guesses.get(name)
+        item, choice = self.table.item(row, NAME), self._choices[row]
+        shown = name not in session.view.hidden
+        item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
+        item.setForeground(QBrush() if shown else self.palette().placeholderText())
+        item.setToolTip(f"{name}\nThe check mark shows or hides it in the view.")
+        choice.show_value(role)
+        for index, each in enumerate(ROLES):
+            choice.setItemText(index, f"{each} ?" if guess and each == role else each)
+        font = choice.font()
+        font.setItalic(guess is not None)
+        choice.setFont(font)
+        told = f"{role}: {ROLE_MEANING[role]}."
+        if guess:
+            told += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
+        choice.setToolTip(wrapped(told))
+
+    def _sync_selection(self, session: Session) -> None:
+        wanted = set(session.view.selected)
+        if wanted == set(self.selected()):
+            return
+        model = self.table.selectionModel()
+        model.clearSelection()
+        flags = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
+        for row, name in enumerate(self._names):
+            if name in wanted:
+                model.select(self.table.model().index(row, 0), flags)
+                self.table.scrollToItem(self.table.item(row, NAME))
+
+    # Widgets to state ------------------------------------------------------------------
+
+    def selected(self) -> tuple[str, ...]:
+        """Return the boundaries of the selected rows."""
+        rows = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
+        return tuple(self._names[row] for row in rows)
+
+    def _selection_changed(self) -> None:
+        if not self._syncing:
+            self.store.change(changes.select, self.selected())
+
+    def _item_changed(self, item: QTableWidgetItem) -> None:
+        if self._syncing or item.column() != NAME:
+            return
+        shown = item.checkState() == Qt.CheckState.Checked
+        name = self._names[item.row()]
+        chosen = self.selected()
+        self.store.change(changes.show, chosen if name in chosen else (name,), shown)
+
+    def _role_chosen(self, name: str, role: object) -> None:
+        chosen = self.selected()
+        self.store.change(changes.set_role, chosen if name in chosen else (name,), role)
+
+    def _menu_wanted(self, where) -> None:
+        item = self.table.itemAt(where)
+        if item is None:
+            return
+        name = self._names[item.row()]
+        names = self.selected()
+        menu = boundary_menu(self, self.store, names if name in names else (name,))
+        menu.popup(self.table.viewport().mapToGlobal(where))
+
+
+def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:
+    """Return a menu for these boundaries: role, visibility."""
+    menu = QMenu(parent)
+    menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    menu.setToolTipsVisible(True)
+    title = names[0] if len(names) == 1 else f"{len(names)} boundaries"
+    menu.addSection(title)
+    roles = {store.session.role(name) for name in names}
+    for role in ROLES:
+        act = QAction(role_icon(role), role.capitalize(), menu)
+        act.setToolTip(ROLE_MEANING[role])
+        act.setCheckable(True)
+        act.setChecked(roles == {role})
+        act.triggered.connect(_later(store, changes.set_role, names, role))
+        menu.addAction(act)
+    menu.addSeparator()
+    if any(name in store.session.guesses for name in names):
+        keep = menu.addAction(icon("check"), "Keep the guess")
+        keep.triggered.connect(_later(store, changes.confirm, names))
+    for text, function, values in (
+        ("Hide", changes.show, (names, False)),
+        ("Show only this" if len(names) == 1 else "Show only these", changes.isolate, (names,)),
+        ("Show all", changes.show, (store.session.mesh.marker_names,)),
+    ):
+        menu.addAction(text).triggered.connect(_later(store, function, *values))
+    return menu
+
+
+def _later(store: Store, function, *values):
+    """Return a slot that makes this change, whatever Qt tells it."""
+    return lambda *_: store.change(function, *values)

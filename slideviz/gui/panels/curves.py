@@ -1,0 +1,256 @@
+"""The curves: quality by step, convergence of the selection, quality along the span."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from slideviz.errors import SlidevizError
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.plot_canvas import (
+    PLOT_FILTERS,
+    PlotArea,
+    PlotCanvas,
+    ask_and_write,
+    folder_of,
+    write_plot,
+)
+from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.drawing.look import SELECTED_COLOUR
+from slideviz.view.plots import curves
+from slideviz.view.plots.draw import convergence, quality_by_step
+from slideviz.view.plots.spanwise import spanwise
+from slideviz.view.plots.style import add_legend
+from slideviz.view.plots.ticks import rounded_out
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
+
+KINDS = {
+    "steps": "Quality by step",
+    "greedy": "Convergence",
+    "span": "Along the span",
+}
+TIPS = {
+    "steps": "Minimum and mean quality against the step; click at a step to go there.",
+    "greedy": "Largest error against control nodes, as the greedy selection adds them.",
+    "span": "Quality in layers from hub to shroud, or along an axis.",
+}
+WHAT = {"minimum": "minimum", "mean": "mean"}
+
+
+class CurveCanvas(PlotCanvas):
+    """A plot that tells the value of the horizontal axis where it is clicked."""
+
+    def __init__(self, drawing) -> None:
+        super().__init__(drawing)
+        self.picked = lambda _value: None
+
+    def mouseReleaseEvent(self, event) -> None:
+        left = event.button() == Qt.MouseButton.LeftButton
+        if not left or self.wiped or not self.figure.axes:
+            return
+        self.picked(self.to_value(event.position().x()))
+
+
+class CurvesPanel(QWidget):
+    """One plot of three, of the shown run and of the others."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._profiles = curves.Profiles()
+        self._mesh: object = None
+        self.area = PlotArea(self.drawing, CurveCanvas)
+        self.canvas: CurveCanvas = self.area.canvas
+        self.canvas.picked = self._picked
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 4, 4, 4)
+        column.setSpacing(3)
+        column.addLayout(self._make_head())
+        column.addWidget(self.area, 1)
+        column.addWidget(self._make_span())
+        store.listen(self._changed)
+        self.sync(store.session)
+
+    def _make_head(self) -> QHBoxLayout:
+        self.kind = Choice(dict(KINDS))
+        self.kind.setObjectName("curve_kind")
+        for index, tip in enumerate(TIPS.values()):
+            self.kind.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
+        self.kind.chosen.connect(lambda _: self._other_plot())
+        self.save = QPushButton("Save…")
+        self.save.setToolTip("Save the plot as PNG, SVG or PDF.")
+        self.save.clicked.connect(self._save)
+        self.whole = QCheckBox("0–1")
+        self.whole.setObjectName("whole_quality")
+        self.whole.setToolTip("All qualities there can be, instead of those of the curves.")
+        self.whole.toggled.connect(lambda _: self.canvas.ask())
+        row = QHBoxLayout()
+        row.addWidget(self.kind, 1)
+        row.addWidget(self.whole)
+        row.addWidget(self.save)
+        return row
+
+    def _make_span(self) -> QWidget:
+        self.span_row = QWidget()
+        self.what = Choice(dict(WHAT))
+        self.what.setToolTip("The lowest or the mean quality of each layer.")
+        self.coordinate = Choice({})
+        self.coordinate.setToolTip(
+            wrapped(
+                "What the layers of the undeformed mesh are counted along; the radius is that "
+                "about the axis of the case."
+            )
+        )
+        row = QHBoxLayout(self.span_row)
+        row.setContentsMargins(0, 0, 0, 0)
+        for choice in (self.what, self.coordinate):
+            choice.chosen.connect(lambda _: self._other_plot())
+            row.addWidget(choice, 1)
+        return self.span_row
+
+    # State to widgets ------------------------------------------------------------------
+
+    def _changed(self, old: Session, new: Session) -> None:
+        same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
+        turned = old.case.axis != new.case.axis or old.case.origin != new.case.origin
+        if not same or turned:
+            self.sync(new)
+
+    def sync(self, session: Session) -> None:
+        """Show the session."""
+        if session.mesh is not self._mesh:
+            self._mesh = session.mesh
+            self.coordinate.clear()
+            for name, text in curves.coordinates(session).items():
+                self.coordinate.addItem(text, name)
+            self.coordinate.show_value(curves.natural(session))
+        kind = self.kind.currentData()
+        missing = self._missing(session, kind)
+        self.kind.setToolTip(TIPS[kind])
+        self.span_row.setVisible(kind == "span" and not missing)
+        self.whole.setVisible(kind != "greedy" and not missing)
+        self.save.setEnabled(not missing)
+        shape = Qt.CursorShape.PointingHandCursor if kind == "steps" else Qt.CursorShape.ArrowCursor
+        self.canvas.setCursor(shape)
+        self.canvas.setToolTip(TIPS["steps"] if kind == "steps" else "")
+        if missing:
+            self.area.say(missing)
+        else:
+            self.area.plot()
+
+    def _missing(self, session: Session, kind: str) -> str:
+        """Return why there is no such plot, or an empty text."""
+        if session.mesh is None:
+            return "Open a mesh first: here are the curves of its runs."
+        if kind == "steps" and not curves.step_runs(session):
+            return "Run the case to see minimum and mean quality of each step."
+        if kind == "greedy" and curves.greedy_run(session) is None:
+            if session.run_shown is None or not session.run_shown.frames:
+                return "Run the case with data reduction to see how its error falls."
+            if session.view.frame == 0:
+                return "The undeformed mesh is shown: go to a step to see how its error fell."
+            return (
+                "This step used all boundary nodes. With data reduction (panel Method) "
+                "you see here how the error falls as control nodes are added."
+            )
+        return ""
+
+    def take_theme(self, look, _colour: str) -> None:
+        """Take the colours of the theme."""
+        self.canvas.set_look(look)
+
+    # Drawing ---------------------------------------------------------------------------
+
+    def drawing(self) -> Draw:
+        """Return what draws the plot that is chosen."""
+        session, kind = self.store.session, self.kind.currentData()
+        if self._missing(session, kind):
+            return lambda _figure, _style: None
+        whole = self.whole.isChecked()
+        if kind == "span":
+            along = self.coordinate.currentData(), self.what.currentData()
+            return partial(draw_span, self._profiles, session, along, whole)
+        return (
+            partial(draw_greedy, session)
+            if kind == "greedy"
+            else partial(draw_steps, session, whole)
+        )
+
+    # What the user does ----------------------------------------------------------------
+
+    def _other_plot(self) -> None:
+        """Show the plot that was chosen; not the one before meanwhile, of other axes."""
+        self.canvas.wipe()
+        self.sync(self.store.session)
+
+    def _picked(self, value: float) -> None:
+        """Go to the step that was clicked."""
+        if self.kind.currentData() == "steps" and not self.area.empty:
+            self.store.change(changes.show_frame, round(value))
+
+    def _save(self) -> None:
+        default = folder_of(self) / f"{self.kind.currentText().lower().replace(' ', '_')}.png"
+        ask_and_write(
+            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
+        )
+
+
+def close_limits(values) -> tuple[float, float]:
+    """Return the ends of an axis around qualities: round numbers, with room for the markers."""
+    good = np.concatenate(list(values))
+    low, high = rounded_out(float(np.nanmin(good)), float(np.nanmax(good)))
+    room = 0.04 * (high - low)
+    return low - room, high + room
+
+
+def draw_steps(session: Session, whole: bool, figure, style) -> None:
+    """Draw minimum and mean quality of each run against the step."""
+    axes, runs = figure.add_subplot(), curves.step_runs(session)
+    quality_by_step(axes, runs, style)
+    if not whole:
+        axes.set_ylim(close_limits(part for run in runs for part in (run.minimum, run.mean)))
+    at = session.view.frame
+    axes.axvline(at, color=SELECTED_COLOUR, linewidth=2.0, zorder=0.5, gid="shown")
+    last = max(len(run.frames) for run in session.runs)
+    axes.set_xlim(-0.03 * last, 1.03 * last)
+
+
+def draw_greedy(session: Session, figure, style) -> None:
+    """Draw how the error of the step that is shown fell."""
+    axes, run = figure.add_subplot(), curves.greedy_run(session)
+    convergence(axes, [run], style=style)
+    axes.set_title(run.label, fontsize=style.size, color=style.look.text)
+
+
+def draw_span(
+    profiles: curves.Profiles,
+    session: Session,
+    along: tuple[str, str],
+    whole: bool,
+    figure,
+    style,
+) -> None:
+    """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
+    axes, (coordinate, what) = figure.add_subplot(), along
+    try:
+        found = profiles.of(session, coordinate)
+    except SlidevizError as error:
+        axes.set_axis_off()
+        figure.text(
+            0.5, 0.5, str(error), ha="center", va="center", wrap=True,
+            fontsize=style.size, color=style.look.text,
+        )  # fmt: skip
+        return
+    spanwise(axes, found, what, style=style)
+    axes.yaxis.label.set_text(f"{coordinate} before deformation [mesh units]")
+    if not whole:
+        axes.set_xlim(close_limits(getattr(profile, what) for profile in found))
+    add_legend(axes, style, loc="best")

@@ -1,0 +1,120 @@
+"""The fields for one motion, in a form: a row for each thing that some kind of motion has."""
+
+from __future__ import annotations
+
+from qtpy.QtWidgets import (
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QWidget,
+)
+
+from slideviz.gui.panels.motion_kinds import KINDS
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, VectorField, a_direction, not_zero
+
+ABOUT = {"centroid": "its centroid", "axis": "the machine's axis", "point": "a point"}
+
+
+class MotionForm(QWidget):
+    """The fields; who shows a motion in them chooses the rows."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.form = QFormLayout(self)
+        self.form.setContentsMargins(0, 2, 0, 0)
+        self.form.setVerticalSpacing(4)
+        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self._make_fields()
+        self._place_fields()
+
+    def _make_fields(self) -> None:
+        self.marker = Choice({})
+        self.kind = Choice(KINDS)
+        self.vector = VectorField()
+        self.vector.set_tip("How far it moves along each axis, in the mesh's length unit.")
+        self.angle = NumberField()
+        self.angle.set_tip("Degrees; positive turns counter-clockwise seen against the axis.")
+        self.factors = VectorField((1.0, 1.0, 1.0))
+        self.factors.set_tip("Enlargement along each axis: 1 leaves it, 2 doubles it.")
+        for field in self.factors.fields:
+            field._allowed = not_zero
+        self.percent = NumberField(allowed=_above_minus_100)
+        self.percent.set_tip("How much larger the radius becomes, in percent: 3 is 3 % outwards.")
+        self.distance = NumberField()
+        self.distance.set_tip("How far outwards besides, in the mesh's length unit.")
+        self.about = Choice({"centroid": ABOUT["centroid"], "point": ABOUT["point"]})
+        self.about.setToolTip("What stays in place while it turns or grows.")
+        self.point = VectorField()
+        self.point.set_tip("The point that stays in place.")
+        self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
+        self.axis.set_tip("Direction of the axis; its length does not matter.")
+        self.path = QLineEdit()
+        self.path.setToolTip("A line for each node: its number and its displacement.")
+        self.browse = QPushButton("…")
+        self.browse.setMaximumWidth(30)
+        self.browse.setToolTip("Choose the file.")
+        self.table = QPushButton("Table…")
+        self.table.setObjectName("motion_table")
+        self.table.setToolTip("Type or paste the rows, or change them, and save them as the file.")
+        self.numbers = (
+            self.vector,
+            self.angle,
+            self.factors,
+            self.percent,
+            self.distance,
+            self.point,
+            self.axis,
+        )
+
+    def _place_fields(self) -> None:
+        row = QWidget()
+        line = QHBoxLayout(row)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.setSpacing(4)
+        line.addWidget(self.path, 1)
+        line.addWidget(self.browse)
+        line.addWidget(self.table)
+        both = QWidget()
+        pair = QHBoxLayout(both)
+        pair.setContentsMargins(0, 0, 0, 0)
+        pair.setSpacing(6)
+        pair.addWidget(self.kind, 1)
+        pair.addWidget(self.marker, 1)
+        self.form.addRow("Motion", both)
+        self._rows: dict[str, QWidget] = {
+            "vector": self.vector,
+            "angle": self.angle,
+            "factors": self.factors,
+            "percent": self.percent,
+            "distance": self.distance,
+            "about": self.about,
+            "point": self.point,
+            "axis": self.axis,
+            "path": row,
+        }
+        titles = (
+            "By",
+            "Angle (°)",
+            "Factors",
+            "Radius by (%)",
+            "and by (length)",
+            "About",
+            "Point",
+            "Axis",
+            "File",
+        )
+        for title, widget in zip(titles, self._rows.values(), strict=True):
+            self.form.addRow(QLabel(title), widget)
+
+    def show_rows(self, names: set[str]) -> None:
+        """Show these rows only."""
+        for name, widget in self._rows.items():
+            self.form.setRowVisible(widget, name in names)
+
+
+def _above_minus_100(value: float) -> str:
+    """Return why a radius cannot change by so many percent."""
+    return "" if value > -100.0 else "-100 % or less would fold the boundary"

@@ -1,0 +1,34 @@
+"""The kinds of motions: their words, and one of each that does not move anything yet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.view.motions.places import Axis
+
+KINDS: dict[type, str] = {
+    Translate: "translate",
+    Rotate: "rotate",
+    Scale: "scale",
+    Radial: "push radially",
+    FromFile: "displacement file",
+}
+
+
+def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -> Motion:
+    """Return a motion of that kind which does not move anything yet.
+
+    Where the mesh repeats about an axis, what turns or is pushed does so about that axis.
+    """
+    axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    if kind is Translate:
+        return Translate(marker, (0.0,) * dim)
+    if kind is Rotate:
+        about = "centroid" if machine is None else origin[:dim]
+        return Rotate(marker, 0.0, about, axis)
+    if kind is Radial:
+        return Radial(marker, 1.0, 0.0, axis, origin[:dim])
+    if kind is Scale:
+        return Scale(marker, (1.0,) * dim)
+    return FromFile(Path(), marker)

@@ -1,0 +1,244 @@
+"""The motion panel: what the moving boundaries do, in sequence, and the form for one of them."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QMenu,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.case.model import FromFile
+from slideviz.errors import SlidevizError
+from slideviz.gui.panels.motion_editor import MotionEditor
+from slideviz.gui.panels.motion_kinds import KINDS, new_motion
+from slideviz.gui.panels.motion_table import ask_table
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.plot_canvas import folder_of, main_window
+from slideviz.mesh.model import Mesh
+from slideviz.view.drawing.look import Look
+from slideviz.view.motions.places import centroids, machine_axis
+from slideviz.view.motions.table import Rows
+from slideviz.view.motions.words import describe
+from slideviz.view.session import changes
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
+
+HEIGHT, LEAST_HEIGHT = 300, 210
+"""Pixels that the panel would like, and that its longest form needs."""
+
+
+class MotionPanel(QWidget):
+    """Lists the motions and edits the chosen one."""
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._syncing = False
+        self._mesh: Mesh | None = None
+        self._extent = 0.0
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 4)
+        layout.setSpacing(4)
+        layout.addLayout(self._make_buttons())
+        self.list = QListWidget()
+        self.list.setObjectName("motions")
+        self.list.setMinimumHeight(52)
+        self.list.setMaximumHeight(140)
+        self.list.setAlternatingRowColors(True)
+        self.list.currentRowChanged.connect(lambda _: self._row_changed())
+        layout.addWidget(self.list, 4)
+        self.editor = MotionEditor()
+        self.editor.changed.connect(self._edited)
+        self.editor.table_wanted.connect(self.edit_table)
+        layout.addWidget(self.editor)
+        self.hint = QLabel()
+        self.hint.setWordWrap(True)
+        self.hint.setProperty("hint", True)
+        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self.hint)
+        layout.addStretch(1)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setSpacing(2)
+        self.add = QToolButton()
+        self.add.setObjectName("add_motion")
+        self.add.setText("Add motion")
+        self.add.setIcon(icon("add"))
+        self.add.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self.add)
+        self.add_actions = {}
+        for kind, words in KINDS.items():
+            self.add_actions[kind] = menu.addAction(words.capitalize())
+            self.add_actions[kind].triggered.connect(partial(self._add, kind))
+        self.add_table = menu.addAction("Displacement table…", self.new_table)
+        self.add.setMenu(menu)
+        row.addWidget(self.add)
+        row.addStretch(1)
+        self.up, self.down, self.remove = (
+            self._button("up", "Perform it earlier", lambda: self._move(-1)),
+            self._button("down", "Perform it later", lambda: self._move(1)),
+            self._button("remove", "Remove the motion (Del)", self._remove),
+        )
+        for button in (self.up, self.down, self.remove):
+            row.addWidget(button)
+        return row
+
+    def _button(self, name: str, tip: str, function) -> QToolButton:
+        button = QToolButton()
+        button.setObjectName(f"motion_{name}")
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
+        button.clicked.connect(function)
+        return button
+
+    def take_theme(self, _look: Look, colour: str) -> None:
+        """Redraw the icons in another colour."""
+        self.add.setIcon(icon("add", colour))
+        for button, name in ((self.up, "up"), (self.down, "down"), (self.remove, "remove")):
+            button.setIcon(icon(name, colour))
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session."""
+        motions, moving = session.case.motions, session.case.markers_with("moving")
+        if session.mesh is not self._mesh:
+            self._take_mesh(session.mesh)
+        self._syncing = True
+        try:
+            dim = session.mesh.dim if session.mesh is not None else 2
+            said = (describe(motion, dim, self._extent) for motion in motions)
+            texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
+            current = self.list.currentRow()
+            if self.list.count() != len(texts):
+                # A new motion is the one to be edited; after a removal, its neighbour is.
+                current = len(texts) - 1 if len(texts) > self.list.count() else current
+                self.list.clear()
+                self.list.addItems(texts)
+            for row, text in enumerate(texts):
+                self.list.item(row).setText(text)
+                self.list.item(row).setToolTip(text)
+            self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
+        finally:
+            self._syncing = False
+        self.editor.set_machine(machine_axis(session))
+        self._sync_editor(session)
+        self._sync_buttons(session, moving)
+
+    def _take_mesh(self, mesh: Mesh | None) -> None:
+        """Note what motions need to know of another mesh; that takes a while."""
+        self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
+        self.editor.set_centroids(centroids(mesh) if mesh is not None else {})
+        self.editor.set_extent(self._extent)
+
+    def _sync_editor(self, session: Session) -> None:
+        row, motions = self.list.currentRow(), session.case.motions
+        dim = session.mesh.dim if session.mesh else 3
+        motion = motions[row] if 0 <= row < len(motions) else None
+        self.editor.show_motion(motion, session.case.markers_with("moving"), dim)
+
+    def _sync_buttons(self, session: Session, moving: tuple[str, ...]) -> None:
+        row, count = self.list.currentRow(), self.list.count()
+        self.up.setEnabled(row > 0)
+        self.down.setEnabled(0 <= row < count - 1)
+        self.remove.setEnabled(row >= 0)
+        self.add.setEnabled(bool(moving))
+        if session.mesh is None:
+            why = "Open a mesh first."
+        elif not moving:
+            why = "No boundary moves yet. Give one the role “moving” in the table above."
+        else:
+            why = ""
+        self.add.setToolTip(why or "Add a motion; several are performed in sequence.")
+        self.hint.setText(why or "Add the motions of the boundary; the view shows them at once.")
+        self.hint.setVisible(bool(why) or count == 0)
+
+    # Widgets to state ------------------------------------------------------------------
+
+    def _row_changed(self) -> None:
+        if not self._syncing:
+            session = self.store.session
+            self._sync_editor(session)
+            self._sync_buttons(session, session.case.markers_with("moving"))
+
+    def _next_marker(self) -> str:
+        """Return the boundary that a new motion is for."""
+        session = self.store.session
+        moving = session.case.markers_with("moving")
+        chosen = [name for name in session.view.selected if name in moving]
+        return (chosen or list(moving))[0]
+
+    def _add(self, kind: type, *_checked: bool) -> None:
+        session = self.store.session
+        motion = new_motion(kind, self._next_marker(), session.mesh.dim, machine_axis(session))
+        self.store.change(changes.add_motion, motion)
+
+    def new_table(self) -> None:
+        """Let a table of displacements be typed, and add a motion that uses it."""
+        marker = self._next_marker()
+        path = self._ask_table(marker, Path())
+        if path is not None:
+            self.store.change(changes.add_motion, FromFile(path, marker))
+
+    def edit_table(self) -> None:
+        """Let the rows of the displacement file of a motion be typed."""
+        row = self.list.currentRow()
+        motion = self.store.session.case.motions[row]
+        path = self._ask_table(motion.marker, motion.path)
+        if path is None:
+            return
+        if path == motion.path:
+            # The same file with other rows: only another motion makes everybody read it again.
+            self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
+        self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
+
+    def _ask_table(self, marker: str, path: Path) -> Path | None:
+        case, mesh_file = self.store.session.case, self.store.session.path
+        beside = case.source or mesh_file
+        folder = beside.parent if beside is not None else folder_of(self)
+        default = folder / f"displacement_{marker or 'all'}.txt"
+        try:
+            rows = Rows.on(self.store.session.mesh, case, marker)
+            return ask_table(self.window(), rows, path, default)
+        except SlidevizError as error:
+            main_window(self).banner.tell_error(error)
+            return None
+
+    def _edited(self, motion: object) -> None:
+        self.store.change(changes.replace_motion, self.list.currentRow(), motion)
+
+    def _remove(self) -> None:
+        self.store.change(changes.remove_motion, self.list.currentRow())
+
+    def _move(self, by: int) -> None:
+        row = self.list.currentRow()
+        self.store.change(changes.move_motion, row, by)
+        self.list.setCurrentRow(row + by)
+
+    def sizeHint(self) -> QSize:
+        # Whatever the form shows: else the panel above would jump with every motion.
+        return QSize(super().sizeHint().width(), HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(super().minimumSizeHint().width(), LEAST_HEIGHT)
+
+    def keyPressEvent(self, event) -> None:
+        if event.key() == Qt.Key.Key_Delete and self.list.hasFocus() and self.remove.isEnabled():
+            self._remove()
+            return
+        super().keyPressEvent(event)

@@ -1,0 +1,171 @@
+"""The runs panel: what was computed with which settings, and how good it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QIcon
+from qtpy.QtWidgets import QLabel, QMenu, QTreeWidgetItem, QVBoxLayout, QWidget
+
+from slideviz.gui.panels.runs_actions import RunActions
+from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.drawing.look import Look
+from slideviz.view.session import changes
+from slideviz.view.session.runs_table import QUALITY, best, described
+from slideviz.view.session.runs_words import brief, run_words
+from slideviz.view.session.state import Run, Session
+from slideviz.view.session.store import Store
+
+EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
+
+
+class RunsPanel(QWidget):
+    """Lists the runs; a click shows one, with Ctrl beside the one that is shown.
+
+    Parameters
+    ----------
+    store : Store
+    save_mesh : callable
+        Asks for a name and writes the mesh that is shown.
+    tell_error : callable
+        Shows an error.
+    say : callable
+        Shows that something was done.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        save_mesh: Callable[[], None] = lambda: None,
+        tell_error: Callable[[BaseException], None] = lambda _: None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        super().__init__()
+        self.store = store
+        self._syncing = False
+        self._drawn: tuple[object, ...] = ()
+        self._colour = "#3b4652"
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 4)
+        layout.setSpacing(4)
+        self.empty = QLabel(EMPTY)
+        self.empty.setWordWrap(True)
+        self.empty.setProperty("hint", True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.tree = RunTree()
+        self.actions_ = RunActions(self, self.tree, store, save_mesh, (tell_error, say))
+        self.buttons = self.actions_.buttons
+        self._connect()
+        layout.addWidget(self.empty, 1)
+        layout.addWidget(self.tree, 1)
+        layout.addLayout(self.actions_.row)
+        self.actions_.set_icon_colour(self._colour)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _connect(self) -> None:
+        self.tree.session = lambda: self.store.session
+        self.tree.currentItemChanged.connect(self._chosen)
+        self.tree.itemDoubleClicked.connect(lambda *_: self._double_clicked())
+        self.tree.beside_wanted.connect(self.actions_.show_beside)
+        self.tree.renamed.connect(
+            lambda number, name: self.store.change(changes.rename_run, number, name)
+        )
+        self.tree.customContextMenuRequested.connect(self._menu_wanted)
+
+    def take_theme(self, _look: Look | None, colour: str) -> None:
+        """Draw the icons in the colours of another theme."""
+        self._colour = colour
+        self.actions_.set_icon_colour(colour)
+        self._drawn = ()
+        if self.store.session.runs:
+            self.sync(self.store.session)
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session; the rows are touched only when a run or the choice differs."""
+        key = (session.runs, session.shown, session.view.beside)
+        if key == self._drawn:
+            return
+        self._drawn = key
+        self._syncing = True
+        try:
+            self._fill(session)
+        finally:
+            self._syncing = False
+        self.empty.setVisible(not session.runs)
+        self.tree.setVisible(bool(session.runs))
+        self.actions_.sync(session)
+
+    def _fill(self, session: Session) -> None:
+        tree, runs = self.tree, session.runs
+        while tree.topLevelItemCount() > len(runs):
+            tree.takeTopLevelItem(tree.topLevelItemCount() - 1)
+        while tree.topLevelItemCount() < len(runs):
+            item = QTreeWidgetItem()
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
+            tree.addTopLevelItem(item)
+        champions = best(runs)
+        for place, run in enumerate(runs):
+            self._sync_row(tree.topLevelItem(place), run, session, run.number in champions)
+        shown = next((place for place, run in enumerate(runs) if run.number == session.shown), None)
+        tree.setCurrentItem(tree.topLevelItem(shown) if shown is not None else None)
+
+    def _sync_row(self, item: QTreeWidgetItem, run: Run, session: Session, champion: bool) -> None:
+        last = run.last
+        texts = [f"{run.number}  {run_words(run)}", "–", "–", "–"]
+        if last is not None:
+            quality = last.quality
+            texts[1:] = (
+                format(quality.min, QUALITY),
+                format(quality.mean, QUALITY),
+                f"{quality.inverted:,}",
+            )
+        beside = run.number == session.view.beside
+        tip = described(run)
+        if champion:
+            tip += "\n\nIts minimum quality is the highest of the runs with the same motion."
+        for column, text in enumerate(texts):
+            item.setText(column, text)
+            item.setToolTip(column, wrapped(tip))
+            if column != RUN:
+                item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        font = item.font(MIN)
+        font.setBold(champion)
+        item.setFont(MIN, font)
+        item.setData(RUN, NUMBER, run.number)
+        item.setData(RUN, NAME, run.name)
+        item.setData(RUN, WORDS, ("beside · " if beside else "") + brief(run, session.runs))
+        item.setIcon(RUN, icon("beside", self._colour) if beside else QIcon())
+
+    # Widgets to state ------------------------------------------------------------------
+
+    def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
+        if not self._syncing and item is not None:
+            self.store.change(changes.show_run, item.data(RUN, NUMBER))
+
+    def _double_clicked(self) -> None:
+        """Show the run beside the one that was shown before, or end the comparison with it."""
+        number, (before, frame, beside) = self.tree.number, self.tree.seen_before
+        if number is None:
+            return
+        if before is None or before == number:
+            self.store.change(changes.show_beside, None)
+            return
+        self.store.change(changes.show_run, before)
+        self.store.change(changes.show_beside, None if beside == number else number)
+        self.store.change(changes.show_frame, frame)
+
+    def _menu_wanted(self, where) -> None:
+        item = self.tree.itemAt(where)
+        if item is None:
+            return
+        self.menu(item.data(RUN, NUMBER)).popup(self.tree.viewport().mapToGlobal(where))
+
+    def menu(self, number: int) -> QMenu:
+        """Return what can be done with a run."""
+        return self.actions_.menu(number)

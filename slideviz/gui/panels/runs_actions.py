@@ -1,0 +1,183 @@
+"""What can be done with runs: the buttons below their list, and the menu of a row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtWidgets import QApplication, QHBoxLayout, QMenu, QToolButton, QWidget
+
+from slideviz.errors import SlidevizError
+from slideviz.gui import dialogs
+from slideviz.gui.canvas.beside import fill_compare
+from slideviz.gui.panels.runs_tree import RunTree
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.session import changes
+from slideviz.view.session.runs_table import table_text, write_table
+from slideviz.view.session.runs_words import run_words
+from slideviz.view.session.state import Session
+from slideviz.view.session.store import Store
+
+TIP_COMPARE = (
+    "Show the undeformed mesh or another run beside the run that is shown. "
+    "Ctrl+click on a run does so too."
+)
+TABLE_FILTERS = "Table (*.csv)"
+
+Tell = tuple[Callable[[BaseException], None], Callable[[str], None]]
+"""What shows an error, and what shows that something was done."""
+
+
+class RunActions:
+    """The actions of the runs panel, each about the run that is chosen or one that is given.
+
+    Attributes
+    ----------
+    buttons : dict of str to QToolButton
+    row : QHBoxLayout
+        Where they are.
+    """
+
+    def __init__(
+        self,
+        panel: QWidget,
+        tree: RunTree,
+        store: Store,
+        save_mesh: Callable[[], None],
+        tell: Tell,
+    ) -> None:
+        self.panel, self.tree, self.store, self._save = panel, tree, store, save_mesh
+        self._tell_error, self._say = tell
+        self.row = QHBoxLayout()
+        self.row.setSpacing(2)
+        self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
+        self.row.addWidget(self.buttons["compare"])
+        for name, image, tip, function in (
+            ("settings", "settings", "Put its settings back into the panels", self.take_settings),
+            ("save", "save", "Save the mesh of this run", self.save_mesh),
+            ("remove", "remove", "Remove this run from the list", self.remove),
+            ("copy", "copy", "Copy the table of all runs", self.copy_table),
+            ("export", "table", "Export the table of all runs as CSV", self.export_table),
+        ):
+            button = self._make_button(name, image, tip)
+            button.clicked.connect(lambda _=False, function=function: function())
+            if name == "copy":
+                self.row.addStretch(1)
+            self.row.addWidget(button)
+            self.buttons[name] = button
+
+    def _make_button(self, name: str, image: str, tip: str) -> QToolButton:
+        button = QToolButton()
+        button.setObjectName(f"runs_{name}")
+        button.setToolTip(wrapped(tip))
+        button.setIconSize(QSize(18, 18))
+        button.setProperty("image", image)
+        return button
+
+    def _make_compare(self) -> QToolButton:
+        button = self._make_button("compare", "beside", TIP_COMPARE)
+        button.setText("Compare")
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(button)
+        menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
+        button.setMenu(menu)
+        return button
+
+    def set_icon_colour(self, colour: str) -> None:
+        """Draw the icons in another colour."""
+        for button in self.buttons.values():
+            button.setIcon(icon(button.property("image"), colour))
+
+    def sync(self, session: Session) -> None:
+        """Show what can be done."""
+        run = session.run_shown
+        done = run is not None and run.last is not None
+        for name, can in (
+            ("compare", done),
+            ("settings", run is not None),
+            ("save", done and bool(run.end)),
+            ("remove", run is not None and bool(run.end)),
+            ("copy", bool(session.runs)),
+            ("export", bool(session.runs)),
+        ):
+            self.buttons[name].setEnabled(can)
+
+    def menu(self, number: int) -> QMenu:
+        """Return what can be done with a run."""
+        session, menu = self.store.session, QMenu(self.panel)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        run = session.run(number)
+        # A click with the right button chooses no row: which one is meant, the menu says.
+        menu.addAction(f"Run {number}: {run_words(run)}").setEnabled(False)
+        menu.addSeparator()
+        beside = session.view.beside == number
+        for text, can, function in (
+            ("Show", True, lambda: self.store.change(changes.show_run, number)),
+            (
+                "End the comparison" if beside else f"Show beside run {session.shown}",
+                beside or number != session.shown,
+                lambda: self.show_beside(number),
+            ),
+            ("Rename\tF2", True, lambda: self.tree.edit_name(number)),
+            ("Put its settings back into the panels", True, lambda: self.take_settings(number)),
+            ("Save its mesh…", bool(run.frames and run.end), lambda: self.save_mesh(number)),
+            ("Remove", bool(run.end), lambda: self.remove(number)),
+            ("", True, None),
+            ("Copy the table", True, self.copy_table),
+            ("Export the table…", True, self.export_table),
+        ):
+            if not text:
+                menu.addSeparator()
+                continue
+            act = menu.addAction(text)
+            act.setEnabled(can)
+            act.triggered.connect(lambda _=False, function=function: function())
+        return menu
+
+    def show_beside(self, number: int) -> None:
+        """Show a run beside the one that is shown, or no longer."""
+        session = self.store.session
+        if number != session.shown:
+            ends = session.view.beside == number
+            self.store.change(changes.show_beside, None if ends else number)
+
+    def take_settings(self, number: int | None = None) -> None:
+        """Put the settings of a run back into the panels."""
+        self.store.change(changes.take_settings, number or self.tree.number)
+
+    def save_mesh(self, number: int | None = None) -> None:
+        """Show a run and save the mesh of its last step."""
+        self.store.change(changes.show_run, number or self.tree.number)
+        self._save()
+
+    def remove(self, number: int | None = None) -> None:
+        """Remove a run from the list."""
+        number = number or self.tree.number
+        if number is None:
+            return
+        self.store.change(changes.remove_run, number)
+        self._say(f"Run {number} removed (Ctrl+Z brings it back)")
+
+    def copy_table(self) -> None:
+        """Put the table into the clipboard, for a spreadsheet."""
+        QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
+        self._say("Copied the table of runs")
+
+    def export_table(self) -> None:
+        """Ask for a name and write the table."""
+        session = self.store.session
+        folder = session.path.parent if session.path is not None else Path.home()
+        stem = session.path.stem if session.path is not None else "mesh"
+        default = folder / f"{stem}_runs.csv"
+        path = dialogs.ask_save(self.panel, "Export the table of runs", default, TABLE_FILTERS)
+        if path is None:
+            return
+        try:
+            write_table(path, session.runs)
+        except SlidevizError as error:
+            self._tell_error(error)
+            return
+        self._say(f"Saved {path}")

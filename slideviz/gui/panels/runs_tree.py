@@ -1,0 +1,213 @@
+"""The list of the runs: numbers in columns, and a line of words below them."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qtpy.QtCore import QSize, Qt, Signal
+from qtpy.QtGui import QPalette
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QLineEdit,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTreeWidget,
+)
+
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.session.state import Session
+
+RUN, MIN, MEAN, INVERTED = range(4)
+NUMBER = Qt.ItemDataRole.UserRole
+WORDS, NAME = NUMBER + 1, NUMBER + 2
+"""What a row keeps beside its texts: the number of its run, the line below, and its own name."""
+PAD = 4
+TIPS = (
+    "Number, and name (F2) or method; below it what sets it apart. Ctrl+click shows it beside.",
+    "Lowest quality of a cell after the last step; the best of the runs with one motion is bold.",
+    "Mean quality of the cells after the last step.",
+    "Inverted cells after the last step.",
+)
+
+
+class _FirstLine(QStyledItemDelegate):
+    """Draws a cell in the upper half of its row: the lower half is one line for all columns.
+
+    Signals
+    -------
+    renamed(int, str)
+        A run got another name, by its number.
+    """
+
+    renamed = Signal(int, str)
+
+    def sizeHint(self, option, index) -> QSize:
+        item = QStyleOptionViewItem(option)
+        self.initStyleOption(item, index)  # the best is bold, thus wider
+        width = item.fontMetrics.horizontalAdvance(item.text) + 2 * PAD + 4
+        return QSize(width, 2 * option.fontMetrics.height() + 2 * PAD)
+
+    def paint(self, painter, option, index) -> None:
+        item = QStyleOptionViewItem(option)
+        self.initStyleOption(item, index)
+        element = QStyle.PrimitiveElement.PE_PanelItemViewItem
+        item.widget.style().drawPrimitive(element, item, painter, item.widget)
+        rect = item.rect.adjusted(PAD, PAD, -PAD, 0)
+        rect.setHeight(item.fontMetrics.height())
+        painter.save()
+        painter.setFont(item.font)
+        painter.setPen(text_colour(item, QPalette.ColorRole.Text))
+        image = index.data(Qt.ItemDataRole.DecorationRole)
+        if image is not None and not image.isNull():
+            image.paint(painter, rect.right() - 15, rect.top(), 16, rect.height())
+            rect.setRight(rect.right() - 18)
+        shown = item.fontMetrics.elidedText(item.text, Qt.TextElideMode.ElideRight, rect.width())
+        painter.drawText(rect, item.displayAlignment, shown)
+        painter.restore()
+
+    def createEditor(self, parent, _option, index) -> QLineEdit | None:
+        if index.column() != RUN:
+            return None
+        editor = QLineEdit(parent)
+        editor.setPlaceholderText(f"Name of run {index.data(NUMBER)}")
+        return editor
+
+    def setEditorData(self, editor, index) -> None:
+        # The row changes while its run goes on; what is being typed stays.
+        if not editor.isModified():
+            editor.setText(index.data(NAME))
+
+    def setModelData(self, editor, _model, index) -> None:
+        self.renamed.emit(index.data(NUMBER), editor.text())
+
+    def updateEditorGeometry(self, editor, option, _index) -> None:
+        width = editor.parentWidget().width() - option.rect.left()
+        editor.setGeometry(option.rect.left(), option.rect.top(), width, option.rect.height())
+
+
+def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
+    """Return the colour of letters in a row, chosen or not."""
+    chosen = bool(option.state & QStyle.StateFlag.State_Selected)
+    active = bool(option.state & QStyle.StateFlag.State_Active)
+    group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
+    return option.palette.color(group, QPalette.ColorRole.HighlightedText if chosen else plain)
+
+
+class RunTree(QTreeWidget):
+    """A row for each run: numbers in columns, and below them a line over the whole width.
+
+    Signals
+    -------
+    beside_wanted(int)
+        A run was clicked with Ctrl, by its number.
+    renamed(int, str)
+        A run got another name, by its number.
+    """
+
+    beside_wanted = Signal(int)
+    renamed = Signal(int, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("runs")
+        self.setColumnCount(4)
+        self.setHeaderLabels(["Run", "Min", "Mean", "Inv."])
+        self.setRootIsDecorated(False)
+        self.setUniformRowHeights(True)
+        self.setAlternatingRowColors(True)
+        self.setAllColumnsShowFocus(True)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        first = _FirstLine(self)
+        first.renamed.connect(self.renamed)
+        self.setItemDelegate(first)
+        self.setMinimumHeight(80)
+        for column, tip in enumerate(TIPS):
+            self.headerItem().setToolTip(column, wrapped(tip))
+        header = self.header()
+        header.setStretchLastSection(False)
+        header.setMinimumSectionSize(36)
+        header.setSectionResizeMode(RUN, QHeaderView.ResizeMode.Stretch)
+        for column in (MIN, MEAN, INVERTED):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+            self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        self.seen_before: tuple[int | None, int, int | None] = (None, 0, None)
+        self.session: Callable[[], Session] = Session
+
+    @property
+    def number(self) -> int | None:
+        """Return the number of the run whose row is chosen."""
+        item = self.currentItem()
+        return None if item is None else item.data(RUN, NUMBER)
+
+    def edit_name(self, number: int | None = None) -> None:
+        """Let the name of a run be typed in its row; of that which is chosen."""
+        number = self.number if number is None else number
+        for place in range(self.topLevelItemCount()):
+            item = self.topLevelItem(place)
+            if item.data(RUN, NUMBER) == number:
+                self.editItem(item, RUN)
+
+    def keyPressEvent(self, event) -> None:
+        if event.key() == Qt.Key.Key_F2:
+            self.edit_name()
+            return
+        super().keyPressEvent(event)
+
+    def mousePressEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.RightButton:
+            event.accept()  # the menu is about the run below the mouse; another may stay shown
+            return
+        if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            item = self.itemAt(event.position().toPoint())
+            if item is not None:
+                self.beside_wanted.emit(item.data(RUN, NUMBER))
+            event.accept()
+            return
+        # A double click begins with a click, which shows the run: what was shown before it is
+        # what the run is to be compared with.
+        now = self.session()
+        self.seen_before = now.shown, now.view.frame, now.view.beside
+        super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event) -> None:
+        # A drag with Ctrl or the right button chooses nothing.
+        if event.buttons() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseMoveEvent(event)
+
+    def mouseReleaseEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseReleaseEvent(event)
+
+    def mouseDoubleClickEvent(self, event) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
+            super().mouseDoubleClickEvent(event)
+
+    def dataChanged(self, first, last, roles=()) -> None:
+        super().dataChanged(first, last, roles)
+        # The line below spans all columns; Qt draws only the one that has changed.
+        self.viewport().update()
+
+    def drawRow(self, painter, option, index) -> None:
+        super().drawRow(painter, option, index)
+        rect = self.visualRect(index.siblingAtColumn(RUN))
+        height = option.fontMetrics.height()
+        rect = rect.adjusted(PAD, height + PAD, 0, 0)
+        rect.setRight(self.viewport().width() - PAD)
+        rect.setHeight(height)
+        row = QStyleOptionViewItem(option)
+        if self.selectionModel().isSelected(index):
+            row.state |= QStyle.StateFlag.State_Selected
+        painter.save()
+        painter.setPen(text_colour(row, QPalette.ColorRole.PlaceholderText))
+        text = str(index.siblingAtColumn(RUN).data(WORDS))
+        shown = option.fontMetrics.elidedText(text, Qt.TextElideMode.ElideRight, rect.width())
+        painter.drawText(rect, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, shown)
+        painter.restore()

@@ -1,0 +1,223 @@
+"""The form for one section: direction, place or radius, whole cells or cut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from qtpy.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from qtpy.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QSlider, QWidget
+
+from slideviz.errors import CaseError
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, VectorField
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.view.sections import start as section_start
+from slideviz.view.sections.model import Section, Triple
+
+STEPS = 1000
+"""Places of the slider."""
+
+FREE = "free"
+AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+class SectionEditor(QWidget):
+    """Shows a section and tells each valid change of it.
+
+    What the slider is dragged through is told once per turn of the event loop, so that drawing
+    never falls behind the mouse.
+    """
+
+    changed = Signal(object)
+    held = Signal(bool)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._section: Section | None = None
+        self._points: FloatArray | None = None
+        self._mesh: Mesh | None = None
+        self._span = (0.0, 1.0)
+        self._span_of: tuple[object, ...] = ()
+        self._free = False
+        self._make_fields()
+        self._place_fields()
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(0)
+        self._soon.timeout.connect(self._slid)
+
+    def _make_fields(self) -> None:
+        self.axis = Choice({**{word: word for word in AXES}, FREE: "free"})
+        self.axis.chosen.connect(self._axis_chosen)
+        self.direction = VectorField((0.0, 0.0, 1.0))
+        self.direction.set_tip("Any length but zero.")
+        self.direction.changed.connect(self._direction_typed)
+        self.centre = VectorField()
+        self.centre.changed.connect(self._centre_typed)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setRange(0, STEPS)
+        self.slider.setPageStep(STEPS // 20)
+        self.slider.setMinimumWidth(80)
+        self.slider.valueChanged.connect(lambda _: self._soon.start())
+        self.slider.sliderPressed.connect(lambda: self.held.emit(True))
+        self.slider.sliderReleased.connect(self._let_go)
+        self.number = NumberField(0.0, self._allowed)
+        self.number.setFixedWidth(84)
+        self.number.changed.connect(self._position_typed)
+        self.whole = QCheckBox("Whole cells")
+        self.whole.setToolTip("Show the cells it cuts whole, instead of cut.")
+        self.whole.toggled.connect(lambda on: self._tell(whole=on))
+
+    def _place_fields(self) -> None:
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.setVerticalSpacing(4)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self.axis_name, self.place_name = QLabel("Normal"), QLabel("Position")
+        # One width for all words, so that the fields do not jump.
+        self.axis_name.setMinimumWidth(self.fontMetrics().horizontalAdvance("Position"))
+        first, second = QHBoxLayout(), QHBoxLayout()
+        for line, widgets in (
+            (first, ((self.axis, 1), (self.whole, 0))),
+            (second, ((self.slider, 1), (self.number, 0))),
+        ):
+            line.setContentsMargins(0, 0, 0, 0)
+            line.setSpacing(6)
+            for widget, stretch in widgets:
+                line.addWidget(widget, stretch)
+        form.addRow(self.axis_name, first)
+        form.addRow("", self.direction)
+        form.addRow("Centre", self.centre)
+        form.addRow(self.place_name, second)
+        self.form = form
+
+    # What is shown ---------------------------------------------------------------------
+
+    def show_section(self, section: Section | None, mesh: Mesh | None) -> None:
+        """Show a section of a mesh, or nothing."""
+        other = self._section is None or section is None or section.kind != self._section.kind
+        self._section = section
+        self.setVisible(section is not None and mesh is not None)
+        if section is None or mesh is None:
+            return
+        if mesh is not self._mesh:
+            self._mesh, self._points = mesh, section_start.cell_points(mesh)
+        cylinder, flat = section.kind == "cylinder", mesh.dim == 2
+        word = _axis_of(section)
+        if other:
+            self._free = False
+        self._free = self._free or word == FREE
+        # The axis of a circle cannot be another.
+        self.axis.setVisible(not (cylinder and flat))
+        self.axis_name.setText("" if cylinder and flat else "Axis" if cylinder else "Normal")
+        self.place_name.setText("Radius" if cylinder else "Position")
+        self.axis.setToolTip("Direction of the axis." if cylinder else "Direction of the normal.")
+        shape = "line" if flat else "plane"
+        self.number.set_tip(
+            "The radius, in the mesh's length unit."
+            if cylinder
+            else f"How far the {shape} is from 0 along its normal, in the mesh's length unit."
+        )
+        self.axis.show_value(FREE if self._free else word)
+        self.direction.set_count(mesh.dim)
+        self.centre.set_count(mesh.dim)
+        point = "The middle of the circle" if flat else "A point of the axis"
+        self.centre.set_tip(f"{point}, in the mesh's length unit.")
+        self.direction.show_value(section.direction)
+        self.centre.show_value(section.origin)
+        for widget, shown in (
+            (self.direction, self._free and not (cylinder and flat)),
+            (self.centre, cylinder),
+        ):
+            self.form.setRowVisible(widget, shown)
+        with QSignalBlocker(self.whole):
+            self.whole.setChecked(section.whole)
+        self._sync_axes(flat)
+        self._sync_place(section)
+
+    def _sync_axes(self, flat: bool) -> None:
+        """Offer the axes there are."""
+        at = self.axis.findData("z")
+        item = self.axis.model().item(at)
+        item.setEnabled(not flat)
+
+    def _sync_place(self, section: Section) -> None:
+        """Show position or radius; the range is looked for again only where it may differ."""
+        centre = section.origin if section.kind == "cylinder" else ()
+        key = (self._mesh, section.kind, section.direction, centre)
+        if key != self._span_of:
+            assert self._points is not None
+            self._span_of, self._span = key, section_start.span(section, self._points)
+        value, (low, high) = section_start.position(section), self._span
+        self.number.show_value(float(f"{value:.6g}"))
+        if self.slider.isSliderDown() or self._soon.isActive():
+            return  # the mouse knows better
+        share = (value - low) / (high - low) if high > low else 0.0
+        with QSignalBlocker(self.slider):
+            self.slider.setValue(round(float(np.clip(share, 0.0, 1.0)) * STEPS))
+
+    # What is told ----------------------------------------------------------------------
+
+    def _tell(self, **values: object) -> None:
+        if self._section is not None:
+            self._offer(replace(self._section, **values))  # type: ignore[arg-type]
+
+    def _offer(self, section: Section) -> None:
+        if section != self._section:
+            self.changed.emit(section)
+
+    def _axis_chosen(self, word: str) -> None:
+        self._free = word == FREE
+        if self._section is None or self._points is None:
+            return
+        if word == FREE:
+            self.show_section(self._section, self._mesh)
+        else:
+            self._offer(section_start.turned(self._section, AXES[word], self._points))
+
+    def _direction_typed(self, values: tuple[float, ...]) -> None:
+        direction = (*values, 0.0, 0.0)[:3]
+        if any(direction) and self._section is not None and self._points is not None:
+            self._offer(section_start.turned(self._section, direction, self._points))
+        elif not any(direction):
+            self.direction.fields[0].setToolTip("A direction is needed: not all may be 0.")
+
+    def _centre_typed(self, values: tuple[float, ...]) -> None:
+        self._tell(origin=(*values, 0.0)[:3])
+
+    def _position_typed(self, value: float) -> None:
+        if self._section is not None:
+            self._offer(section_start.at_position(self._section, value))
+
+    def _allowed(self, value: float) -> str:
+        if self._section is None:
+            return ""
+        try:
+            section_start.at_position(self._section, value)
+        except CaseError as problem:
+            return str(problem)
+        return ""
+
+    def _let_go(self) -> None:
+        if self._soon.isActive():
+            self._soon.stop()
+            self._slid()
+        self.held.emit(False)
+
+    def _slid(self) -> None:
+        if self._section is None:
+            return
+        low, high = self._span
+        # A cylinder has no radius 0, and a plane in the outermost nodes cuts nothing.
+        share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
+        self._offer(section_start.at_position(self._section, low + float(share) * (high - low)))
+
+
+def _axis_of(section: Section) -> str:
+    """Return x, y or z where the direction is that axis, else ``FREE``."""
+    unit = np.asarray(section.direction) / np.linalg.norm(section.direction)
+    for word, axis in AXES.items():
+        if abs(unit @ np.asarray(axis)) > 1.0 - 1e-12:
+            return word
+    return FREE

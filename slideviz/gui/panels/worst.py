@@ -1,0 +1,256 @@
+"""The worst cells of the step that is shown: a table; a click flies to one and marks it."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from html import escape
+
+from qtpy.QtCore import QModelIndex, Qt, QTimer
+from qtpy.QtGui import QGuiApplication, QKeySequence, QShortcut
+from qtpy.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.gui.panels.worst_table import WorstModel, WorstTable
+from slideviz.gui.theme import alarm
+from slideviz.gui.widgets.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
+from slideviz.mesh.model import FloatArray
+from slideviz.view.inspect import (
+    cell_info,
+    measure,
+    table_rows,
+    worst_cells,
+    write_table,
+)
+from slideviz.view.session import changes
+from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.store import Store
+from slideviz.view.where import Around, axis_of, coordinates, nearest_boundary
+
+
+class WorstPanel(QWidget):
+    """The hundred worst cells; the one that is marked is the current row.
+
+    Parameters
+    ----------
+    store : Store
+    fly_to, fly_back : callable
+        Look at a cell; look from where one looked before.
+    """
+
+    def __init__(
+        self, store: Store, fly_to: Callable[[int], None], fly_back: Callable[[], None]
+    ) -> None:
+        super().__init__()
+        self.store = store
+        self._fly_to, self._fly_back = fly_to, fly_back
+        self._seen: tuple[object, ...] = ()
+        self._last = 0.0
+        self._marked: int | None = None
+        self.model = WorstModel()
+        # Its signals hold this panel: with a parent they end with it.
+        self.model.setParent(self)
+        self.table = self._make_table()
+        self.words = words_label()
+        self.info = QLabel()
+        self.info.setObjectName("cell_info")
+        self.info.setWordWrap(True)
+        self.info.setTextFormat(Qt.TextFormat.RichText)
+        self.info.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(self.words)
+        self.stack.addWidget(self.table)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 4, 4, 4)
+        column.setSpacing(3)
+        column.addWidget(self.stack, 1)
+        column.addWidget(self.info)
+        column.addLayout(self._make_buttons())
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.timeout.connect(lambda: self._fill(self.store.session))
+        for keys, function in (
+            (QKeySequence(Qt.Key.Key_Escape), self.unmark),
+            (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),
+        ):
+            shortcut = QShortcut(keys, self)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(function)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def _make_table(self) -> WorstTable:
+        table = WorstTable(self.model)
+        table.gone_to.connect(self._go)
+        table.clicked.connect(self._clicked)
+        self.model.modelReset.connect(lambda: self._sync_mark(self.store.session))
+        return table
+
+    def _make_buttons(self) -> QHBoxLayout:
+        self.back = QPushButton("Whole mesh")
+        self.back.setToolTip("Look again at all that was seen before flying to a cell.")
+        self.back.clicked.connect(self._go_back)
+        self.export = QPushButton("Export CSV…")
+        self.export.setToolTip("Write the list with every digit as comma-separated values.")
+        self.export.clicked.connect(self._export)
+        row = QHBoxLayout()
+        row.addWidget(self.back)
+        row.addStretch(1)
+        row.addWidget(self.export)
+        return row
+
+    # State to widgets ------------------------------------------------------------------
+
+    def sync(self, session: Session) -> None:
+        """Show the session; the list of a step that is played by comes when there is time."""
+        there = session.frame is not None
+        self.stack.setCurrentWidget(self.table if there else self.words)
+        for widget in (self.back, self.export):
+            widget.setVisible(there)
+        if not there:
+            self.info.hide()
+            self.words.setText("Open a mesh first: here are its worst cells.")
+            self.model.show(None)
+            self._seen = ()
+        elif is_seen(self) and self._key(session) != self._seen:
+            since = (time.monotonic() - self._last) * 1000.0
+            if since >= REST_MS:
+                self._fill(session)
+            elif not self._soon.isActive():
+                self._soon.start(round(REST_MS - since))
+        if is_seen(self):
+            self._sync_mark(session)
+
+    @staticmethod
+    def _key(session: Session) -> tuple[object, ...]:
+        return (
+            session.frame,
+            len(session.frames),
+            measure(session.view.colour_by),
+            axis_of(session),
+        )
+
+    def _fill(self, session: Session) -> None:
+        """Make the list of the step that is shown."""
+        if session.frame is None or self._key(session) == self._seen:
+            return
+        self._seen, self._last = self._key(session), time.monotonic()
+        at = session.frames.index(session.frame)
+        what = measure(session.view.colour_by)
+        worst = worst_cells(session.frames, at, what)
+        title = f"Quality: {COLOUR_BY[what]} of the step that is shown"
+        self.table.horizontalHeader().setToolTip(title)
+        self.model.show(worst, axis_of(session))
+
+    def _sync_mark(self, session: Session) -> None:
+        """Make the marked cell the current row, and tell of it."""
+        cell = session.view.marked
+        row = self.model.row_of(cell)
+        current = self.table.currentIndex()
+        if row != (current.row() if current.isValid() else -1):
+            if row >= 0:
+                self.table.selectRow(row)
+            elif self._marked is not None:  # what is selected to be copied stays
+                self.table.clearSelection()
+                self.table.setCurrentIndex(QModelIndex())
+        self._marked = cell
+        there = cell is not None and session.frame is not None
+        there = there and 0 <= cell < len(session.frame.mesh.cells)
+        self.info.setVisible(bool(there))
+        if there:
+            self.info.setText(info_text(session, cell))
+            self.info.setToolTip(info_text(session, cell, every=True))
+
+    def paintEvent(self, event) -> None:
+        super().paintEvent(event)
+        session = self.store.session
+        # Behind another tab nothing was listed.
+        if session.frame is not None and self._key(session) != self._seen:
+            QTimer.singleShot(0, self, lambda: self.sync(self.store.session))
+
+    # What the user does ----------------------------------------------------------------
+
+    def _go(self, row: int) -> None:
+        cell = self.model.cell(row)
+        self.store.change(changes.mark, cell)
+        self._fly_to(cell)
+
+    def _clicked(self, index: QModelIndex) -> None:
+        if self.model.cell(index.row()) == self.store.session.view.marked:
+            self.unmark()
+        else:
+            self._go(index.row())
+
+    def unmark(self) -> None:
+        """Take the mark away."""
+        if self.store.session.view.marked is not None:
+            self.store.change(changes.mark, None)
+
+    def _go_back(self) -> None:
+        # The mark stays: that is how the cell is found in the whole mesh.
+        self._fly_back()
+
+    def copy_rows(self) -> None:
+        """Copy the selected rows, or all, to the clipboard, with a line of names."""
+        if self.model.worst is None:
+            return
+        chosen = sorted(index.row() for index in self.table.selectionModel().selectedRows())
+        order = self.model.order[chosen] if chosen else self.model.order
+        rows = table_rows(self.model.worst)
+        lines = [rows[0], *(rows[1 + at] for at in order)]
+        QGuiApplication.clipboard().setText("\n".join("\t".join(line) for line in lines) + "\n")
+
+    def _export(self) -> None:
+        self._fill(self.store.session)
+        worst = self.model.worst
+        if worst is None:
+            return
+        ask_and_write(
+            self,
+            "Export worst cells",
+            folder_of(self) / "worst_cells.csv",
+            "Comma-separated values (*.csv)",
+            lambda path: write_table(worst, path),
+        )
+
+
+def info_text(session: Session, cell: int, every: bool = False) -> str:
+    """Return what is told of a cell of the step that is shown, as rich text of few lines.
+
+    ``every`` tells every corner and coordinate.
+    """
+    info = cell_info(session.frame, cell)
+    red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
+    state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"
+    around = axis_of(session)
+    parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"
+    lines = [
+        f"<b>Cell {cell}</b>, {info.kind}{state}",
+        f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
+        _place_text(info.position, around),
+    ]
+    if every and around is not None:
+        lines.append(_place_text(info.position, None))
+    near = nearest_boundary(session.frame.mesh, info.position)
+    if near is not None:
+        lines.append(f"{near[1]:.4g} from {escape(near[0])}, the nearest boundary")
+    ends = f"{info.jacobians.min():.3g} to {info.jacobians.max():.3g}"
+    corners = ", ".join(f"{value:.3g}" for value in info.jacobians)
+    lines.append(f"corner Jacobians: {corners if every else ends}")
+    return "<br>".join(lines)
+
+
+def _place_text(position: FloatArray, around: Around | None) -> str:
+    names, values = coordinates(position[None], around)
+    return "&nbsp; ".join(
+        f"{name.removesuffix(' [°]')} {value:.5g}{'°' if '°' in name else ''}"
+        for name, value in zip(names, values[0], strict=True)
+    )

@@ -1,0 +1,221 @@
+"""The table of the worst cells: its rows, their order, and the keys."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import numpy as np
+from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
+from qtpy.QtGui import QBrush, QColor
+from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+
+from slideviz.view.drawing.look import INVERTED_COLOUR
+from slideviz.view.inspect import WorstCells
+from slideviz.view.where import Around, coordinates, decimals
+
+SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
+COLUMNS = ("Cell", "Quality", "Worse\nsince")
+CELL, QUALITY, SINCE = range(3)
+"""The first columns; the coordinates follow, and the type where there are several."""
+LAST = "Type"
+ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
+"""Pixels of the sign of the order in a header, and what is between it and the words."""
+_RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+_MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
+TIPS = {
+    CELL: "Number of the cell, from 0 as in an SU2 file",
+    QUALITY: "Quality of the step that is shown",
+    SINCE: "Worse since step: the first step at which the cell was at its worst",
+}
+
+
+class WorstModel(QAbstractTableModel):
+    """The rows of the table, in the order that was asked for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.worst: WorstCells | None = None
+        self.names: tuple[str, ...] = ()
+        self.places = np.empty((0, 0))
+        self._decimals: tuple[int, ...] = ()
+        self._mixed = False
+        self.order = np.empty(0, np.int64)
+        self._by, self._down = QUALITY, False
+
+    def show(self, worst: WorstCells | None, around: Around | None = None) -> None:
+        """Show another list, with places about an axis, if there is one."""
+        self.beginResetModel()
+        self.worst = worst
+        if worst is not None:
+            self.names, self.places = coordinates(worst.positions, around)
+            self._decimals = tuple(
+                min(decimals(column), 2) if "°" in name else decimals(column)
+                for name, column in zip(self.names, self.places.T, strict=True)
+            )
+            self._mixed = len(set(worst.kinds)) > 1
+        self._arrange()
+        self.endResetModel()
+
+    def cell(self, row: int) -> int:
+        """Return the cell of a row."""
+        return int(self.worst.cells[self.order[row]])
+
+    def row_of(self, cell: int | None) -> int:
+        """Return the row of a cell, or -1."""
+        if self.worst is None or cell is None:
+            return -1
+        found = np.flatnonzero(self.worst.cells[self.order] == cell)
+        return int(found[0]) if len(found) else -1
+
+    def rowCount(self, parent: QModelIndex | None = None) -> int:
+        return len(self.order) if parent is None or not parent.isValid() else 0
+
+    def columnCount(self, _parent: QModelIndex | None = None) -> int:
+        return len(self.headers)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Return the words above the columns."""
+        return (*COLUMNS, *self.names, *((LAST,) if self._mixed else ()))
+
+    def _alignment(self, column: int) -> int:
+        if column == SINCE:
+            return _MIDDLE
+        return _LEFT if self.headers[column] == LAST else _RIGHT
+
+    def headerData(self, section, orientation, role=Qt.ItemDataRole.DisplayRole):
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.ToolTipRole:
+            place = f"{self.headers[section]} of the mean of its nodes, in mesh units or degrees"
+            return "Element type" if self.headers[section] == LAST else TIPS.get(section, place)
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return self._alignment(section)
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        # Qt draws the sign of the order right behind the letters.
+        return self.headers[section] + (GAP if section == QUALITY == self._by else "")
+
+    def data(self, index, role=Qt.ItemDataRole.DisplayRole):
+        at = self.order[index.row()]
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._text(at, index.column())
+        if role == Qt.ItemDataRole.ToolTipRole:
+            where = ", ".join(f"{value:.8g}" for value in self.worst.positions[at])
+            return f"{self.worst.kinds[at]} at {'x, y, z'[: 3 * len(self.names) - 2]} = {where}"
+        if role == Qt.ItemDataRole.ForegroundRole and self.worst.inverted[at]:
+            return QBrush(QColor(INVERTED_COLOUR)) if index.column() == QUALITY else None
+        return (
+            self._alignment(index.column()) if role == Qt.ItemDataRole.TextAlignmentRole else None
+        )
+
+    def _text(self, at: int, column: int) -> str:
+        worst = self.worst
+        if column == QUALITY:
+            return "inverted" if worst.inverted[at] else f"{worst.values[at]:.4f}"
+        if column in (CELL, SINCE):
+            return str((worst.cells if column == CELL else worst.steps)[at])
+        axis = column - len(COLUMNS)
+        if axis == len(self.names):
+            return SHORT.get(worst.kinds[at], worst.kinds[at])
+        value, digits = float(self.places[at, axis]), self._decimals[axis]
+        # Without a sign before zeros.
+        return f"{round(value, digits) + 0.0:.{digits}f}" if digits < 8 else f"{value:.3g}"
+
+    def sort(self, column: int, order=Qt.SortOrder.AscendingOrder) -> None:
+        self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
+        self.beginResetModel()
+        self._arrange()
+        self.endResetModel()
+
+    def _arrange(self) -> None:
+        """Order the rows; equal ones stay in the order of their quality."""
+        if self.worst is None:
+            self.order = np.empty(0, np.int64)
+            return
+        worst = self.worst
+        keys = {
+            CELL: worst.cells,
+            QUALITY: np.arange(len(worst)),
+            SINCE: worst.steps,
+            **dict(enumerate(self.places.T, len(COLUMNS))),
+        }
+        key = keys.get(self._by)
+        if key is None:
+            key = np.unique(np.array(worst.kinds), return_inverse=True)[1]
+        self.order = np.argsort(-key if self._down else key, kind="stable")
+
+
+class WorstTable(QTableView):
+    """A table that tells to which row the keys have gone.
+
+    The current row itself would tell too much: the focus alone makes the first one current.
+    """
+
+    gone_to = Signal(int)
+
+    def __init__(self, model: WorstModel) -> None:
+        super().__init__()
+        self.setObjectName("worst")
+        self._shared: tuple[str, ...] = ()
+        self._needed: list[int] = []
+        self._given: list[int] = []
+        self.setModel(model)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setAlternatingRowColors(True)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        letters = self.font()
+        letters.setPointSizeF(0.9 * letters.pointSizeF())
+        self.setFont(letters)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(22)
+        self.setToolTip("Click a cell to fly there; again, or Esc, to take the mark away.")
+        header = self.horizontalHeader()
+        header.setHighlightSections(False)
+        header.setFont(letters)
+        header.setStretchLastSection(True)
+        header.setMinimumSectionSize(32)
+        model.modelReset.connect(self._share)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+        header.setSortIndicator(QUALITY, Qt.SortOrder.AscendingOrder)
+        self.setSortingEnabled(True)
+
+    def _share(self) -> None:
+        """Give every column what its numbers need, when there are others than before."""
+        if self.model().rowCount() and self.model().headers != self._shared:
+            self._shared = self.model().headers
+            metrics, rows = self.fontMetrics(), range(self.model().rowCount())
+            self._needed = []
+            for column, words in enumerate(self._shared):
+                texts = [self.model().index(row, column).data() for row in rows]
+                room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
+                # What Qt would take is more than there is.
+                self._needed.append(room + 8 + (ARROW if column == QUALITY else 0))
+            self._given = []
+            self._spread()
+
+    def _spread(self) -> None:
+        """Give every column its part of the width, unless somebody has chosen others."""
+        now = [self.columnWidth(column) for column in range(len(self._needed))]
+        # The last one takes what is left.
+        if not self._needed or (self._given and now[:-1] != self._given[:-1]):
+            return
+        spare = max(self.viewport().width() - sum(self._needed), 0) // len(self._needed)
+        self._given = [needed + spare for needed in self._needed]
+        for column, width in enumerate(self._given):
+            self.setColumnWidth(column, width)
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._spread()
+
+    def keyPressEvent(self, event) -> None:
+        before = self.currentIndex().row()
+        super().keyPressEvent(event)
+        row = self.currentIndex().row()
+        enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if row >= 0 and (row != before or enter):
+            self.gone_to.emit(row)

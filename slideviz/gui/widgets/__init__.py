@@ -1,0 +1,1 @@
+"""Fields, lists, plots and icons that the panels are made of."""

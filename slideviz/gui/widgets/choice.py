@@ -1,0 +1,45 @@
+"""A drop-down of values with words."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QComboBox
+
+from slideviz.gui.widgets.tips import wrapped
+
+
+class Choice(QComboBox):
+    """A drop-down of values with words; the wheel scrolls the panel instead of changing it."""
+
+    chosen = Signal(object)
+
+    def __init__(self, words: dict[object, str]) -> None:
+        super().__init__()
+        self.words = dict(words)
+        for value, text in words.items():
+            self.addItem(text, value)
+        self.setMinimumContentsLength(8)
+        self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
+
+    def show_value(self, value: object) -> None:
+        """Show a value without telling."""
+        index = self.findData(value)
+        if index >= 0 and index != self.currentIndex():
+            self.setCurrentIndex(index)
+
+    def explain(self, tips: Mapping[str, str]) -> None:
+        """Explain entries, by their value, to who is about to choose one."""
+        for value, tip in tips.items():
+            self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
+
+    def showPopup(self) -> None:
+        # Escape leaves the list at the entry below the mouse; it would open there next time.
+        self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
+        super().showPopup()
+
+    def wheelEvent(self, event) -> None:
+        event.ignore()

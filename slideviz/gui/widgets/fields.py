@@ -1,0 +1,264 @@
+"""Small input fields: numbers and vectors that are checked as they are typed."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from qtpy.QtCore import QLocale, Qt, Signal
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+
+from slideviz.gui.widgets.tips import wrapped
+
+
+def number_text(value: float) -> str:
+    """Return a number as short as it can be without losing a digit."""
+    text = repr(float(value))
+    return text.removesuffix(".0")
+
+
+SHORT = 8
+"""A number with so many signs is shown with every digit."""
+
+NOTHING = 1e-10
+"""Part of a length below which another is what is left of zero by rounding."""
+
+
+def short_text(value: float, scale: float = 0.0) -> str:
+    """Return a number with six digits, or all if they are few; 0 if it is nothing beside scale."""
+    if abs(value) < NOTHING * abs(scale) or value == 0:
+        return "0"
+    exact = number_text(value)
+    return exact if len(exact) <= SHORT else f"{float(value):.6g}"
+
+
+class NumberField(QLineEdit):
+    """A number; what is not allowed is marked at once, with the reason as tooltip.
+
+    ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
+    while it is edited; the value keeps them all. What is not valid when the field is left goes
+    back to the number before it was edited, not to a valid beginning of what was typed.
+    """
+
+    changed = Signal(float)
+
+    def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
+        super().__init__(short_text(value))
+        self._allowed = allowed or (lambda _: "")
+        self._value = self._before = float(value)
+        self._scale = 0.0
+        self._tip = ""
+        self._whole = False
+        self.setCursorPosition(0)
+        self.setMinimumWidth(46)
+        self.setLocale(QLocale.c())
+        self.textEdited.connect(self._edited)
+        self.editingFinished.connect(self._tidy)
+
+    @property
+    def value(self) -> float:
+        """Return the last valid number."""
+        return self._value
+
+    @property
+    def problem(self) -> str:
+        """Return why the text is not valid, or an empty text."""
+        if self.text() in (number_text(self._value), short_text(self._value, self._scale)):
+            return self._allowed(self._value)
+        try:
+            # A decimal comma is what many people type; thousands are not separated here.
+            value = float(self.text().strip().replace(",", "."))
+        except ValueError:
+            return f"“{self.text()}” is not a number"
+        if not math.isfinite(value):
+            return "the number must be finite"
+        return self._allowed(value)
+
+    def set_tip(self, text: str) -> None:
+        """Explain the field; shown while its value is valid."""
+        self._tip = text
+        self.mark(self.problem)
+
+    def set_scale(self, scale: float) -> None:
+        """Take a length beside which the smallest numbers are shown as 0."""
+        if scale != self._scale:
+            self._scale = scale
+            if not (self.hasFocus() or self.isModified()):
+                self._write()
+
+    def show_value(self, value: float) -> None:
+        """Show a number without telling; what is being typed is left if it means the same."""
+        if value == self._value and (self.hasFocus() or not self.problem):
+            return
+        if not (self.hasFocus() and self.isModified()):
+            self._before = float(value)
+        self._value = float(value)
+        self._write()
+        self.mark("")
+
+    def _write(self) -> None:
+        """Write the value, the first digits in sight."""
+        exact = self.hasFocus() and not self.isReadOnly()
+        text = number_text(self._value) if exact else short_text(self._value, self._scale)
+        if text != self.text():
+            self.setText(text)
+        if not exact:
+            self.setCursorPosition(0)
+
+    def focusInEvent(self, event) -> None:
+        if not self.problem:
+            self._before = self._value
+            self._write()
+        super().focusInEvent(event)
+
+    def mouseDoubleClickEvent(self, event) -> None:
+        # Qt takes a word, and a point ends one: half of a decimal number would be replaced.
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.selectAll()
+            self._whole = True
+
+    def mouseMoveEvent(self, event) -> None:
+        if not self._whole:  # a hand that trembles in a double click selects less again
+            super().mouseMoveEvent(event)
+
+    def mouseReleaseEvent(self, event) -> None:
+        self._whole = False
+        super().mouseReleaseEvent(event)
+
+    def focusOutEvent(self, event) -> None:
+        super().focusOutEvent(event)
+        self.setModified(False)
+        if not self.problem:
+            self._write()
+
+    def _edited(self) -> None:
+        problem = self.problem
+        self.mark(problem)
+        if not problem:
+            self._value = float(self.text().strip().replace(",", "."))
+            self.changed.emit(self._value)
+
+    def _tidy(self) -> None:
+        if not self.problem:
+            self._before = self._value
+            return
+        typed, self._value = self._value, self._before
+        self._write()
+        self.mark("")
+        if typed != self._value:
+            self.changed.emit(self._value)
+
+    def mark(self, problem: str) -> None:
+        """Show that the number is not valid, and why; or, with an empty text, that it is."""
+        self.setToolTip(wrapped(problem or self._tip))
+        if bool(self.property("bad")) != bool(problem):
+            self.setProperty("bad", bool(problem))
+            self.style().unpolish(self)
+            self.style().polish(self)
+
+
+class VectorField(QWidget):
+    """Two or three numbers in a row.
+
+    ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
+    then, and the change is not told.
+    """
+
+    changed = Signal(tuple)
+
+    def __init__(
+        self,
+        values: Sequence[float] = (0.0, 0.0, 0.0),
+        allowed: Callable[[Sequence[float]], str] | None = None,
+        names: str = "xyz",
+    ) -> None:
+        super().__init__()
+        self._allowed = allowed or (lambda _: "")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(4)
+        self.fields: list[NumberField] = []
+        self._labels: list[QLabel] = []
+        for name, value in zip(names, values, strict=True):
+            label, field = QLabel(name), NumberField(value)
+            field.setAccessibleName(name)
+            field.changed.connect(lambda _: self._tell())
+            row.addWidget(label)
+            row.addWidget(field, 1)
+            self.fields.append(field)
+            self._labels.append(label)
+        self.count = len(self.fields)
+        self._scale = 0.0
+        self._compare()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    @property
+    def value(self) -> tuple[float, ...]:
+        """Return the numbers, as many as the mesh has dimensions."""
+        return tuple(field.value for field in self.fields[: self.count])
+
+    @property
+    def problem(self) -> str:
+        """Return why the numbers together are not valid, or an empty text."""
+        return self._allowed(self.value)
+
+    def _tell(self) -> None:
+        self._mark()
+        if not self.problem:
+            self.changed.emit(self.value)
+
+    def _mark(self) -> None:
+        for field in self.fields:
+            field.mark(field.problem or self.problem)
+
+    def set_count(self, count: int) -> None:
+        """Show the first ``count`` numbers only."""
+        self.count = count
+        for index, (label, field) in enumerate(zip(self._labels, self.fields, strict=True)):
+            label.setVisible(index < count)
+            field.setVisible(index < count)
+
+    def set_scale(self, scale: float) -> None:
+        """Take a length, of the mesh, beside which the smallest numbers are shown as 0."""
+        self._scale = scale
+        self._compare()
+
+    def show_value(self, values: Sequence[float]) -> None:
+        """Show numbers without telling."""
+        for field, value in zip(self.fields, values, strict=False):
+            field.show_value(value)
+        self._compare()
+        self._mark()
+
+    def _compare(self) -> None:
+        """Show as 0 what is left of it by rounding beside the other numbers."""
+        scale = max(self._scale, *(abs(field.value) for field in self.fields))
+        for field in self.fields:
+            field.set_scale(scale)
+
+    def set_tip(self, text: str) -> None:
+        """Explain the field."""
+        for field in self.fields:
+            field.set_tip(text)
+
+
+def positive(value: float) -> str:
+    """Return why a number is not above zero."""
+    return "" if value > 0 else f"{number_text(value)} must be greater than 0"
+
+
+def not_zero(value: float) -> str:
+    """Return why a number may not be zero."""
+    return "" if value else "0 would flatten the boundary"
+
+
+def a_direction(values: Sequence[float]) -> str:
+    """Return why numbers are no direction."""
+    return "" if any(values) else "an axis needs a direction: not all may be 0"
+
+
+def angle_limit(value: float) -> str:
+    """Return why a feature angle is out of range."""
+    return "" if 0 < value <= 180 else f"{number_text(value)} must be above 0 and at most 180"

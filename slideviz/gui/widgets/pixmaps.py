@@ -1,0 +1,70 @@
+"""Images of numbers as Qt's: for previews and the clipboard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
+from qtpy.QtWidgets import QApplication
+
+from slideviz.view.pictures.studio import Studio
+
+LARGE = 50_000
+"""Cells of a mesh whose preview is drawn as large as it is shown."""
+
+
+def to_image(pixels: np.ndarray) -> QImage:
+    """Return an image (height, width, 3 or 4) as Qt's, with memory of its own."""
+    height, width, depth = pixels.shape
+    kind = QImage.Format.Format_RGBA8888 if depth == 4 else QImage.Format.Format_RGB888
+    return QImage(pixels.tobytes(), width, height, depth * width, kind).copy()
+
+
+def drawn_for(studio: Studio, box: tuple[int, int]) -> tuple[int, int]:
+    """Return the size that a preview is drawn at: twice the box, for lines are a pixel wide.
+
+    Not of a large mesh, which takes its time.
+    """
+    mesh = studio.session.mesh
+    times = 1 if mesh is not None and len(mesh.cells) > LARGE else 2
+    return times * box[0], times * box[1]
+
+
+def fitted(image: QImage, box: tuple[int, int]) -> QImage:
+    """Return an image as large as it can be in a box."""
+    keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+    return image.scaled(QSize(*box), keep, smooth)
+
+
+def framed(image: QImage) -> QPixmap:
+    """Return an image with a thin frame; what is transparent is seen as a chequerboard."""
+    out = QPixmap(image.width() + 2, image.height() + 2)
+    out.fill(QColor("#ffffff"))
+    painter = QPainter(out)
+    if image.hasAlphaChannel():
+        for x in range(0, out.width(), 10):
+            for y in range((x // 10) % 2 * 10, out.height(), 20):
+                painter.fillRect(x, y, 10, 10, QColor("#d5d9de"))
+    painter.drawImage(1, 1, image)
+    painter.setPen(QColor("#9aa3ad"))
+    painter.drawRect(0, 0, out.width() - 1, out.height() - 1)
+    painter.end()
+    return out
+
+
+@contextmanager
+def wait_cursor() -> Iterator[None]:
+    """Show that the window does not answer for a moment: a large mesh takes a second or two."""
+    QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
+    try:
+        yield
+    finally:
+        QApplication.restoreOverrideCursor()
+
+
+def copy_image(image: QImage) -> None:
+    """Put an image on the clipboard."""
+    QApplication.clipboard().setImage(image)

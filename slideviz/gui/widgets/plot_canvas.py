@@ -1,0 +1,282 @@
+"""A plot in a panel: drawn when it is seen, in the colours of the theme, saved as a figure."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from qtpy.QtCore import Qt, QTimer, Signal
+from qtpy.QtGui import QColor, QImage, QPainter
+from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
+
+from slideviz.errors import SlidevizError
+from slideviz.gui import dialogs
+from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
+from slideviz.mesh.atomic import atomic_write
+from slideviz.view.drawing.look import LIGHT, Look
+from slideviz.view.plots.draw import PRINT, Style
+
+REST_MS = 200
+"""Between two drawings while steps are played, at least."""
+REST_TIMES, MOST_REST = 4.0, 4
+"""So many times as long as a drawing took, but not more than so many ``REST_MS``."""
+LOOK_MS = 8
+"""How often it is looked whether a drawing is there."""
+
+FIGURE_INCHES = (4.2, 3.1)
+PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
+
+
+class PlotCanvas(QWidget):
+    """A plot that is drawn beside the window; what is shown is the newest image of it.
+
+    Parameters
+    ----------
+    drawing : callable
+        Returns what fills a figure with what there is now, at a call without widgets.
+
+    Attributes
+    ----------
+    figure : Figure
+        What is shown; its axes tell what is where.
+
+    Signals
+    -------
+    drawn()
+        There is another image.
+    """
+
+    drawn = Signal()
+
+    def __init__(self, drawing: Callable[[], Draw]) -> None:
+        super().__init__()
+        self.drawing = drawing
+        self.look = LIGHT
+        self._stale = True
+        self.wiped = False
+        self._last = 0.0
+        self._picture = Picture()
+        self._coming: Future[Picture] | None = None
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.fill)
+        # Asked for rather than told: the thread need not know of a widget that may be gone.
+        self._look_after = QTimer(self)
+        self._look_after.setInterval(LOOK_MS)
+        self._look_after.timeout.connect(self._take)
+        self.setMinimumSize(120, 100)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+
+    @property
+    def style_(self) -> Style:
+        """Return how it is drawn in the window."""
+        return Style(self.look, size=8.0, width=1.3)
+
+    @property
+    def figure(self) -> Figure:
+        """Return what is shown."""
+        return self._picture.figure
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether another image is on its way."""
+        return self._coming is not None or self._timer.isActive()
+
+    # Drawing ---------------------------------------------------------------------------
+
+    def ask(self) -> None:
+        """Draw what there is now, soon; hidden plots wait until they are seen."""
+        self._stale = True
+        if is_seen(self) and not self.busy:
+            since = (time.monotonic() - self._last) * 1000.0
+            self._timer.start(max(0, round(self._rest_ms() - since)))
+
+    def wipe(self) -> None:
+        """Show nothing until the next drawing is there: what is shown is another plot."""
+        self.wiped = True
+        self.update()
+
+    def _rest_ms(self) -> float:
+        """Return the time between two drawings: the view needs the processors, too."""
+        return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
+
+    def fill(self) -> None:
+        """Have drawn what there is now; while a drawing goes on, after it."""
+        self._stale = self._coming is not None
+        if self._stale:
+            return
+        ratio = self.devicePixelRatioF()
+        size = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
+        paper = Paper(*size, ratio, self.style_)
+        self._coming = draw_beside(self.drawing(), paper, self._picture.place)
+        self._look_after.start()
+
+    def _take(self) -> None:
+        """Show the image that was asked for, if it is there."""
+        if self._coming is None or not self._coming.done():
+            return
+        coming, self._coming = self._coming, None
+        self._look_after.stop()
+        self._last = time.monotonic()
+        self._picture = coming.result()
+        # One that was asked for before it was wiped is still the other plot.
+        self.wiped = self.wiped and self._stale
+        self.update()
+        self.drawn.emit()
+        if self._stale:
+            self.ask()
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours."""
+        self.look = look
+        self.ask()
+
+    # Places ----------------------------------------------------------------------------
+
+    @property
+    def _scale(self) -> tuple[float, float]:
+        """Return pixels of the image for one of the widget: a new size is drawn a little later."""
+        high, wide = self._picture.pixels.shape[:2]
+        return wide / max(self.width(), 1), high / max(self.height(), 1)
+
+    def to_value(self, x_px: float) -> float:
+        """Return what the horizontal axis has at a position of the mouse."""
+        place = x_px * self._scale[0], 0.0
+        return float(self.figure.axes[0].transData.inverted().transform(place)[0])
+
+    def to_pixel(self, value: float) -> float:
+        """Return where a value of the horizontal axis is, in pixels of the widget."""
+        place = self.figure.axes[0].transData.transform((value, 1.0))
+        return float(place[0] / self._scale[0])
+
+    def axes_rows(self) -> tuple[float, float]:
+        """Return top and height of the axes in pixels of the widget."""
+        box, scale = self.figure.axes[0].get_window_extent(), self._scale[1]
+        return self.height() - box.y1 / scale, box.height / scale
+
+    # Qt --------------------------------------------------------------------------------
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._last = 0.0  # what is shown meanwhile is stretched
+        self.ask()
+
+    def paintEvent(self, event) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        pixels = self._picture.pixels
+        high, wide = pixels.shape[:2]
+        if self.wiped:
+            painter.fillRect(self.rect(), QColor(self.look.background))
+            painter.setPen(QColor(self.look.text))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "Drawing…")
+        elif wide > 1:
+            image = QImage(pixels, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
+            painter.drawImage(self.rect(), image)
+        else:
+            painter.fillRect(self.rect(), QColor(self.look.background))
+        painter.end()
+        if self._stale:
+            self.ask()
+
+
+class PlotArea(QStackedWidget):
+    """A plot, or words that say why there is none."""
+
+    def __init__(self, drawing: Callable[[], Draw], canvas: type[PlotCanvas] = PlotCanvas) -> None:
+        super().__init__()
+        self.words = words_label()
+        self.canvas = canvas(drawing)
+        self.addWidget(self.words)
+        self.addWidget(self.canvas)
+        self.setMinimumHeight(100)
+
+    @property
+    def empty(self) -> bool:
+        """Tell whether words are shown."""
+        return self.currentWidget() is self.words
+
+    def say(self, text: str) -> None:
+        """Show words instead of the plot."""
+        self.words.setText(text)
+        self.setCurrentWidget(self.words)
+
+    def plot(self) -> None:
+        """Show the plot as it is now."""
+        self.setCurrentWidget(self.canvas)
+        self.canvas.ask()
+
+
+def is_seen(widget: QWidget) -> bool:
+    """Tell whether any of a widget is seen; a dock behind another tab counts as visible."""
+    return widget.isVisible() and not widget.visibleRegion().isEmpty()
+
+
+def words_label() -> QLabel:
+    """Return a label for what a panel says while it has nothing to show."""
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    label.setProperty("hint", True)
+    label.setMargin(12)
+    return label
+
+
+def write_plot(path: Path, draw_on: Draw) -> None:
+    """Write a plot as a figure for paper: PNG, SVG or PDF by the ending of the name.
+
+    Raises
+    ------
+    SlidevizError
+        Another ending, or the file cannot be written.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise SlidevizError(f"{path}: a plot is a .png, .svg or .pdf file; choose one of these")
+    figure = Figure(FIGURE_INCHES, layout="constrained")
+    draw_on(figure, replace(PRINT, size=8.5))
+    data = io.BytesIO()
+    figure.savefig(data, format=kind, dpi=300)
+    with atomic_write(path, SlidevizError) as file:
+        file.write(data.getvalue())
+
+
+def ask_and_write(
+    parent: QWidget, title: str, default: Path, filters: str, write: Callable[[Path], None]
+) -> None:
+    """Ask for a name and write a file; tell how it went in the window, if there is one."""
+    path = dialogs.ask_save(parent, title, default, filters)
+    if path is None:
+        return
+    window = main_window(parent)
+    try:
+        write(path)
+    except (OSError, SlidevizError) as error:
+        if window is None:
+            raise
+        window.banner.tell_error(error)
+        return
+    if window is not None:
+        window.settings.setValue("folder", str(path.parent))
+        window.say(f"Saved {path}")
+
+
+def main_window(widget: QWidget | None):
+    """Return slideviz's window around a widget, also where its dock floats."""
+    while widget is not None and not hasattr(widget, "banner"):
+        widget = widget.parentWidget()
+    return widget
+
+
+def folder_of(widget: QWidget) -> Path:
+    """Return where file dialogs start."""
+    window = main_window(widget)
+    return window.files.folder() if window is not None else Path.home()

@@ -1,0 +1,103 @@
+"""Rulers beside a flat view: ticks, numbers and the name of an axis."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import math
+
+from qtpy.QtCore import QRectF, Qt
+from qtpy.QtGui import QPainter, QPalette
+from qtpy.QtWidgets import QWidget
+
+from slideviz.view.plots.ticks import ticks
+
+
+class Ruler(QWidget):
+    """The numbers of one axis; upright at the left, or lying below.
+
+    Parameters
+    ----------
+    upright : bool
+    """
+
+    def __init__(self, upright: bool) -> None:
+        super().__init__()
+        self.upright = upright
+        self.low, self.high, self.name = 0.0, 1.0, ""
+        if upright:
+            self.setFixedWidth(58)
+        else:
+            self.setFixedHeight(34)
+
+    def show_range(self, low: float, high: float, name: str) -> None:
+        """Show the numbers from the left or lower end to the other, and what they are."""
+        if (low, high, name) != (self.low, self.high, self.name):
+            self.low, self.high, self.name = low, high, name
+            self.update()
+
+    def ticks(self) -> list[float]:
+        """Return the numbers that are written, rising."""
+        length = self.height() if self.upright else self.width()
+        room = 34 if self.upright else 70
+        return nice_ticks(self.low, self.high, max(length // room, 2))
+
+    def paintEvent(self, _event) -> None:
+        painter = QPainter(self)
+        painter.setPen(self.palette().color(QPalette.ColorRole.WindowText))
+        font = painter.font()
+        font.setPointSizeF(max(font.pointSizeF() - 1.0, 7.0))
+        painter.setFont(font)
+        ticks = self.ticks()
+        step = ticks[1] - ticks[0] if len(ticks) > 1 else self.high - self.low
+        for value in ticks:
+            share = (value - self.low) / (self.high - self.low)
+            self._draw_tick(painter, share, tick_text(value, step))
+        self._draw_name(painter)
+        painter.end()
+
+    def _draw_tick(self, painter: QPainter, share: float, text: str) -> None:
+        wide, high = self.width(), self.height()
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        if self.upright:
+            y = high * (1.0 - share)
+            painter.drawLine(wide - 4, round(y), wide - 1, round(y))
+            top = min(max(y - 8.0, 0.0), high - 16.0)
+            painter.drawText(QRectF(14, top, wide - 20, 16), right, text)
+        else:
+            x = wide * share
+            painter.drawLine(round(x), 0, round(x), 3)
+            # At the ends, where half a number would be cut off, it stands beside its tick.
+            half = painter.fontMetrics().horizontalAdvance(text) / 2.0 + 1.0
+            middle = min(max(x, half), wide - half)
+            box = QRectF(middle - 35, 3, 70, 15)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+
+    def _draw_name(self, painter: QPainter) -> None:
+        centre = Qt.AlignmentFlag.AlignCenter
+        if not self.upright:
+            painter.drawText(QRectF(0, 17, self.width(), 16), centre, self.name)
+            return
+        painter.translate(8, self.height() / 2.0)
+        painter.rotate(-90)
+        painter.drawText(QRectF(-self.height() / 2.0, -8, self.height(), 16), centre, self.name)
+
+
+def nice_ticks(low: float, high: float, most: int) -> list[float]:
+    """Return round numbers in a range, rising, at most so many and one more."""
+    if not (math.isfinite(low) and math.isfinite(high) and high > low):
+        return []
+    return ticks(low, high, most).tolist()
+
+
+def tick_text(value: float, step: float) -> str:
+    """Return a number with as many digits as its distance from the next needs."""
+    if abs(value) < 1e-9 * step:
+        return "0"
+    size = max(abs(value), step)
+    if not 1e-4 <= size < 1e5:
+        return f"{value:.4g}"
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    # A step of 0.25 has a digit more than 0.1.
+    exact = abs(round(step, digits) - step) < 1e-6 * step
+    return f"{value:.{digits + (not exact)}f}"

@@ -1,0 +1,1 @@
+"""One case by several methods: computed, tabled, plotted."""

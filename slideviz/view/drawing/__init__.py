@@ -1,0 +1,1 @@
+"""How cells, points and words become actors of a plotter, and what the mouse hits there."""

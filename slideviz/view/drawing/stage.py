@@ -1,0 +1,141 @@
+"""What all parts of a scene share: the plotter, the look, the colours of values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.view.drawing.actors import LIFT, VALUES, lookup_table, shown_values
+from slideviz.view.drawing.look import LIGHT, Look
+from slideviz.view.drawing.surfaces import Surface
+from slideviz.view.legend import STRIP
+from slideviz.view.session.state import Session
+
+_EDGE = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
+"""How VTK's shader draws edges; a VTK that writes it otherwise draws all in one colour."""
+_EITHER_EDGE = """float edgeMix = min(emix * edgeOpacity, 0.99);
+  const vec3 luma = vec3(0.30, 0.59, 0.11);
+  vec3 face = ambientColor + diffuseColor / (1.0 - edgeMix);
+  float light = dot(face, luma);
+  vec3 darker = edgeColor * clamp((light - 0.30) / dot(edgeColor, luma), 0.0, 1.0);
+  vec3 line = light < 0.36 ? face + 0.32 : darker;
+  ambientColor = mix(ambientColor, line, edgeMix);"""
+
+
+class Layer(Protocol):
+    """A part of the scene that draws one kind of thing.
+
+    Its actors have names of their own, ``kind:name``, and are changed in place.
+    """
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; nothing of the one before is left in the plotter."""
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state of the same mesh, touching only what differs; None: set all."""
+
+    def clear(self) -> None:
+        """Forget the mesh; the actors are gone already."""
+
+    def shapes(self) -> list[Any]:
+        """Return the data sets that should be seen when everything is made to fit the view."""
+
+
+class Stage:
+    """The plotter of a scene and what is common to its layers.
+
+    Attributes
+    ----------
+    plotter : pyvista.BasePlotter
+    look : Look
+        Colours of background, text and edges.
+    font_scale : float
+        Enlarges the letters, for pictures of many pixels.
+    table : pyvista.LookupTable
+        The colours of values, and of inverted cells; changed in place.
+    point_words : tuple of (str, str)
+        Words and colours of the nodes drawn as points, for the legend.
+    has_legend : bool
+        Whether the legend is drawn, if it is wanted, and its strip kept free.
+    has_plate : bool
+        Whether the legend has a half-transparent plate; not where the background is left out.
+    """
+
+    def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
+        self.plotter = plotter
+        self.look = look
+        self.font_scale = font_scale
+        self.table = lookup_table()
+        self.point_words: tuple[tuple[str, str], ...] = ()
+        self.has_legend = True
+        self.has_plate = True
+        self._values: tuple[object, FloatArray] | None = None
+
+    def add(self, shape: Any, name: str, **options: Any) -> Any:
+        """Return the actor of a new data set; cells have no colour of their values yet."""
+        valued = VALUES in shape.cell_data
+        actor = self.plotter.add_mesh(
+            shape,
+            name=name,
+            scalars=VALUES if valued else None,
+            cmap=self.table if valued else None,
+            clim=tuple(self.table.scalar_range) if valued else None,
+            show_scalar_bar=False,
+            reset_camera=False,
+            render=False,
+            copy_mesh=False,
+            **options,
+        )
+        # Lines on dark colours are light: one colour would not be seen on both ends of a map.
+        actor.GetShaderProperty().AddFragmentShaderReplacement(_EDGE, False, _EITHER_EDGE, False)
+        if valued:
+            # The table's own range: pyvista gives each actor that of its data.
+            actor.mapper.SetUseLookupTableScalarRange(True)
+        actor.mapper.scalar_visibility = False
+        return actor
+
+    def remove(self, name: str) -> None:
+        """Remove an actor, if it is there."""
+        self.plotter.remove_actor(name, reset_camera=False, render=False)
+
+    def edges(self, prop: Any, shown: bool) -> None:
+        """Draw the edges of an actor's cells, or do not."""
+        prop.show_edges = shown
+        prop.edge_color = self.look.edge
+        prop.edge_opacity = 0.55
+
+    def lift(self, mesh: Mesh) -> float:
+        """Return how far lines of a mesh are drawn above its cells, in its length unit."""
+        return LIFT * mesh.extent if mesh.dim == 2 else 0.0
+
+    def strip(self) -> float:
+        """Return how many pixels at the right are the legend's."""
+        if not self.has_legend:
+            return 0.0
+        return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
+
+    def values(self, session: Session) -> FloatArray:
+        """Return the number of every cell of the frame that is shown, (m,), for the colours.
+
+        Not a number for inverted cells. Made once for a frame, whatever layers ask for it.
+        """
+        frame, what = session.frame, session.view.colour_by
+        assert frame is not None
+        key = (frame, what)
+        if self._values is None or self._values[0] != key:
+            self._values = key, shown_values(frame, what, session.mesh)
+        return self._values[1]
+
+    def set_colours(self, session: Session) -> None:
+        """Give the table the map and the range of the session."""
+        low, high = session.colour_range
+        self.table.scalar_range = (low, high)
+        if session.view.colour_map != self.table.cmap.name:
+            self.table.apply_cmap(session.view.colour_map, 256)
+
+    def set_background(self) -> None:
+        """Give the plotter the background of the look."""
+        look = self.look
+        top = None if look.background == look.background_top else look.background_top
+        self.plotter.set_background(look.background, top=top)

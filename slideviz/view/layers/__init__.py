@@ -1,0 +1,1 @@
+"""The parts of a scene: each draws one thing and keeps it up to date."""

@@ -1,0 +1,124 @@
+"""The marked cell: its outline in front of everything, wherever in the mesh it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Mesh
+from slideviz.view.drawing import actors
+from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.look import SELECTED_COLOUR
+from slideviz.view.drawing.stage import Stage
+from slideviz.view.drawing.surfaces import Surface, lifted
+from slideviz.view.inspect import nodes_of
+from slideviz.view.layers.chosen import part_shape
+from slideviz.view.layers.mesh import BoundaryLayer
+from slideviz.view.session.state import Session
+
+OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
+IN_FRONT = -66_000.0
+"""Units of depth that bring lines and points in front of all else; the whole range is 65536."""
+SEE_THROUGH = 0.25
+"""Opacity of boundaries around a marked cell that is not beside one of them."""
+
+
+class MarkLayer:
+    """The cell that the view marks: edges, sides in the colour of its value, and a dot.
+
+    The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
+    3D mesh, the boundaries let it be seen.
+
+    Attributes
+    ----------
+    cell : int or None
+        Which cell is drawn.
+    """
+
+    def __init__(self, stage: Stage, boundaries: BoundaryLayer) -> None:
+        self.stage = stage
+        self.boundaries = boundaries
+        self.clear()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; nothing yet."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.cell: int | None = None
+        self._drawn: dict[str, Any] = {}
+        # Kept here: a data set that only VTK holds may come back from a mapper without points.
+        self._shapes: dict[str, Any] = {}
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the cell is a part of the mesh."""
+        return []
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        cell, frame = new.view.marked, new.frame
+        if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
+            for name in self._drawn:
+                self.stage.remove(name)
+            self.clear()
+            return
+        if cell != self.cell:
+            self._add(frame.mesh, cell)
+        if cell != self.cell or old is None or old.frame is not new.frame:
+            self._place(frame.mesh, cell)
+        self.cell = cell
+        if FACES in self._drawn:
+            shape = self._shapes[FACES]
+            shape.cell_data[VALUES] = np.full(shape.n_cells, self.stage.values(new)[cell])
+            self._drawn[FACES].mapper.scalar_visibility = True
+        self._open_view(new, cell)
+
+    def _add(self, mesh: Mesh, cell: int) -> None:
+        """Make the actors of another cell."""
+        for name in self._drawn:
+            self.stage.remove(name)
+        self._drawn = {}
+        at = lifted(mesh.points[nodes_of(mesh, cell)], 0.0)
+        edges = np.array(ELEMENTS[int(mesh.cells.types[cell])].edges)
+        lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
+        shapes = {OUTLINE: pv.PolyData(at, lines=lines), DOT: pv.PolyData(at[:1].copy())}
+        if mesh.dim == 3:
+            shapes[FACES] = part_shape(mesh, np.array([cell]))
+            shapes[FACES].cell_data[VALUES] = np.zeros(shapes[FACES].n_cells)
+        self._shapes = shapes
+        for name, shape in shapes.items():
+            actor = self.stage.add(shape, name, lighting=False, pickable=False)
+            self._drawn[name] = actor
+            if name == FACES:
+                continue
+            actor.prop.color = SELECTED_COLOUR
+            actor.prop.line_width, actor.prop.point_size = 4.0, 9.0
+            actor.prop.render_points_as_spheres = name == DOT
+            actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+            actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+            actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+
+    def _place(self, mesh: Mesh, cell: int) -> None:
+        """Move the actors to where the cell is now."""
+        at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
+        actors.place(self._shapes[OUTLINE], at, lift)
+        actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)
+        if FACES in self._shapes:
+            faces = self._shapes[FACES]
+            actors.place(faces, mesh.points[faces.point_data["vtkOriginalPointIds"]])
+
+    def _open_view(self, session: Session, cell: int) -> None:
+        """Let the cell be seen through boundaries that it is not beside."""
+        drawn, hidden = self.boundaries.drawn, session.view.hidden
+        if session.mesh is None or session.mesh.dim == 2:
+            return
+        shown = [one for name, one in drawn.items() if name not in hidden]
+        if any((one.surface.owner == cell).any() for one in shown):
+            return
+        for one in shown:
+            one.actor.prop.opacity = min(one.actor.prop.opacity, SEE_THROUGH)
+            one.actor.prop.show_edges = False

@@ -1,0 +1,1 @@
+"""Motions before they are computed: ghosts, what these hit, and their words."""

@@ -1,0 +1,35 @@
+"""The period of a mesh in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from slideviz.mesh.periodic import Pair
+from slideviz.view.motions.words import direction_words
+from slideviz.view.session.state import Session
+
+
+def period_text(pair: Pair) -> str:
+    """Return the period of a pair in a few words: λ or θ, and along or about what."""
+    if pair.kind == "rotational":
+        return f"θ = {math.degrees(pair.period):.6g}° about {_axis(pair.axis)}"
+    return f"λ = {pair.period:.6g} along {_axis((pair.vector / pair.period).tolist())}"
+
+
+def _axis(direction: Sequence[float]) -> str:
+    """Return an axis in words: which of its two ways it is told does not matter."""
+    return direction_words(direction).removeprefix("-")
+
+
+def found_text(session: Session) -> str:
+    """Return the period of the periodic boundaries that matched, in words."""
+    names = session.case.markers_with("periodic")
+    lines = [
+        f"Found: {pair.first} → {pair.second}, {period_text(pair)}"
+        for pair in session.pairs
+        if pair.first in names and pair.second in names
+    ]
+    if not lines and len(names) >= 2 and session.mesh is not None:
+        lines.append("No match found yet between the periodic boundaries; the run will try.")
+    return "\n".join(lines)

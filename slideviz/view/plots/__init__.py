@@ -1,0 +1,1 @@
+"""Curves and histograms, and what they are made of."""

@@ -1,0 +1,33 @@
+"""How many cells of a frame have which value."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.model import Mesh
+from slideviz.view.drawing.actors import shown_values
+from slideviz.view.plots.series import Distribution
+from slideviz.view.session.state import ColourBy, Frame
+
+BINS = 25
+"""So many that a step of an outline is wide enough for its dashes in a panel of the window."""
+
+
+def distribution(
+    frame: Frame,
+    what: ColourBy,
+    limits: tuple[float, float] = (0.0, 1.0),
+    undeformed: Mesh | None = None,
+) -> Distribution:
+    """Return the counts of the cells of a frame in `BINS` equal intervals between limits."""
+    edges = np.linspace(*limits, BINS + 1)
+    return Distribution.of(shown_values(frame, what, undeformed), edges)
+
+
+def spread(
+    frame: Frame, what: ColourBy, undeformed: Mesh | None = None
+) -> tuple[float, float] | None:
+    """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
+    values = shown_values(frame, what, undeformed)
+    right = values[np.isfinite(values)]
+    return (float(right.min()), float(right.max())) if len(right) else None

@@ -1,0 +1,1 @@
+"""Cuts through a mesh: planes and cylinders, in space and laid flat."""

@@ -1,0 +1,82 @@
+"""The picture of a section as a job beside the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.view.copies import show_passages
+from slideviz.view.jobs import Doing, Report, Stopped, require_going
+from slideviz.view.layers.copies import Period, matrices
+from slideviz.view.sections.around import surroundings
+from slideviz.view.sections.cut import Cutter
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.paint import PAINT_BY, PaintBy, paint
+from slideviz.view.sections.picture import SectionStyle, require_picture_name, section_picture
+from slideviz.view.session.runs_words import run_words
+from slideviz.view.session.state import COLOUR_BY, Session
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Width and height of a picture in pixels, and pixels per inch where it is for paper."""
+
+    size: tuple[int, int]
+    dpi: float | None = None
+
+    @classmethod
+    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
+        """Return that of a picture so large on paper."""
+        return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
+
+
+def save_section(
+    path: Path,
+    session: Session,
+    section: Section,
+    paper: Paper,
+    report: Report,
+    stopped: Stopped,
+) -> Path:
+    """Write the picture of a section as the view shows it: step, colours, neighbours.
+
+    Raises
+    ------
+    CaseError
+        No mesh is open, the section cuts no cell, the name has another end than a picture's, or
+        the file cannot be written.
+    """
+    frame = session.frame
+    if frame is None:
+        raise CaseError("no mesh is open, so there is no section to draw")
+    require_picture_name(path)
+    report(Doing(f"Cutting for {path.name}"))
+    word = COLOUR_BY[session.view.colour_by]
+    by: PaintBy = next((one for one in PAINT_BY if one == word), "size-skew")
+    painted = paint(frame.mesh, frame.quality, by, session.mesh)
+    painted = replace(painted, colour_map=session.view.colour_map)
+    if by == word:
+        painted = painted.within(*session.colour_range)
+    around = matrices(session, Period().of(session) if session.view.copies else None)
+    every = {0: np.eye(4)} | around
+    cutter, points = Cutter.of(frame.mesh), frame.mesh.points
+    pieces = show_passages(cutter, points, section, every)
+    require_going(stopped)
+    report(Doing(f"Drawing {path.name}"))
+    name = session.path.name if session.path is not None else ""
+    state = state_words(session)
+    style = SectionStyle(paper.size, session.view.edges, name=name, state=state, dpi=paper.dpi)
+    section_picture(pieces, section, painted, path, style, surroundings(cutter, points, every))
+    return path
+
+
+def state_words(session: Session) -> str:
+    """Return which run and step a session shows, and how it was computed."""
+    run = session.run_shown
+    if run is None or session.view.frame == 0:
+        return "undeformed"
+    step = min(session.view.frame, len(run.frames))
+    return f"run {run.number}, {run_words(run)}, step {step}"

@@ -1,0 +1,304 @@
+"""Pictures of sections, drawn with matplotlib: PNG, SVG and PDF alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.model import FloatArray
+from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER
+from slideviz.view.drawing.polygons import Polygons, joined
+from slideviz.view.legend import UNITS
+from slideviz.view.plots.style import PRINT
+from slideviz.view.sections.around import draw_around, window
+from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.view.sections.layout import Layout, inches_of, lay_out, plot_layout, room_ratio
+from slideviz.view.sections.model import Section
+from slideviz.view.sections.paint import Paint
+from slideviz.view.sections.shapes import colours_of, shapes_of
+from slideviz.view.sections.space import in_space
+from slideviz.view.sections.title import LETTERS, write_title
+from slideviz.view.sections.unroll import Label, flat_labels, flatten, middle_angle
+
+SUFFIXES = (".png", ".svg", ".pdf")
+_LETTER_WIDTH = 0.075
+"""Inches that a letter of a label takes."""
+
+
+@dataclass(frozen=True)
+class SectionStyle:
+    """How a section is drawn.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the picture in pixels; SVG and PDF keep their ratio.
+    edges : bool
+        Draw the mesh lines.
+    in_space : bool
+        Show it in space instead of flat.
+    name : str
+        What was cut: it stands before the section in words, shortened where there is no room.
+    state : str
+        Which state of it: run, method and step.
+    dpi : float, optional
+        Pixels per inch; left out, letters can be read when the picture is as wide as a page.
+    note : str
+        Stands behind the numbers of the title.
+    """
+
+    size: tuple[int, int] = (1600, 1000)
+    edges: bool = True
+    in_space: bool = False
+    name: str = ""
+    state: str = ""
+    dpi: float | None = None
+    note: str = ""
+
+
+def require_picture_name(file: Path) -> None:
+    """Raise if no picture can have this name.
+
+    Raises
+    ------
+    CaseError
+        The end of the name is none of ``SUFFIXES``.
+    """
+    if file.suffix.lower() not in SUFFIXES:
+        raise CaseError(f"{file}: a section is drawn as {', '.join(SUFFIXES)}; end the name so")
+
+
+def section_picture(
+    pieces: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    file: str | Path,
+    style: SectionStyle | None = None,
+    around: Polygons | None = None,
+) -> None:
+    """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
+
+    Parameters
+    ----------
+    pieces : mapping of int to Polygons
+        What the section shows of each passage; 0 is the mesh itself (see
+        `slideviz.view.copies.show_passages`).
+    section : Section
+    paint : Paint
+        Its numbers are those of the cells that the pieces name.
+    file : str or Path
+        Ends with .png, .svg or .pdf.
+    style : SectionStyle, optional
+    around : Polygons, optional
+        The other cells of a 2D mesh (see `slideviz.view.sections.around.surroundings`).
+
+    Raises
+    ------
+    CaseError
+        There is nothing to draw, the name has another end, or the file cannot be written.
+    """
+    from matplotlib import rc_context
+
+    target, style = Path(file), style or SectionStyle()
+    require_picture_name(target)
+    figure, dpi = draw_section(pieces, section, paint, style, around)
+    data = BytesIO()
+    kind = target.suffix.lower()[1:]
+    # Without the date, and with names that are not random, the same section gives the same file.
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with rc_context({"svg.hashsalt": "slideviz"}):
+        figure.savefig(data, format=kind, dpi=dpi if kind == "png" else 300, metadata=metadata)
+    with atomic_write(target, CaseError) as out:
+        out.write(data.getvalue())
+
+
+def draw_section(
+    pieces: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    style: SectionStyle,
+    around: Polygons | None = None,
+) -> tuple[Any, float]:
+    """Return the matplotlib figure of a section, and its pixels per inch.
+
+    Raises
+    ------
+    CaseError
+        There is nothing to draw.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    drawn = {number: piece for number, piece in pieces.items() if len(piece)}
+    if not drawn:
+        raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
+    width, height, dpi = inches_of(style.size, style.dpi)
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    lines = all(piece.sizes.max() == 2 for piece in drawn.values())
+    if lines:
+        layout = _curve(figure, joined(list(drawn.values())), section, paint)
+    else:
+        layout = _cells(figure, drawn, section, paint, style, around)
+    every = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
+    ids = drawn[0].cell_ids if 0 in drawn else every
+    in_plane = not any(piece.points[:, 2].any() for piece in drawn.values())
+    what = section.describe(2 if in_plane else 3)
+    words = ", ".join(part for part in (style.state, what) if part)
+    numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
+    write_title(figure, layout, (style.name, words), numbers)
+    return figure, dpi
+
+
+def _cells(
+    figure: Any,
+    drawn: Mapping[int, Polygons],
+    section: Section,
+    paint: Paint,
+    style: SectionStyle,
+    around: Polygons | None,
+) -> Layout:
+    """Draw polygons, with a colour bar."""
+    flat, labels = _flat(drawn, section, style)
+    if not section.whole:
+        # Nothing is in front of another, but folded cells overlap: show them.
+        flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
+    corners = flat.points[flat.connectivity, :2]
+    box, inches = (corners.min(axis=0), corners.max(axis=0)), figure.get_size_inches()
+    if around is not None:
+        box = window(box, around, room_ratio(inches))
+    layout = lay_out(box, inches, bare=style.in_space)
+    axes = figure.add_axes(layout.axes)
+    if around is not None:
+        draw_around(axes, around, section, (layout.low, layout.high))
+    shapes = shapes_of(flat, paint, layout.points_per_length, style.edges, lit=style.in_space)
+    axes.add_collection(shapes)
+    _dress(axes, layout, labels)
+    if style.in_space:
+        _triad(figure, drawn, section)
+    inverted = any(paint.inverted[piece.cells].any() for piece in drawn.values())
+    _bar(figure, layout, paint, inverted)
+    return layout
+
+
+def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layout:
+    """Draw the numbers along a line or circle."""
+    layout = plot_layout(figure.get_size_inches())
+    curve = curve_of(lines, section, paint.values, paint.inverted)
+    labels = position_label(section).full, f"{paint.label} {UNITS.get(paint.label, '[-]')}"
+    colours = Colours(paint.colour_map, paint.limits)
+    style = replace(PRINT, size=LETTERS)
+    draw_curves(figure.add_axes(layout.axes), [CurveRow("", curve)], labels, style, colours)
+    return layout
+
+
+def _flat(
+    pieces: Mapping[int, Polygons], section: Section, style: SectionStyle
+) -> tuple[Polygons, tuple[Label, Label] | None]:
+    """Return the pieces as they lie on paper, the nearest last, and what the axes are called."""
+    if style.in_space:
+        return in_space(list(pieces.values()), section), None
+    if not any(piece.points[:, 2].any() for piece in pieces.values()):
+        # A 2D mesh, or a plane that lies flat already.
+        return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
+    found: dict[int, Polygons] = {}
+    for numbers in (
+        sorted(number for number in pieces if number >= 0),
+        sorted((number for number in pieces if number < 0), reverse=True),
+    ):
+        # Each passage beside the one before, from the mesh itself outwards.
+        near = _middle(found[min(found)], section) if found else None
+        for number in numbers:
+            found[number] = flatten(pieces[number], section, near)
+            near = _middle(found[number], section)
+    flat = joined([found[number] for number in sorted(found)])
+    return flat.by_depth(), flat_labels(section)
+
+
+def _middle(flat: Polygons, section: Section) -> float | None:
+    return middle_angle(flat, section) if section.kind == "cylinder" else None
+
+
+def _dress(axes: Any, layout: Layout, labels: tuple[Label, Label] | None) -> None:
+    """Set limits, ticks and labels of the axes."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xlim(layout.low[0], layout.high[0])
+    axes.set_ylim(layout.low[1], layout.high[1])
+    if labels is None:
+        axes.set_axis_off()
+        return
+    for put, label, inches in zip(
+        (axes.set_xlabel, axes.set_ylabel), labels, layout.inches, strict=True
+    ):
+        fits = len(label.full) * _LETTER_WIDTH <= inches
+        put(label.full if fits else label.short, fontsize=LETTERS)
+    axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
+    room = (layout.inches[0] / 0.65, layout.inches[1] / 0.4)
+    for axis, bins in zip((axes.xaxis, axes.yaxis), room, strict=True):
+        number = int(np.clip(bins, 2, 9))
+        axis.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1))
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.6)
+
+
+def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:
+    """Draw the directions of x, y and z in the lower left corner."""
+    from slideviz.view.sections.space import camera
+
+    rows = camera(next(iter(pieces.values())), section)
+    size = figure.get_size_inches()
+    centre = np.array([0.55, 0.5])
+    for word, towards in zip("xyz", rows[:2].T, strict=True):
+        tip = centre + 0.3 * towards
+        figure.add_artist(_line(np.stack([centre, tip]) / size))
+        # An axis that points at the eye has no length, but its letter needs room all the same.
+        beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
+        at = (tip + 0.12 * beside) / size
+        figure.text(at[0], at[1], word, fontsize=LETTERS, ha="center", va="center")
+
+
+def _line(ends: FloatArray) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D(ends[:, 0], ends[:, 1], color=PAPER.text, linewidth=1.0)
+
+
+def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
+    """Draw the colour bar, with the colour of inverted cells where there are some."""
+    from matplotlib.patches import Rectangle
+
+    axes = figure.add_axes(layout.bar)
+    direction = "vertical" if layout.upright_bar else "horizontal"
+    bar = figure.colorbar(colours_of(paint), cax=axes, orientation=direction)
+    bar.set_label(paint.label, fontsize=LETTERS)
+    bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
+    bar.outline.set_linewidth(0.6)
+    bar.solids.set_rasterized(False)
+    bar.solids.set_edgecolor("face")
+    if not inverted:
+        return
+    width, height = figure.get_size_inches()
+    x, y, wide, high = layout.bar
+    if layout.upright_bar:
+        box, at = (x, y - 0.3 / height), (x + wide + 0.06 / width, y - 0.3 / height)
+        side = wide * width
+    else:
+        side = high * height
+        box = (x + wide + 0.2 / width, y)
+        at = (box[0] + (side + 0.06) / width, y)
+    figure.add_artist(
+        Rectangle(
+            box, side / width, side / height, color=INVERTED_COLOUR, transform=figure.transFigure
+        )
+    )
+    figure.text(
+        at[0], at[1] + side / height / 2, "inverted", fontsize=8, ha="left", va="center_baseline"
+    )

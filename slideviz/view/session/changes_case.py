@@ -1,0 +1,68 @@
+"""Pure functions from one session to the next: roles, motions, settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from slideviz.case.model import Case, Motion, Role
+from slideviz.view.session.rows import replaced, without
+from slideviz.view.session.state import Session
+
+
+def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
+    """Return the session with these boundaries in that role, which confirms it for them."""
+    changed = tuple(names)
+    roles = dict(session.case.roles) | dict.fromkeys(changed, role)
+    guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
+    motions = tuple(
+        motion
+        for motion in session.case.motions
+        if not motion.marker or roles.get(motion.marker) == "moving"
+    )
+    case = session.case.change(roles=roles, motions=motions)
+    if "periodic" not in roles.values():
+        case = case.change(periodic="none")
+    return replace(session, case=case, guesses=guesses)
+
+
+def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
+    """Return the session with the guesses for these boundaries (default: all) taken as right."""
+    gone = set(session.guesses if names is None else names)
+    kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
+    return replace(session, guesses=kept)
+
+
+def set_case(session: Session, **values: Any) -> Session:
+    """Return the session with other settings of the case."""
+    guess = "" if "reduction" in values else session.reduction_guess
+    return replace(session, case=session.case.change(**values), reduction_guess=guess)
+
+
+def add_motion(session: Session, motion: Motion) -> Session:
+    """Return the session with one more motion, performed last."""
+    return set_case(session, motions=(*session.case.motions, motion))
+
+
+def replace_motion(session: Session, index: int, motion: Motion) -> Session:
+    """Return the session with another motion at that place."""
+    return set_case(session, motions=replaced(session.case.motions, index, motion))
+
+
+def remove_motion(session: Session, index: int) -> Session:
+    """Return the session without the motion at that place."""
+    return set_case(session, motions=without(session.case.motions, index))
+
+
+def move_motion(session: Session, index: int, by: int) -> Session:
+    """Return the session with a motion performed earlier (negative) or later."""
+    motions = list(session.case.motions)
+    motion = motions.pop(index)
+    motions.insert(max(0, index + by), motion)
+    return set_case(session, motions=tuple(motions))
+
+
+def saved_case(session: Session, case: Case) -> Session:
+    """Return the session with ``case`` on disk."""
+    return replace(session, case=case, saved=case)

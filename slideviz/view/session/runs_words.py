@@ -1,0 +1,152 @@
+"""The runs of a session in words: what each is, and what sets it apart from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from slideviz.case.model import Case
+from slideviz.view.motions.words import motion_labels, vector_words
+from slideviz.view.session.state import Run
+
+SLIDING = {"none": "no sliding", "ps": "pseudo sliding", "ds": "direct sliding"}
+OTHER = {"idw": "inverse distance", "elastic": "linear elasticity"}
+PERIODIC = {
+    "none": "not periodic",
+    "periodic": "periodic distance",
+    "fixed": "periodic, fixed vertices",
+    "moving": "periodic, moving vertices",
+}
+USUAL = Case()
+
+
+def method_words(case: Case) -> str:
+    """Return which method a case asks for, in words."""
+    return OTHER.get(case.method, SLIDING[case.sliding])
+
+
+def run_words(run: Run) -> str:
+    """Return what a run is called: its name, or else its method."""
+    return run.name or method_words(run.case)
+
+
+def reduction_words(case: Case) -> str:
+    """Return how control nodes are chosen, in words."""
+    given = case.reduction
+    if given is None or case.method != "rbf":
+        return "all nodes"
+    part = f"{given.relative:g} of the extent" if given.relative else f"{given.tolerance:g}"
+    levels = ", in levels" if given.multilevel else ""
+    most = f", at most {given.max_nodes:,} nodes" if given.max_nodes else ""
+    return f"reduced to {part}{levels}{most}"
+
+
+def steps_words(run: Run) -> str:
+    """Return how many steps a run made, or has made of how many."""
+    made = len(run.frames)
+    step = run.last.step if run.last is not None else None
+    total = step.total if step is not None else run.case.steps
+    auto = ", automatic" if not run.case.steps else ""
+    if run.end == "done" or made == total:
+        return f"{made} step{'' if made == 1 else 's'}{auto}"
+    return f"{made} of {total} steps{auto}" if total else f"{made} steps{auto}"
+
+
+def seconds_words(seconds: float) -> str:
+    """Return a time, as exactly as it matters."""
+    if seconds < 100:
+        return f"{seconds:.3g} s" if seconds >= 0.1 else f"{seconds:.2f} s"
+    return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
+
+
+def end_words(run: Run) -> str:
+    """Return how a run ended, or that it goes on."""
+    return run.end or "running"
+
+
+def control_nodes(run: Run) -> int | None:
+    """Return the control nodes of its last step, if it has one."""
+    step = run.last.step if run.last is not None else None
+    return step.control_nodes if step is not None else None
+
+
+RBF = ("kernel", "influence_factor", "reduction")
+"""Settings that only radial basis functions know."""
+
+SETTINGS: dict[str, Callable[[Case], str]] = {
+    "kernel": lambda case: case.kernel,
+    "influence_factor": lambda case: f"radius × {case.influence_factor:g}",
+    "reduction": reduction_words,
+    "feature_angle_deg": lambda case: f"feature angle {case.feature_angle_deg:g}°",
+    "curved": lambda _: "curved boundaries",
+    "steps_gain": lambda case: f"gain {case.steps_gain:g}",
+    "idw_power": lambda case: f"power {case.idw_power:g}",
+    "idw_fixed_weight": lambda case: f"fixed weight {case.idw_fixed_weight:g}",
+    "quality_metric": lambda case: f"quality {case.quality_metric}",
+    "periodic_type": lambda case: f"{case.periodic_type} type",
+    "direction": lambda case: f"repeats in direction {case.direction}",
+    "axis": lambda case: f"axis {vector_words(case.axis)}",
+    "origin": lambda case: f"axis through {vector_words(case.origin)}",
+}
+"""Settings in words, by the field of the case; the motions, roles and others have their own."""
+
+
+def _roles_words(case: Case, others: Sequence[Case]) -> str:
+    """Return the roles of the boundaries whose role differs among cases."""
+    names = dict.fromkeys(name for other in others for name in other.roles)
+    differ = [n for n in names if len({one.roles.get(n, "fixed") for one in others}) > 1]
+    return ", ".join(f"{name} {case.roles.get(name, 'fixed')}" for name in differ)
+
+
+def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
+    """Yield what is told of the settings of a run, and whether that differs among cases."""
+    case = run.case
+
+    def differs(name: str) -> bool:
+        return any(getattr(other, name) != getattr(case, name) for other in cases)
+
+    if case.periodic != "none" or differs("periodic"):
+        yield PERIODIC[case.periodic].removeprefix("periodic, "), differs("periodic")
+    yield steps_words(run), differs("steps")
+    for name, words in SETTINGS.items():
+        # What is as usual needs no words: the other runs say that they are not.
+        usual = getattr(case, name) == getattr(USUAL, name)
+        known = case.method == "rbf" or name not in RBF
+        if known and not usual and (differs(name) or name == "kernel"):
+            yield words(case), differs(name)
+    nodes = control_nodes(run)
+    if nodes is not None:
+        yield f"{nodes:,} nodes", False
+
+
+def apart(run: Run, among: Sequence[Run]) -> str:
+    """Return what sets a run apart from those of a list, beside its name, in few words.
+
+    Nothing where no other is called as it is: its name or method says enough.
+    """
+    if not any(other is not run and run_words(other) == run_words(run) for other in among):
+        return ""
+    cases = [other.case for other in among]
+    words = [method_words(run.case)] if run.name else []
+    words += [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
+    words += [text for text, differs in _told(run, cases) if differs]
+    return ", ".join(filter(None, words))
+
+
+def brief(run: Run, among: Sequence[Run] = ()) -> str:
+    """Return what sets a run apart, beside its method, in one short line.
+
+    What differs among the runs of a list, which has it, comes first: the rest may be cut off.
+    """
+    cases = [other.case for other in among]
+    words = [] if run.end == "done" else [end_words(run)]
+    if run.name:
+        words.append(method_words(run.case))
+    if run in among:
+        words.append(motion_labels(cases)[among.index(run)])
+        words.append(_roles_words(run.case, cases))
+    told = list(_told(run, cases))
+    words += [text for text, differs in told if differs]
+    words += [text for text, differs in told if not differs]
+    if run.frames:
+        words.append(seconds_words(run.seconds))
+    return " · ".join(filter(None, words))
