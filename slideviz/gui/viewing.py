@@ -101,6 +101,7 @@ class Viewing(QWidget):
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self.scene.eye.beside, self.second_scene.eye.beside = self.second_scene.eye, self.scene.eye
         self._rearranged(not detail)
+        self.second.unveil()
 
     def _swap(self, swapped: bool) -> None:
         """Let the two views change places where they stand the other way round."""

@@ -80,6 +80,22 @@ def test_a_window_is_painted_though_its_view_goes_before_it_was(framed_view, qtb
     qtbot.waitUntil(lambda: frame.label in painted.widgets)
 
 
+def test_a_view_of_another_size_is_drawn_once_it_has_it(framed_view, qtbot):
+    frame = framed_view
+    drawn = []
+    frame.view.renderer.AddObserver(
+        "EndEvent", lambda *_: drawn.append((frame.view.width(), frame.view.height()))
+    )
+    for size in ((400, 320), (420, 350), (500, 400)):
+        frame.resize(*size)
+        frame.layout().activate()
+    assert not drawn, "nobody sees the sizes on the way"
+    qtbot.waitUntil(lambda: bool(drawn))
+    turns()
+    assert set(drawn) == {(frame.view.width(), frame.view.height())}
+    assert frame.view.width() > 450
+
+
 def test_a_closed_view_names_nothing_of_qt_that_is_gone(framed_view):
     view = framed_view.view
     surface = view._surface

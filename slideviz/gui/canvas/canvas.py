@@ -54,6 +54,7 @@ class View3D(QtInteractor):
         self.flat = False
         self._one_paint = OnePaint(self)
         self._veiled: list[list[vtkProp]] = []
+        self._resizing = False
 
     def render(self) -> None:
         """Schedule one repaint; pyvista calls this everywhere."""
@@ -89,6 +90,8 @@ class View3D(QtInteractor):
         self.render()
 
     def paintGL(self) -> None:
+        if self._resizing:
+            return
         # What changed the scene meanwhile knows nothing of the veil.
         self._veil()
         super().paintGL()
@@ -170,7 +173,14 @@ class View3D(QtInteractor):
         event.accept()
 
     def resizeEvent(self, event) -> None:
-        super().resizeEvent(event)
+        # Qt paints at once, and again when the widgets around have their places: on the way there
+        # a view has several sizes that nobody sees.
+        self._resizing = True
+        try:
+            super().resizeEvent(event)
+        finally:
+            self._resizing = False
+        self.update()
         if hasattr(self, "told"):
             self.told.resized.emit()
 
