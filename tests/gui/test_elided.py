@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QListWidget
 
-from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.elided import ElidedLabel, elide_items
 
 WORDS = "size-skew: min 0.8218, mean 0.9302; 1,608 cells cut"
 
@@ -48,3 +49,15 @@ def test_a_long_text_makes_nothing_wider(label):
     label.resize(100, 20)
     assert label.minimumSizeHint().width() <= label.sizeHint().width()
     assert label.sizePolicy().horizontalPolicy() == label.sizePolicy().Policy.Ignored
+
+
+def test_items_of_a_list_end_where_it_does(qtbot):
+    box = QListWidget()
+    box.addItems([WORDS, "short"])
+    elide_items(box)
+    qtbot.addWidget(box)
+    box.resize(150, 80)
+    box.show()
+    assert box.horizontalScrollBar().maximum() == 0
+    assert box.visualItemRect(box.item(0)).width() == box.viewport().width()
+    assert box.sizeHintForRow(0) > 10, "as high as before"

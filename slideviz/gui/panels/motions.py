@@ -23,6 +23,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_kinds import KINDS, new_motion
 from slideviz.gui.panels.motion_table import ask_table
+from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import folder_of, main_window
 from slideviz.mesh.model import Mesh
@@ -56,6 +57,7 @@ class MotionPanel(QWidget):
         self.list.setMinimumHeight(52)
         self.list.setMaximumHeight(140)
         self.list.setAlternatingRowColors(True)
+        elide_items(self.list)
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
         layout.addWidget(self.list, 4)
         self.editor = MotionEditor()

@@ -24,6 +24,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui import dialogs
 from slideviz.gui.canvas.cutting import Cutting
 from slideviz.gui.panels.section_editor import SectionEditor
+from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.view.layers.copies import Period
@@ -93,8 +94,7 @@ class SectionsPanel(QWidget):
         self.list = QListWidget()
         self.list.setObjectName("section_list")
         self.list.setMinimumHeight(48)
-        self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
-        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        elide_items(self.list)
         self.list.itemChanged.connect(self._checked)
         self.list.currentRowChanged.connect(self._row_chosen)
         # For the list alone: elsewhere the key means something else.

@@ -1,12 +1,18 @@
-"""A label that ends with an ellipsis where there is no room for all of its words."""
+"""Labels and lists whose words end with an ellipsis where there is no room for all of them."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QPainter
-from qtpy.QtWidgets import QLabel, QSizePolicy, QWidget
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QLabel,
+    QSizePolicy,
+    QStyledItemDelegate,
+    QWidget,
+)
 
 
 class ElidedLabel(QLabel):
@@ -36,3 +42,17 @@ class ElidedLabel(QLabel):
             self.shown,
             self.foregroundRole(),
         )
+
+
+class _Narrow(QStyledItemDelegate):
+    """Asks for no width, so that the text of an item ends where the list does."""
+
+    def sizeHint(self, option, index) -> QSize:
+        return QSize(0, super().sizeHint(option, index).height())
+
+
+def elide_items(items: QAbstractItemView) -> None:
+    """Let the items of a list end with an ellipsis, instead of scrolling sideways."""
+    items.setItemDelegate(_Narrow(items))
+    items.setTextElideMode(Qt.TextElideMode.ElideRight)
+    items.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
