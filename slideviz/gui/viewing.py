@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QPoint, Qt
+from qtpy.QtCore import QPoint, Qt, Signal
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.gui.canvas.beside import CameraLink, TitleBar, fill_pane
@@ -34,7 +34,15 @@ class Viewing(QWidget):
         The other, None while one is enough.
     titles
         What stands above each while there are two.
+
+    Signals
+    -------
+    second_made(), second_leaves()
+        The second view is there; it is still there, but will be closed.
     """
+
+    second_made = Signal()
+    second_leaves = Signal()
 
     def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -102,6 +110,7 @@ class Viewing(QWidget):
         self.scene.eye.beside, self.second_scene.eye.beside = self.second_scene.eye, self.scene.eye
         self._rearranged(not detail)
         self.second.unveil()
+        self.second_made.emit()
 
     def _swap(self, swapped: bool) -> None:
         """Let the two views change places where they stand the other way round."""
@@ -157,9 +166,10 @@ class Viewing(QWidget):
         self.render()
 
     def _drop_second(self) -> None:
-        second, self.second, self.second_scene = self.second, None, None
-        if second is None:
+        if self.second is None:
             return
+        self.second_leaves.emit()
+        second, self.second, self.second_scene = self.second, None, None
         whole = self.scene.sees_all()
         self._link.end()
         self._link = None
@@ -226,6 +236,11 @@ class Viewing(QWidget):
             self._swap(session.view.swapped)
             self.second_scene.update(changes.seen_beside(session))
             self.second.render_soon()
+
+    def pairs(self) -> list[tuple[View3D, Scene]]:
+        """Return the views with what each draws, one or two."""
+        views = (self.view,) if self.second is None else (self.view, self.second)
+        return list(zip(views, self._scenes(), strict=True))
 
     def _scenes(self) -> tuple[Scene, ...]:
         """Return what is drawn, of one view or two."""

@@ -248,7 +248,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     driver.click(panel.add_plane)
     (plane,) = sections(window)
     panel.handle.click()
-    handle = window.cutting.handle
+    handle = window.cutting.handles.of(window.view)
     assert handle.widget.GetEnabled()
     assert handle.shape.GetOrigin() == pytest.approx(plane.origin)
     interactor = window.view.iren.interactor
@@ -264,7 +264,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     driver.type(panel.editor.number, "0.3")
     assert np.dot(handle.shape.GetOrigin(), plane.direction) == pytest.approx(0.3)
     panel.handle.click()
-    assert window.cutting.handle is None
+    assert not window.cutting.handles
     assert handle.widget.GetInteractor() is None
     assert interactor is window.view.iren.interactor
 
@@ -274,7 +274,7 @@ def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, pass
     panel.handle.click()
     panel.flat.click()
     driver.open(passage_file)
-    assert window.cutting.handle is None
+    assert not window.cutting.handles
     assert window.cutting.flat is None
     assert sections(window) == ()
     assert panel.add_plane.text() == "Line"
@@ -413,7 +413,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     (moved,) = sections(window)
     assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
     assert moved.direction == line.direction
-    end = window.cutting.handle._grips.ends[1]
+    end = window.cutting.handles.of(window.view)._grips.ends[1]
     drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
     (turned,) = sections(window)
     assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
@@ -435,7 +435,11 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     flat_panel.handle.click()
     window.view.snapshot()
     centre = np.array(circle.origin[:2])
-    drag_in_view(window.view, window.cutting.handle._grips.ends[0], centre + np.array([0.2, 0.0]))
+    drag_in_view(
+        window.view,
+        window.cutting.handles.of(window.view)._grips.ends[0],
+        centre + np.array([0.2, 0.0]),
+    )
     assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)
     assert sections(window)[0].origin == circle.origin
     driver.type(flat_panel.editor.centre.fields[1], "0.05")
@@ -446,7 +450,7 @@ def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
     driver.click(flat_panel.add_plane)
     flat_panel.handle.click()
     assert any(name.startswith("handle:") for name in window.view.actors)
-    handle = window.cutting.handle
+    handle = window.cutting.handles.of(window.view)
     # What is dragged beside it moves the view, as ever.
     camera = window.scene.eye.place
     beside = handle._grips.ends[0] + 0.2
@@ -466,7 +470,7 @@ def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel,
     panel.handle.click()
     panel.flat.click()
     QApplication.processEvents()
-    cutting, handle = window.cutting, window.cutting.handle
+    cutting, handle = window.cutting, window.cutting.handles.of(window.view)
     monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
     window.close()
     assert handle.widget.GetInteractor() is None
@@ -492,6 +496,50 @@ def test_look_along_the_normal(window, driver, panel):
     driver.choose(panel.editor.axis, "x")
     driver.click(panel.look)
     assert abs(np.array(window.view.camera.direction)[0]) == pytest.approx(1.0)
+
+
+def compare(window, driver):
+    window.start_run()
+    driver.settle()
+    window.store.change(changes.show_beside, changes.UNDEFORMED)
+    driver.qtbot.waitUntil(lambda: window.viewing.second.isVisible())
+    QApplication.processEvents()
+    return window.viewing.second
+
+
+def test_of_two_views_each_has_a_handle(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.handle.click()
+    handles = window.cutting.handles
+    first = handles.of(window.view)
+    second_view = compare(window, driver)
+    second = handles.of(second_view)
+    (plane,) = sections(window)
+    at = np.array(plane.origin) + 0.1 * np.array(plane.direction)
+    second.widget.InvokeEvent("StartInteractionEvent")
+    second.shape.SetOrigin(*at)
+    second.widget.InvokeEvent("EndInteractionEvent")
+    assert sections(window)[0].origin == pytest.approx(tuple(at))
+    assert first.shape.GetOrigin() == pytest.approx(tuple(at)), "the other follows"
+    window.store.change(changes.show_beside, None)
+    assert second.widget.GetInteractor() is None
+    assert handles.of(second_view) is None
+    assert handles.of(window.view) is first
+    assert first.widget.GetEnabled()
+
+
+def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
+    second_view = compare(window, driver)
+    driver.click(flat_panel.add_plane)
+    flat_panel.handle.click()
+    second_view.snapshot()
+    (line,) = sections(window)
+    start, shift = np.array(line.origin[:2]), np.array([0.1, 0.05])
+    drag_in_view(second_view, start, start + shift)
+    assert sections(window)[0].origin[:2] == pytest.approx(tuple(start + shift), abs=0.02)
+    flat_panel.handle.click()
+    for view in (window.view, second_view):
+        assert not any(name.startswith("handle:") for name in view.actors)
 
 
 def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_path):

@@ -1,20 +1,18 @@
-"""What belongs to the section that is chosen: its handle in the view, and its flat picture."""
+"""What belongs to the section that is chosen: its handles in the views, and its flat picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QSplitter
 
 from slideviz.gui.canvas.flats import Flats, beside
-from slideviz.gui.canvas.handle import PlaneHandle
-from slideviz.gui.canvas.handle_flat import FlatHandle
+from slideviz.gui.canvas.handles import Handles
 from slideviz.gui.viewing import Viewing
 from slideviz.view.sections.cuts import can_cut
-from slideviz.view.sections.model import Section, Triple
+from slideviz.view.sections.model import Section
 from slideviz.view.sections.unroll import plane_axes
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
@@ -38,8 +36,10 @@ class Cutting(QSplitter):
         The place of the section in the list of the view.
     wants_handle : bool
         Whether the chosen section gets a handle, if it is a plane, or in 2D.
-    handle, flats
-        Both, None while nobody wants them.
+    handles
+        Of the section, one in each view while they are wanted.
+    flats
+        None while nobody wants them.
     look : Look
         Their colours.
     """
@@ -54,11 +54,13 @@ class Cutting(QSplitter):
         self._multi_samples = multi_samples
         self.chosen: int | None = None
         self.wants_handle = False
-        self.handle: PlaneHandle | FlatHandle | None = None
+        self.handles = Handles(self._replaced, self.store.hold)
         self.flats: Flats | None = None
         self._kind: tuple[object, ...] = ()
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
+        viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
+        viewing.second_leaves.connect(lambda: self.handles.drop(viewing.second))
 
     # What is wanted --------------------------------------------------------------------
 
@@ -119,61 +121,27 @@ class Cutting(QSplitter):
             self.wants_handle = False
         elif old.view.sections != new.view.sections:
             self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
-        elif self.flats is None and self.handle is None:
+        elif self.flats is None and not self.handles:
             return
         self._sync()
 
     def _sync(self) -> None:
-        session, section = self.store.session, self.section
-        self._sync_handle(session, section)
+        session = self.store.session
+        self._sync_handles(session)
         self._sync_flat(session)
         self.changed.emit()
 
-    def _sync_handle(self, session: Session, section: Section | None) -> None:
-        mesh = session.mesh
-        flat = mesh is not None and mesh.dim == 2
+    def _sync_handles(self, session: Session) -> None:
+        mesh, section = session.mesh, self.section
         usable = section is not None and section.shown and can_cut(mesh, section)
-        if not (self.wants_handle and usable and (flat or section.kind == "plane")):
-            self._drop_handle()
-            return
-        assert mesh is not None
-        if flat:
-            self._show_flat_handle(section)
-            return
-        if self.handle is None:
-            self.handle = PlaneHandle(self.viewing.view, self._dragged, self.store.hold)
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-        room = 0.03 * (high - low).max()
-        box = np.stack([low - room, high + room], axis=1).ravel()
-        self.handle.show(section, tuple(box.tolist()), self.look)
-        self.viewing.view.render_soon()
-
-    def _show_flat_handle(self, section: Section) -> None:
-        viewing, stage = self.viewing, self.viewing.scene.stage
-        if self.handle is None:
-            self.handle = FlatHandle(viewing.view, stage.strip, self._replaced, self.store.hold)
-        self.handle.show(section, stage.lift(self.store.session.mesh), self.look)
-        viewing.view.render_soon()
-
-    def _drop_handle(self) -> None:
-        if self.handle is not None:
-            self.handle.close()
-            self.handle = None
-            self.viewing.view.render_soon()
+        if self.wants_handle and usable and (mesh.dim == 2 or section.kind == "plane"):
+            self.handles.show(self.viewing.pairs(), section, mesh, self.look)
+        else:
+            self.handles.clear()
 
     def _replaced(self, section: Section) -> None:
         if self.section is not None and section != self.section:
             self.store.change(changes.replace_section, self.chosen, section)
-
-    def _dragged(self, origin: Triple, normal: Triple) -> None:
-        section = self.section
-        if section is None or section.kind != "plane":
-            return
-        moved = replace(section, origin=origin, direction=normal)
-        if not np.allclose(moved.origin, section.origin) or not np.allclose(
-            moved.basis[2], section.basis[2]
-        ):
-            self.store.change(changes.replace_section, self.chosen, moved)
 
     def _sync_flat(self, session: Session) -> None:
         at = flat_one(session.view.sections)
@@ -228,7 +196,7 @@ class Cutting(QSplitter):
 
     def close_views(self) -> None:
         """Give the graphics back, before those of the 3D view."""
-        self._drop_handle()
+        self.handles.clear()
         if self.flats is not None:
             self.flats.close_views()
             self.flats = None
