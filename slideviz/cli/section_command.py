@@ -53,7 +53,8 @@ def section(arguments: argparse.Namespace) -> int:
         painted = painted.up_to(ids)
     name = Path(mesh.name).name
     note = "" if base is not None or painted.label == "skew" else NONE
-    style = SectionStyle(arguments.size, arguments.edges, arguments.in_space, name, note=note)
+    size, trimmed = arguments.size or SectionStyle.size, arguments.size is None
+    style = SectionStyle(size, trimmed, arguments.edges, arguments.in_space, name, note=note)
     around = surroundings(cutter, mesh.points, matrices)
     section_picture(pieces, chosen, painted, arguments.output, style, around)
     summary = painted.summary(ids)

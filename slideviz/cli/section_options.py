@@ -83,7 +83,12 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         default=0,
         help="neighbouring passages to draw on each side, or wheel for all of them",
     )
-    add("--size", type=pixels, metavar="WxH", default=(1600, 1000), help="pixels")
+    add(
+        "--size",
+        type=pixels,
+        metavar="WxH",
+        help="pixels (default: 1600 wide, and as high as the section needs)",
+    )
     add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
     add("--metric", choices=("knupp", "rbf-slide"), default="knupp", help="as for quality")
     add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")

@@ -284,3 +284,36 @@ def test_what_cannot_be_drawn_or_written_says_so(tmp_path):
     with pytest.raises(CaseError, match="plane z = 3: it cuts no cell"):
         section_picture(pieces, section, painted, tmp_path / "x.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_strip_leaves_no_empty_paper():
+    mesh = cube(4, block=False)
+    long = mesh.with_points(mesh.points * (8.0, 1.0, 1.0))
+    section = Section("plane", (0, 0, 0.4))
+    whole, *_ = drawn(long, section, size=(1600, 1000))
+    figure, *_ = drawn(long, section, size=(1600, 1000), trimmed=True)
+    assert figure.get_figwidth() == whole.get_figwidth()
+    assert figure.get_figheight() < 0.7 * whole.get_figheight()
+    boxes = [
+        one.axes[0].get_position().bounds * np.tile(one.get_size_inches(), 2)
+        for one in (whole, figure)
+    ]
+    assert boxes[0][2:] == pytest.approx(boxes[1][2:]), "as large as before"
+    # All of it is on the paper, without much room above and below.
+    heights = [
+        limit
+        for text in figure.texts
+        for limit in text.get_window_extent(figure.canvas.get_renderer()).intervaly
+    ]
+    bars = [axes.get_tightbbox().intervaly for axes in figure.axes]
+    lowest, highest = min(map(min, bars)), max(heights)
+    assert 0 <= lowest < 0.4 * figure.dpi
+    assert 0 <= figure.bbox.height - highest < 0.4 * figure.dpi
+
+
+def test_a_square_section_fills_its_picture_as_before():
+    mesh = cube(4, block=False)
+    section = Section("plane", (0, 0, 0.4))
+    whole, *_ = drawn(mesh, section, size=(1600, 1000))
+    figure, *_ = drawn(mesh, section, size=(1600, 1000), trimmed=True)
+    assert figure.get_figheight() == pytest.approx(whole.get_figheight(), abs=0.01)

@@ -40,9 +40,9 @@ SIZES = {
     "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
     "17 cm wide, a page…": Paper.of_cm(17.0, 10.6),
     "25 cm wide, a slide…": Paper.of_cm(25.0, 14.0),
-    "1600 × 1000 pixels, for the screen…": Paper((1600, 1000)),
+    "1600 pixels wide, for the screen…": Paper((1600, 1000)),
 }
-"""Sizes of pictures, with the words of the menu."""
+"""Sizes of pictures, with the words of the menu; the height is the most."""
 HINTS = {
     3: "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells "
     "inside.",

@@ -22,7 +22,7 @@ from slideviz.view.session.state import COLOUR_BY, Session
 
 @dataclass(frozen=True)
 class Paper:
-    """Width and height of a picture in pixels, and pixels per inch where it is for paper."""
+    """Width and most height of a picture in pixels, and pixels per inch where it is for paper."""
 
     size: tuple[int, int]
     dpi: float | None = None
@@ -68,7 +68,9 @@ def save_section(
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     state = state_words(session)
-    style = SectionStyle(paper.size, session.view.edges, name=name, state=state, dpi=paper.dpi)
+    style = SectionStyle(
+        paper.size, True, session.view.edges, name=name, state=state, dpi=paper.dpi
+    )
     section_picture(pieces, section, painted, path, style, surroundings(cutter, points, every))
     return path
 

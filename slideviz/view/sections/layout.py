@@ -11,6 +11,7 @@ from slideviz.mesh.model import FloatArray
 Box = tuple[float, float, float, float]
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.6, 0.68
+_EDGE = 0.25
 _BAR, _BESIDE, _BELOW = 0.16, 1.05, 0.75
 """Thickness of the colour bar, and the room that it needs beside or below the axes, in inches."""
 
@@ -18,6 +19,8 @@ _THIN = 25.0
 """Sections longer than so many times their height get air around them."""
 
 _MARGIN = 0.02
+_LOWEST = 1.5
+"""Inches that a picture is high at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,7 @@ def lay_out(
     """
     low, high = _aired(*box)
     width, height = inches
-    left, bottom = (0.25, 0.25) if bare else (_LEFT, _BOTTOM)
+    left, bottom = (_EDGE, _EDGE) if bare else (_LEFT, _BOTTOM)
     free = {
         True: (width - left - _BESIDE, height - bottom - _TOP),
         False: (width - left - _RIGHT, height - bottom - _TOP - _BELOW),
@@ -112,6 +115,29 @@ def lay_out(
         (float(size[0]), float(size[1])),
         upright,
     )
+
+
+def height_for(
+    box: tuple[FloatArray, FloatArray], inches: tuple[float, float], bare: bool = False
+) -> float:
+    """Return the height of a figure that shows a box as large as `lay_out`, and nothing empty.
+
+    Parameters
+    ----------
+    box, inches, bare
+        As for `lay_out`.
+
+    Returns
+    -------
+    float
+        Inches, not more than the given height.
+    """
+    layout, height = lay_out(box, inches, bare), inches[1]
+    bottom = (_EDGE if bare else _BOTTOM) + (0.0 if layout.upright_bar else _BELOW)
+    inside = layout.inches[1]
+    if layout.upright_bar:
+        inside = max(inside, layout.bar[3] * height)
+    return float(min(max(bottom + inside + _TOP, _LOWEST), height))
 
 
 def room_ratio(inches: tuple[float, float]) -> float:

@@ -19,7 +19,14 @@ from slideviz.view.legend import UNITS
 from slideviz.view.plots.style import PRINT
 from slideviz.view.sections.around import draw_around, window
 from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
-from slideviz.view.sections.layout import Layout, inches_of, lay_out, plot_layout, room_ratio
+from slideviz.view.sections.layout import (
+    Layout,
+    height_for,
+    inches_of,
+    lay_out,
+    plot_layout,
+    room_ratio,
+)
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
 from slideviz.view.sections.shapes import colours_of, shapes_of
@@ -40,6 +47,8 @@ class SectionStyle:
     ----------
     size : (int, int)
         Width and height of the picture in pixels; SVG and PDF keep their ratio.
+    trimmed : bool
+        The height is the most: the picture is only as high as the section needs.
     edges : bool
         Draw the mesh lines.
     in_space : bool
@@ -55,6 +64,7 @@ class SectionStyle:
     """
 
     size: tuple[int, int] = (1600, 1000)
+    trimmed: bool = False
     edges: bool = True
     in_space: bool = False
     name: str = ""
@@ -174,6 +184,9 @@ def _cells(
     box, inches = (corners.min(axis=0), corners.max(axis=0)), figure.get_size_inches()
     if around is not None:
         box = window(box, around, room_ratio(inches))
+    if style.trimmed:
+        inches = inches[0], height_for(box, inches, bare=style.in_space)
+        figure.set_size_inches(inches)
     layout = lay_out(box, inches, bare=style.in_space)
     axes = figure.add_axes(layout.axes)
     if around is not None:
