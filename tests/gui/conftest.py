@@ -12,8 +12,10 @@ else:
 
     from slideviz.case.samples import write_sample
     from slideviz.gui import dialogs
+    from slideviz.gui.widgets import plot_canvas
     from slideviz.gui.window import MainWindow
     from slideviz.view.drawing.pick import to_display
+    from slideviz.view.session.store import Store
 
 
 DIALOGS = (
@@ -92,6 +94,22 @@ def window(qtbot, settings, monkeypatch):
     yield made
     # A listener that raises is told in the banner, and the window goes on: not so a test.
     assert made.faults.count == 0, made.banner.text.text()
+
+
+@pytest.fixture
+def plot_panel(qtbot, monkeypatch):
+    """Show a panel with a plot alone: ``plot_panel(HistogramPanel)``; it draws without delay."""
+    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
+
+    def show(kind):
+        made = kind(Store())
+        made.resize(300, 400)
+        qtbot.addWidget(made)
+        with qtbot.waitExposed(made):
+            made.show()
+        return made
+
+    return show
 
 
 @pytest.fixture(scope="session")

@@ -9,22 +9,14 @@ from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
 from slideviz.gui.panels.curves import CurvesPanel
-from slideviz.gui.widgets import plot_canvas
 from slideviz.view.drawing.look import DARK
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
 
 
 @pytest.fixture
-def panel(qtbot, monkeypatch):
-    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
-    made = CurvesPanel(Store())
-    made.resize(300, 400)
-    qtbot.addWidget(made)
-    with qtbot.waitExposed(made):
-        made.show()
-    return made
+def panel(plot_panel):
+    return plot_panel(CurvesPanel)
 
 
 @pytest.fixture

@@ -14,18 +14,11 @@ from slideviz.view.drawing.look import DARK
 from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
-from slideviz.view.session.store import Store
 
 
 @pytest.fixture
-def panel(qtbot, monkeypatch):
-    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
-    made = HistogramPanel(Store())
-    made.resize(300, 400)
-    qtbot.addWidget(made)
-    with qtbot.waitExposed(made):
-        made.show()
-    return made
+def panel(plot_panel):
+    return plot_panel(HistogramPanel)
 
 
 @pytest.fixture

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+import pyvista as pv
 
 from slideviz.case.samples import sample
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
+from slideviz.view.scene import Scene
 from slideviz.view.session.changes import open_mesh
 from slideviz.view.session.state import Frame
 
@@ -25,6 +27,24 @@ def square_mesh(n=4):
     )
     points = np.stack([x.ravel(), y.ravel()], 1)
     return Mesh(points, Cells.from_blocks([(9, quads)]), markers, name="square")
+
+
+@pytest.fixture
+def window_size():
+    """Width and height of the plotter in pixels; modules have their own."""
+    return [420, 300]
+
+
+@pytest.fixture
+def plotter(window_size):
+    made = pv.Plotter(off_screen=True, window_size=window_size)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def scene(plotter):
+    return Scene(plotter)
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,6 @@ import gc
 
 import numpy as np
 import pytest
-import pyvista as pv
 
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
@@ -15,10 +14,8 @@ from slideviz.view.session.state import Frame
 
 
 @pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=[300, 200])
-    yield plotter
-    plotter.close()
+def window_size():
+    return [300, 200]
 
 
 @pytest.fixture

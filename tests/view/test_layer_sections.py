@@ -20,7 +20,6 @@ from slideviz.view.drawing.polygon_actor import plain_colour
 from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.flat_scene import FlatScene
 from slideviz.view.layers.mesh import looks_inside
-from slideviz.view.scene import Scene
 from slideviz.view.sections import picture as section_picture
 from slideviz.view.sections import start as section_start
 from slideviz.view.sections.cuts import KEPT, Cuts
@@ -30,18 +29,6 @@ from slideviz.view.session import changes
 from slideviz.view.session.state import Frame, Session
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
-
-
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=[420, 300])
-    yield plotter
-    plotter.close()
-
-
-@pytest.fixture
-def scene(plotter):
-    return Scene(plotter)
 
 
 @pytest.fixture

@@ -21,7 +21,6 @@ from slideviz.view.layers.copies import (
 )
 from slideviz.view.layers.triad import COLOURS, SIZE
 from slideviz.view.node_types import NODE_COLOURS
-from slideviz.view.scene import Scene
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 
@@ -29,15 +28,8 @@ LEFT = np.array([-0.004, 0.0])
 
 
 @pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=[620, 460])
-    yield plotter
-    plotter.close()
-
-
-@pytest.fixture
-def scene(plotter):
-    return Scene(plotter)
+def window_size():
+    return [620, 460]
 
 
 @pytest.fixture(scope="module")

@@ -18,10 +18,8 @@ SIZE = (500, 400)
 
 
 @pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    yield plotter
-    plotter.close()
+def window_size():
+    return SIZE
 
 
 def opened(plotter, mesh, look, **view):

@@ -14,18 +14,6 @@ from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 
 
-@pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=[420, 300])
-    yield plotter
-    plotter.close()
-
-
-@pytest.fixture
-def scene(plotter):
-    return Scene(plotter)
-
-
 def image(scene):
     scene.plotter.render()
     return np.asarray(scene.plotter.screenshot(return_img=True)).astype(int)

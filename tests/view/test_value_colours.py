@@ -19,10 +19,8 @@ from slideviz.view.session.state import Frame
 
 
 @pytest.fixture
-def plotter():
-    plotter = pv.Plotter(off_screen=True, window_size=[300, 300])
-    yield plotter
-    plotter.close()
+def window_size():
+    return [300, 300]
 
 
 def colours(plotter):
@@ -79,7 +77,7 @@ def test_the_labels_of_the_bar_differ(plotter, session):
     session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
     scene.open(session, find_surfaces(session.mesh))
     bar = plotter.scalar_bars["size-skew"]
-    at = [bar.GetCustomLabels().GetValue(i) for i in range(bar.GetCustomLabels().GetSize())]
+    at = [bar.GetCustomLabels().GetValue(i) for i in range(bar.GetCustomLabels().GetNumberOfValues())]
     assert at == pytest.approx([0.950, 0.955, 0.960, 0.965])
     assert bar.GetUseCustomLabels()
     assert len({bar.GetLabelFormat() % value for value in at}) == 4
