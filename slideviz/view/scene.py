@@ -190,9 +190,12 @@ class Scene:
         drawn = [one for name, one in self.drawn.items() if name not in hidden]
         if not drawn:
             return None
-        if drawn[0].surface.facets.shape[1] == 2:
+        if drawn[0].surface.flat:
             return pick.nearest_line(self.plotter, x, y, drawn)
-        return pick.front_surface(self.plotter, x, y, drawn)
+        # What is seen through glass is meant, not the glass.
+        within = [one for one in drawn if one.surface.name not in self._boundaries.glass]
+        found = pick.front_surface(self.plotter, x, y, within) if within else None
+        return pick.front_surface(self.plotter, x, y, drawn) if found is None else found
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None.

@@ -8,7 +8,7 @@ from slideviz.mesh.quality import quality
 from slideviz.view.drawing.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
 from slideviz.view.drawing.pick import to_display
 from slideviz.view.drawing.surfaces import facet_connectivity, find_surfaces
-from slideviz.view.layers.mesh import is_closed
+from slideviz.view.layers.mesh import GLASS, enclosed, is_closed
 from slideviz.view.scene import Scene
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
@@ -385,6 +385,43 @@ def test_boundaries_with_a_hole_show_their_inside(scene, cube):
     holed = replace(cube, markers=tuple(m for m in cube.markers if m.name != "FRONT"))
     opened(scene, changes.open_mesh(Frame(holed, quality(holed)), None))
     assert culling(scene) == {"none"}
+
+
+def test_a_moving_boundary_inside_is_seen_and_clicked_through_those_around_it(scene, cube):
+    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.set_role(session, ("BLOCK",), "fixed")
+    opened(scene, session)
+    scene.look_from("+x")
+    (block,) = (one for one in find_surfaces(cube) if one.name == "BLOCK")
+    middle = to_display(scene.plotter, cube.points[block.nodes].mean(axis=0)[None])[0]
+    across, down = int(middle[0]), 299 - int(middle[1])
+    patch = np.s_[down - 8 : down + 9, across - 8 : across + 9]
+    front = scene.pick(*middle)
+    assert front not in (None, "BLOCK")
+    hidden = image(scene)
+    moving = changes.set_role(session, ("BLOCK",), "moving")
+    scene.update(moving)
+    opacity = {name: one.actor.prop.opacity for name, one in scene.drawn.items()}
+    assert opacity.pop("BLOCK") == 1.0
+    assert set(opacity.values()) == {GLASS}
+    assert scene.pick(*middle) == "BLOCK"
+    corner = to_display(scene.plotter, cube.points.max(axis=0)[None])[0] - 12.0
+    assert scene.pick(*corner) == front, "beside it, the glass"
+    for picture, orange in ((image(scene)[patch], True), (hidden[patch], False)):
+        assert ((picture[..., 0] > picture[..., 2] + 40).mean() > 0.9) == orange
+    # Values are looked at on the boundaries; without what is inside there is no reason for glass.
+    for view in ({"colour_by": "size_skew"}, {"hidden": frozenset({"BLOCK"})}):
+        scene.update(changes.set_view(moving, **view))
+        assert {one.actor.prop.opacity for one in scene.drawn.values()} == {1.0}
+        assert scene.pick(*middle) == front
+
+
+def test_a_boundary_that_reaches_the_outside_encloses_nothing_and_is_not_enclosed(cube):
+    assert enclosed(find_surfaces(cube), cube.points) == {"BLOCK"}
+    (block,) = (one for one in find_surfaces(cube) if one.name == "BLOCK")
+    moved = cube.points.copy()
+    moved[block.nodes, 0] += cube.points[:, 0].max() - moved[block.nodes, 0].max()
+    assert enclosed(find_surfaces(cube), moved) == frozenset()
 
 
 def test_what_highlights_a_boundary_is_made_when_it_is_selected_and_moves_with_it(scene, session):

@@ -77,7 +77,9 @@ def test_the_labels_of_the_bar_differ(plotter, session):
     session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
     scene.open(session, find_surfaces(session.mesh))
     bar = plotter.scalar_bars["size-skew"]
-    at = [bar.GetCustomLabels().GetValue(i) for i in range(bar.GetCustomLabels().GetNumberOfValues())]
+    at = [
+        bar.GetCustomLabels().GetValue(i) for i in range(bar.GetCustomLabels().GetNumberOfValues())
+    ]
     assert at == pytest.approx([0.950, 0.955, 0.960, 0.965])
     assert bar.GetUseCustomLabels()
     assert len({bar.GetLabelFormat() % value for value in at}) == 4

@@ -17,6 +17,10 @@ from slideviz.view.session.state import Session
 
 FADED = 0.3
 """Opacity of a 2D mesh while sections show the cells on them."""
+GLASS = 0.15
+"""Opacity of boundaries around moving ones."""
+_BESIDE = 1e-6
+"""Part of a mesh's length that an enclosed boundary is at least away from its outside."""
 
 
 def recoloured(old: Session | None, new: Session) -> bool:
@@ -92,14 +96,18 @@ class BoundaryLayer:
         By name.
     bands : dict of str to Band
         Of those that are, or were, selected.
+    glass : frozenset of str
+        Those that are seen through, as moving ones are inside of them.
     """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.drawn: dict[str, Drawn] = {}
         self.bands: dict[str, Band] = {}
+        self.glass: frozenset[str] = frozenset()
         self._lift = 0.0
         self._closed = False
+        self._enclosed: frozenset[str] = frozenset()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
         """Draw another mesh."""
@@ -108,10 +116,11 @@ class BoundaryLayer:
         for surface in surfaces:
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
         self._closed = is_closed(surfaces)
+        self._enclosed = enclosed(surfaces, session.mesh.points)
 
     def clear(self) -> None:
         """Forget the mesh."""
-        self.drawn, self.bands = {}, {}
+        self.drawn, self.bands, self.glass = {}, {}, frozenset()
 
     def shapes(self) -> list[Any]:
         """Return the data sets of all boundaries."""
@@ -147,12 +156,21 @@ class BoundaryLayer:
             values = self.stage.values(new)
             for one in self.drawn.values():
                 one.shape.cell_data[VALUES] = values[one.surface.owner]
+        self.glass = self._glass(new)
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)
         # Half of the faces look away; nobody sees them from outside, and they take their time.
-        culled = self._closed and seen_from_outside(new)
+        culled = self._closed and not self.glass and seen_from_outside(new)
         for one in self.drawn.values():
             one.actor.prop.culling = "back" if culled else "none"
+
+    def _glass(self, session: Session) -> frozenset[str]:
+        """Return what would hide boundaries that move, where colours tell of roles."""
+        view = session.view
+        within = (name for name in self._enclosed if name not in view.hidden)
+        if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
+            return frozenset()
+        return frozenset(self.drawn) - self._enclosed
 
     def _place(self, points: FloatArray) -> None:
         for one in self.drawn.values():
@@ -176,8 +194,8 @@ class BoundaryLayer:
             one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
         else:
             self.stage.edges(one.actor.prop, view.edges)
-            inside = looks_inside(session)
-            one.actor.prop.opacity = 0.12 if inside else 1.0
+            inside, glass = looks_inside(session), name in self.glass
+            one.actor.prop.opacity = 0.12 if inside else GLASS if glass else 1.0
             if inside:
                 one.actor.prop.show_edges = False
 
@@ -203,6 +221,32 @@ def seen_from_outside(session: Session) -> bool:
     glass = view.hidden or view.perspective or looks_inside(session)
     # The outside of a folded cell is inside.
     return not glass and session.frame is not None and session.frame.quality.inverted == 0
+
+
+def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
+    """Return the names of boundaries of a 3D mesh that are inside of all others: a wing in air.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+    points : (n, d) float64
+        Of the mesh.
+    """
+    boxes = {
+        one.name: (points[one.nodes].min(axis=0), points[one.nodes].max(axis=0))
+        for one in surfaces
+        if not one.flat
+    }
+    if not boxes:
+        return frozenset()
+    low = np.min([box[0] for box in boxes.values()], axis=0)
+    high = np.max([box[1] for box in boxes.values()], axis=0)
+    beside = _BESIDE * float((high - low).max())
+    return frozenset(
+        name
+        for name, box in boxes.items()
+        if (box[0] > low + beside).all() and (box[1] < high - beside).all()
+    )
 
 
 def is_closed(surfaces: Sequence[Surface]) -> bool:
