@@ -145,6 +145,10 @@ class Actions:
             act.toggled.connect(partial(self._toggle, name))
             menu.addAction(act)
         menu.addSeparator()
+        colours = self._add("fit_colours", "Fit &colours", None, "R", "colours")
+        colours.setCheckable(True)
+        colours.triggered.connect(self._fit_colours)
+        menu.addAction(colours)
         menu.addAction(self._add("fit", "&Fit all", window.fit, "F", "fit"))
         sides = self._menu(menu, "look_from", "Look &from")
         for side, keys in {**SIDE_KEYS, "iso": "0"}.items():
@@ -198,6 +202,19 @@ class Actions:
         if getattr(self.window.store.session.view, name) != checked:
             self.window.store.change(changes.set_view, **{name: checked})
 
+    def _fit_colours(self, wanted: bool) -> None:
+        if wanted:
+            self.window.store.change(changes.fit_colours)
+        else:
+            self.window.store.change(changes.set_view, colour_range=None)
+        # Nothing changes where all values are alike.
+        self._sync_colours(self.window.store.session)
+
+    def _sync_colours(self, session: Session) -> None:
+        fit, view = self.by_name["fit_colours"], session.view
+        fit.setChecked(view.colour_range is not None and view.colour_by != "role")
+        fit.setEnabled(session.mesh is not None and view.colour_by != "role")
+
     def _sync_export(self, session: Session, busy: bool) -> None:
         """Show which exports there can be, and say why not."""
         stepped, opened = len(session.frames) > 1, session.mesh is not None
@@ -246,6 +263,7 @@ class Actions:
             act.setToolTip(f"{said} ({act.shortcut().toString()})")
         for name in ("save_case", "save_picture", "copy_picture", "fit", "show_all"):
             self.by_name[name].setEnabled(opened)
+        self._sync_colours(session)
         self._sync_export(session, busy)
         self.compare.setEnabled(session.deformed is not None)
         self.by_name["save_mesh"].setEnabled(opened and not busy)

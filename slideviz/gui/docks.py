@@ -9,6 +9,7 @@ from typing import Any
 from qtpy.QtCore import QEvent, QObject, Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
+from slideviz.gui.dock_tabs import DockTabs
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.curves import CurvesPanel
 from slideviz.gui.panels.display import DisplayPanel
@@ -35,8 +36,8 @@ SIDE = 0.22
 class DockRow:
     """One dock: its name and title, where it stands, and how its panel is made.
 
-    ``after`` names the dock that it shares a place with, as a tab; ``bare`` has no title bar:
-    the tab, or the button in it, names it already, and the height is needed.
+    ``after`` names the dock that it shares a place with, as a tab. One that is ``named`` by what is
+    in it has no title bar, as those have none that a tab names: the height is needed.
     """
 
     name: str
@@ -44,34 +45,32 @@ class DockRow:
     area: Qt.DockWidgetArea
     make: Callable[[Any], QWidget]
     after: str = ""
-    bare: bool = False
+    named: bool = False
     shown: bool = True
 
 
 DOCKS: tuple[DockRow, ...] = (
     DockRow("boundaries", "Boundaries", LEFT, lambda w: BoundariesPanel(w.store)),
-    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store), bare=True),
-    DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion", bare=True),
-    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), bare=True),
-    DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store), bare=True),
+    DockRow("motion", "Motion", LEFT, lambda w: MotionPanel(w.store)),
+    DockRow("method", "Method", LEFT, lambda w: MethodPanel(w.store), "motion"),
+    DockRow("run", "Run", LEFT, lambda w: RunPanel(w.store), named=True),
+    DockRow("histogram", "Histogram", RIGHT, lambda w: HistogramPanel(w.store)),
     DockRow(
         "worst",
         "Worst cells",
         RIGHT,
         lambda w: WorstPanel(w.store, w.viewing.fly_to, w.viewing.fly_back),
         "histogram",
-        bare=True,
     ),
-    DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram", bare=True),
+    DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram"),
     DockRow(
         "runs",
         "Runs",
         RIGHT,
         lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error, w.say),
-        bare=True,
     ),
-    DockRow("sections", "Sections", RIGHT, sections_panel, "runs", bare=True),
-    DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs", bare=True),
+    DockRow("sections", "Sections", RIGHT, sections_panel, "runs"),
+    DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs"),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )
 """Every dock; the panels get the window and take from it what they need."""
@@ -86,7 +85,9 @@ class Docks(QObject):
         self._widths: dict[Side, int] = {}
         window.installEventFilter(self)
         window.setDockOptions(
-            QMainWindow.DockOption.AnimatedDocks | QMainWindow.DockOption.AllowTabbedDocks
+            QMainWindow.DockOption.AnimatedDocks
+            | QMainWindow.DockOption.AllowTabbedDocks
+            | QMainWindow.DockOption.GroupedDragging  # a tab can be dragged out of its bar
         )
         window.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
         window.setCorner(Qt.Corner.BottomLeftCorner, LEFT)
@@ -96,6 +97,8 @@ class Docks(QObject):
         for row in DOCKS:
             self._make(row)
         self.arrange()
+        bare = {self.by_name[row.name] for row in DOCKS if row.named}
+        self.tabs = DockTabs(window, self.by_name.values(), bare)
 
     def _make(self, row: DockRow) -> None:
         dock = QDockWidget(row.title, self.window)
@@ -105,12 +108,6 @@ class Docks(QObject):
         # A window once made small must not leave names and fields cut off for ever.
         if row.area != BOTTOM:
             dock.setMinimumWidth(LEFT_WIDTH if row.area == LEFT else RIGHT_WIDTH)
-        if row.bare:
-            dock.setTitleBarWidget(QWidget())
-            # Taken out of its place it needs a title to be held by.
-            dock.topLevelChanged.connect(
-                lambda floats: dock.setTitleBarWidget(None if floats else QWidget())
-            )
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 

@@ -35,6 +35,7 @@ class ToolBar(QToolBar):
         self._add(by_name, *FIRST)
         self._add(by_name, "undo", "redo")
         self._add_colour(window.store)
+        self._add(by_name, "fit_colours")
         self._add(by_name, *SHOWN)
         for side, text in SIDES.items():
             by_name[f"side{side}"].setIconText(text)
@@ -59,7 +60,6 @@ class ToolBar(QToolBar):
         )
         self.colour.chosen.connect(lambda value: store.change(changes.set_view, colour_by=value))
         self.addWidget(self.colour)
-        self.addSeparator()
 
     def _add_zone(self, open_zone) -> None:
         self.zone = Choice({})

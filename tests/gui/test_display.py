@@ -74,6 +74,7 @@ def test_the_range_fits_the_values_of_the_step(shown):
     values = shown.session.frame.quality.skew
     assert low == pytest.approx(values.min(), rel=1e-2)
     assert high == pytest.approx(values.max(), rel=1e-2)
+    assert low <= values.min() < values.max() <= high
     shown.click(panel(shown).reset_range)
     assert view(shown).colour_range is None
 
@@ -207,6 +208,25 @@ def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
     assert not synced
     shown.window.store.change(changes.set_view, edges=False)
     assert len(synced) == 1
+
+
+def test_colours_fit_at_a_click_and_are_as_ever_at_the_next(shown):
+    fit = shown.window.actions_.by_name["fit_colours"]
+    assert not fit.isEnabled(), "roles have no range"
+    shown.window.store.change(changes.set_view, colour_by="skew")
+    assert fit.isEnabled()
+    assert not fit.isChecked()
+    fit.trigger()
+    values = shown.session.frame.quality.skew
+    assert view(shown).colour_range == pytest.approx((values.min(), values.max()), abs=0.02)
+    assert fit.isChecked()
+    fit.trigger()
+    assert view(shown).colour_range is None
+    assert not fit.isChecked()
+    shown.window.store.change(changes.set_view, colour_by="size")
+    fit.trigger()
+    assert view(shown).colour_range is None, "all cells have the size they had"
+    assert not fit.isChecked()
 
 
 def test_the_range_fits_both_views_of_a_comparison(shown):

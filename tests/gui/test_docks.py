@@ -211,3 +211,62 @@ def test_sides_follow_the_window_until_they_are_moved_also_after_a_restart(
     third.resize(1700, 900)
     settled(qtbot, third)
     assert widths(third) == pytest.approx(moved, abs=3)
+
+
+def tab_of(window, title):
+    """Return the tab bar that has a panel, and where its tab is."""
+    for bar in window.docks_.tabs.bars():
+        for index in range(bar.count()):
+            if bar.tabText(index) == title:
+                return bar, bar.tabRect(index).center()
+    raise AssertionError(title)
+
+
+def is_titled(dock):
+    return dock.titleBarWidget() is None
+
+
+def test_a_panel_is_taken_out_of_its_tab_and_put_back(start, qtbot, monkeypatch):
+    window = start(SMALL)
+    docks = window.docks
+    assert not is_titled(docks["curves"])
+    bar, at = tab_of(window, "Curves")
+    QTest.mouseDClick(bar, Qt.MouseButton.LeftButton, pos=at)
+    settled(qtbot, window)
+    assert docks["curves"].isFloating()
+    assert is_titled(docks["curves"])
+    assert docks["curves"].isVisible()
+    assert docks["histogram"].isVisible(), "both are seen together"
+    assert docks["curves"].height() > 200
+    close(window, monkeypatch)
+    again = start()
+    assert again.docks["curves"].isFloating()
+    again.actions_.by_name["restore_layout"].trigger()
+    settled(qtbot, again)
+    assert not again.docks["curves"].isFloating()
+    assert not is_titled(again.docks["curves"])
+    tab_of(again, "Curves")
+
+
+def test_the_menu_of_a_tab_takes_its_panel_out_or_closes_it(start, qtbot):
+    window = start(SMALL)
+    menu = window.docks_.tabs.menu_of(window.docks["runs"])
+    texts = {action.text(): action for action in menu.actions()}
+    texts["Own window"].trigger()
+    assert window.docks["runs"].isFloating()
+    texts["Close"].trigger()
+    settled(qtbot, window)
+    assert not window.docks["runs"].isVisible()
+
+
+def test_a_panel_without_a_tab_has_a_title_to_be_moved_by(start, qtbot):
+    window = start(SMALL)
+    for name in ("worst", "curves"):
+        window.docks[name].close()
+    settled(qtbot, window)
+    assert is_titled(window.docks["histogram"])
+    assert not is_titled(window.docks["run"]), "its button names it"
+    window.docks["worst"].show()
+    settled(qtbot, window)
+    assert not is_titled(window.docks["histogram"])
+    assert run_is_seen(window)

@@ -701,7 +701,7 @@ def test_a_narrow_player_leaves_out_speed_and_words_before_numbers(ready):
     ready.qtbot.waitUntil(lambda: not player.speed_button.isVisible())
     assert player.step_text.text() == "3/3"
     ready.qtbot.waitUntil(lambda: player.step_text.x() > player.slider.geometry().right())
-    assert "inv" in plain(player.result.text())
+    ready.qtbot.waitUntil(lambda: "inv" in plain(player.result.text()))
     ready.window.resize(1280, 800)
     ready.qtbot.waitUntil(player.speed_button.isVisible)
     assert player.step_text.text() == "Step 3 of 3"

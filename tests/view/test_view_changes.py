@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, FromFile, Rotate, Translate
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import INVERTED, quality
 from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.sections.model import Section
 from slideviz.view.session import changes, opening
@@ -263,3 +263,43 @@ def test_one_section_is_laid_flat(session):
     for index, wanted in ((0, [True, False]), (1, [False, True]), (None, [False, False])):
         session = changes.lay_flat(session, index)
         assert [section.flat for section in session.view.sections] == wanted
+
+
+@pytest.fixture
+def ran(session):
+    """Two steps, the second worse."""
+    started = changes.start_run(session)
+    return changes.add_frames(started, [moved(session, 0.1), moved(session, 0.3)])
+
+
+def test_the_colours_fit_all_steps_whichever_is_shown(ran):
+    session = changes.set_view(ran, colour_by="size_skew", frame=0)
+    values = [frame.quality.values for frame in session.frames]
+    lowest, highest = (pick(values) for pick in (np.min, np.max))
+    fitted = changes.fit_colours(session)
+    low, high = fitted.view.colour_range
+    assert low <= lowest < highest <= high
+    assert high - low < 1.03 * (highest - lowest)
+    assert high <= 1.0
+    for frame in range(len(session.frames)):
+        again = changes.fit_colours(changes.set_view(fitted, frame=frame))
+        assert again.view.colour_range == (low, high)
+
+
+def test_inverted_cells_do_not_widen_the_colours(ran):
+    session = changes.set_view(ran, colour_by="size_skew")
+    last = session.run_shown.last
+    status = last.quality.status.copy()
+    worst = np.argmin(last.quality.values)
+    status[worst] = INVERTED
+    folded = replace(last, quality=replace(last.quality, status=status))
+    runs = (replace(session.run_shown, frames=(folded,)),)
+    left = np.delete(last.quality.values, worst).min()
+    low, _ = changes.fit_colours(replace(session, runs=runs)).view.colour_range
+    assert last.quality.values[worst] < low <= left
+
+
+def test_roles_and_equal_values_have_no_range(ran, session):
+    assert changes.fit_colours(ran) is ran, "roles"
+    equal = changes.set_view(session, colour_by="size")
+    assert changes.fit_colours(equal) is equal

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-import numpy as np
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import (
     QCheckBox,
@@ -43,7 +43,7 @@ SHOWN: dict[str, tuple[str, str]] = {
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
     "range": "The values at the ends of the colour bar.",
-    "fit": "From the lowest to the highest value of the cells that are shown now.",
+    "fit": "From the lowest to the highest value of all steps, of both runs in a comparison (R).",
 }
 ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
@@ -92,7 +92,8 @@ class DisplayPanel(QWidget):
         row = QHBoxLayout()
         row.setSpacing(3)
         row.addWidget(self.range, 1)
-        self.fit_range = self._button("fit_range", "Fit", self._fit_range)
+        fit = partial(self.store.change, changes.fit_colours)
+        self.fit_range = self._button("fit_range", "Fit", fit)
         self.reset_range = self._button("reset_range", "Reset", self._reset_range)
         row.addWidget(self.fit_range)
         row.addWidget(self.reset_range)
@@ -224,21 +225,6 @@ class DisplayPanel(QWidget):
 
     def _reset_range(self) -> None:
         self._set(colour_range=None)
-
-    def _values(self) -> np.ndarray:
-        """Return the values of the cells of the steps that are shown, of all views."""
-        session = self.store.session
-        shown = (session, changes.seen_beside(session))
-        what, frames = session.view.colour_by, {one.frame for one in shown}
-        found = [frame.values(what, session.mesh) for frame in frames if frame is not None]
-        values = np.concatenate([np.empty(0), *found])
-        return values[np.isfinite(values)]
-
-    def _fit_range(self) -> None:
-        values = self._values()
-        if len(values) and values.min() < values.max():
-            low, high = (float(f"{value:.3g}") for value in (values.min(), values.max()))
-            self._set(colour_range=(low, high) if low < high else None)
 
     def _only(self, on: bool) -> None:
         low, high = self.store.session.colour_range

@@ -29,6 +29,8 @@ _STROKES = {
     "previous": '<path d="M15 6l-6 6 6 6"/>',
     "next": '<path d="M9 6l6 6-6 6"/>',
     "fit": '<path d="M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5"/><circle cx="12" cy="12" r="3"/>',
+    "colours": '<rect x="4" y="3" width="7" height="18" rx="1"/><path d="M4 9h7M4 15h7"/>'
+    '<path d="M17.5 4v16M14.5 7l3-3 3 3M14.5 17l3 3 3-3"/>',
     "edges": '<path d="M4 4h16v16H4zM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16"/>',
     "undeformed": '<path d="M5 16c2-9 8-11 14-11" stroke-dasharray="2.5 2.5"/>'
     '<path d="M5 20c5-2 12-2 14-9"/>',

@@ -26,6 +26,7 @@ TIPS: dict[str, str] = {
     "run": "Deform the mesh with these settings.",
     "cancel": "Stop what runs; the steps that are done are kept.",
     "fit": "Make the whole mesh fill the view.",
+    "fit_colours": "Let the colours range over the values of all steps, or from 0 to 1 again.",
     "look_from": "Look at the mesh from a side.",
     "sideiso": "Look at the mesh from a corner.",
     "compare": "Show the undeformed mesh or another run beside the run that is shown.",

@@ -40,6 +40,7 @@ from slideviz.view.session.changes_view import (
     show,
     show_frame,
 )
+from slideviz.view.session.colours import fit_colours
 from slideviz.view.session.opening import open_mesh, suggested_reduction
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "add_section",
     "confirm",
     "end_run",
+    "fit_colours",
     "fresh_view",
     "is_missing",
     "isolate",

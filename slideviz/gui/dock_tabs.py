@@ -1,0 +1,104 @@
+"""The tabs of panels that share a place: each can be taken out of it, or closed."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from qtpy.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+from qtpy.QtWidgets import QDockWidget, QMainWindow, QMenu, QTabBar, QWidget
+
+TIP = "Double click: a window of its own. Drag it away to put the panel elsewhere."
+_DOWN = 24
+"""Pixels below its tab where a panel appears that is taken out."""
+
+
+class DockTabs(QObject):
+    """Watches the tab bars that Qt makes for docks: a double click takes one out.
+
+    A right click asks what to do with it. A panel that a tab names has no title bar.
+
+    Parameters
+    ----------
+    window : QMainWindow
+    docks : iterable of QDockWidget
+    bare : set of QDockWidget
+        Those that have no title bar where they are alone, either.
+    """
+
+    def __init__(
+        self, window: QMainWindow, docks: Iterable[QDockWidget], bare: set[QDockWidget]
+    ) -> None:
+        super().__init__(window)
+        self.window, self._bare = window, bare
+        self._docks = {dock.windowTitle(): dock for dock in docks}
+        for dock in self._docks.values():
+            for told in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
+                told.connect(self._soon)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(0)
+        self._timer.timeout.connect(self.watch)
+        self.watch()
+
+    def _soon(self, _: object = None) -> None:
+        # Qt makes its tab bars when it lays the docks out.
+        self._timer.start()
+
+    def bars(self) -> list[QTabBar]:
+        """Return the tab bars of docks that there are now."""
+        direct = Qt.FindChildOption.FindDirectChildrenOnly
+        return [bar for bar in self.window.findChildren(QTabBar, options=direct) if bar.count()]
+
+    def watch(self) -> None:
+        """Watch every tab bar, also those made since the last time, and give the others titles."""
+        for dock in self._docks.values():
+            tabbed = bool(self.window.tabifiedDockWidgets(dock))
+            self._set_title(dock, dock.isFloating() or not (tabbed or dock in self._bare))
+        for bar in self.bars():
+            bar.removeEventFilter(self)
+            bar.installEventFilter(self)
+            for index in range(bar.count()):
+                bar.setTabToolTip(index, TIP)
+
+    def _set_title(self, dock: QDockWidget, titled: bool) -> None:
+        # What stands in the place of a title bar hides it.
+        if (dock.titleBarWidget() is None) != titled:
+            dock.setTitleBarWidget(None if titled else QWidget())
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kinds = QEvent.Type
+        if event.type() not in (kinds.MouseButtonDblClick, kinds.ContextMenu):
+            return False
+        dock = self._dock_at(watched, event.pos())
+        if dock is None:
+            return False
+        if event.type() == kinds.MouseButtonDblClick:
+            self.take_out(dock)
+        else:
+            self.menu_of(dock).popup(event.globalPos())
+        return True
+
+    def _dock_at(self, bar: QObject, where: QPoint) -> QDockWidget | None:
+        assert isinstance(bar, QTabBar)
+        return self._docks.get(bar.tabText(bar.tabAt(where)))
+
+    def menu_of(self, dock: QDockWidget) -> QMenu:
+        """Return what can be done with a panel."""
+        menu = QMenu(self.window)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction("Own window", lambda: self.take_out(dock))
+        menu.addAction("Close", dock.close)
+        return menu
+
+    def take_out(self, dock: QDockWidget) -> None:
+        """Make a panel a window of its own, near where it was, as large as it was."""
+        size, at = dock.size(), dock.mapToGlobal(QPoint(-_DOWN, _DOWN))
+        for other in self.window.tabifiedDockWidgets(dock):
+            # Behind another tab it may be as small as it was long ago.
+            size = size.expandedTo(other.size())
+        dock.setFloating(True)
+        dock.resize(size)
+        dock.move(at)
+        dock.raise_()
