@@ -220,6 +220,7 @@ def test_colours_fit_at_a_click_and_are_as_ever_at_the_next(shown):
     values = shown.session.frame.quality.skew
     assert view(shown).colour_range == pytest.approx((values.min(), values.max()), abs=0.02)
     assert fit.isChecked()
+    assert shown.window.store.can_undo == "colour range"
     fit.trigger()
     assert view(shown).colour_range is None
     assert not fit.isChecked()

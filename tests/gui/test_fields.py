@@ -72,8 +72,15 @@ def test_a_double_click_selects_the_whole_number(qtbot):
     QTest.mouseClick(made, Qt.MouseButton.LeftButton, pos=where)
     QTest.mouseDClick(made, Qt.MouseButton.LeftButton, pos=where)
     assert made.selectedText() == "0.949"
+    # A third click changes nothing of that; a later one puts the cursor there.
+    QTest.mouseClick(made, Qt.MouseButton.LeftButton, pos=where)
+    assert made.selectedText() == "0.949"
     QTest.keyClicks(made, "2")
     assert made.value == 2.0
+    QTest.mouseClick(
+        made, Qt.MouseButton.LeftButton, pos=where, delay=2 * QApplication.doubleClickInterval()
+    )
+    assert made.selectedText() == ""
 
 
 def test_a_list_opens_at_its_value_after_escape(qtbot):

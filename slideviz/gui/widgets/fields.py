@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from qtpy.QtCore import QLocale, Qt, Signal
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+from qtpy.QtWidgets import QApplication, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
 
 from slideviz.gui.widgets.tips import wrapped
 
@@ -51,6 +51,7 @@ class NumberField(QLineEdit):
         self._scale = 0.0
         self._tip = ""
         self._whole = False
+        self._twice_ms = float("-inf")
         self.setCursorPosition(0)
         self.setMinimumWidth(46)
         self.setLocale(QLocale.c())
@@ -118,6 +119,16 @@ class NumberField(QLineEdit):
         if event.button() == Qt.MouseButton.LeftButton:
             self.selectAll()
             self._whole = True
+            self._twice_ms = event.timestamp()
+
+    def mousePressEvent(self, event) -> None:
+        # Who clicks three times wants all of it, too.
+        soon = event.timestamp() - self._twice_ms < QApplication.doubleClickInterval()
+        if event.button() == Qt.MouseButton.LeftButton and soon:
+            self.selectAll()
+            self._whole = True
+            return
+        super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event) -> None:
         if not self._whole:  # a hand that trembles in a double click selects less again

@@ -35,6 +35,7 @@ WORDS: dict[str, str] = {
     "remove_run": "removing a run",
     "take_settings": "settings of a run",
     "set_case": "settings",
+    "fit_colours": "colour range",
     "set_view": "view",
 }
 """What the menu calls a change, by the name of its function; others cannot be undone."""
