@@ -61,7 +61,7 @@ class Scene:
             self._boundaries,
             self._chosen,
             self.sections,
-            MarkLayer(self.stage, self._boundaries),
+            MarkLayer(self.stage),
             self._ghosts,
             CopyLayer(self.stage, self._cells, self._boundaries, self._chosen),
             PointLayer(self.stage),

@@ -1,4 +1,4 @@
-"""Edges of cells stand out on every colour."""
+"""Edges of cells stand out on every colour, and step back where cells are small."""
 
 import numpy as np
 import pytest
@@ -11,27 +11,48 @@ from slideviz.view.drawing.stage import Stage
 SIZE = 240
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK])
-@pytest.mark.parametrize("value", [0.0, 0.2, 0.5, 0.75, 1.0])
-def test_edges_are_seen_on_low_and_on_high_values(value, look):
+@pytest.fixture
+def stage():
     plotter = pv.Plotter(off_screen=True, window_size=[SIZE, SIZE])
-    try:
-        stage = Stage(plotter, look)
-        shape = pv.Plane(i_resolution=4, j_resolution=4)
-        shape.clear_data()
-        shape.cell_data[VALUES] = np.full(16, value)
-        actor = stage.add(shape, "cells", lighting=False)
-        actor.mapper.scalar_visibility = True
-        actor.prop.line_width = 3.0
-        stage.edges(actor.prop, True)
-        plotter.camera_position = "xy"
-        plotter.camera.parallel_projection = True
-        plotter.camera.parallel_scale = 0.4
-        image = plotter.screenshot(return_img=True).astype(float)
-    finally:
-        plotter.close()
-    light = image @ (0.30, 0.59, 0.11)
+    yield Stage(plotter)
+    plotter.close()
+
+
+def light_of(stage, cells, values, width=1.0):
+    """Return how light each pixel is of cells along x and y, and the actor."""
+    shape = pv.Plane(i_resolution=cells[0], j_resolution=cells[1])
+    shape.clear_data()
+    shape.cell_data[VALUES] = values
+    actor = stage.add(shape, "cells", lighting=False)
+    actor.mapper.scalar_visibility = True
+    actor.prop.line_width = width
+    stage.edges(actor.prop, True)
+    camera = stage.plotter.camera
+    stage.plotter.camera_position = "xy"
+    camera.parallel_projection, camera.parallel_scale = True, 0.4
+    image = stage.plotter.screenshot(return_img=True).astype(float)
+    return image @ (0.30, 0.59, 0.11), actor
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK])
+@pytest.mark.parametrize("value", [0.0, 0.2, 0.3, 0.35, 0.4, 0.5, 0.75, 1.0])
+def test_edges_are_dark_on_low_and_on_high_values(value, look, stage):
+    stage.look = look
+    light, _ = light_of(stage, (4, 4), np.full(16, value), 3.0)
     # Between the lines, and on the one in the middle.
     face, line = light[SIZE // 2 + 36, SIZE // 2 + 36], light[SIZE // 2 + 36, SIZE // 2]
-    assert abs(line - face) > 30
-    assert (line > face) == (value < 0.4), "lighter on dark colours, darker on others"
+    assert line < face - 25
+    assert line < 110, "lines are dark even where the colours are light"
+
+
+def test_edges_fade_where_cells_are_hardly_wider_than_lines(stage):
+    light, actor = light_of(stage, (200, 3), np.full(600, 0.75))
+    # 1.5 pixels wide, 100 high: no columns, but rows.
+    between = light[SIZE // 2 - 20 : SIZE // 2 + 20]
+    assert np.ptp(between) < 2
+    assert light[:, SIZE // 2].min() < between.min() - 30
+    stage.plotter.camera.parallel_scale = 0.02
+    stage.plotter.render_window.Render()
+    near = stage.plotter.screenshot(return_img=True).astype(float) @ (0.30, 0.59, 0.11)
+    assert np.ptp(near[SIZE // 2]) > 30, "seen from near they are there"
+    assert actor.prop.show_edges

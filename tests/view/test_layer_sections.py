@@ -159,6 +159,66 @@ def test_a_section_beside_the_mesh_shows_nothing(scene, cube):
     assert scene.plotter.actors["section:0"].visibility
 
 
+@pytest.mark.parametrize("copies", [0, 1])
+def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, copies):
+    """The shell is seen beside it, and is what it was when the section is gone."""
+    mesh, section = stator.mesh, Section("cylinder", radius=0.27)
+    view = {"colour_by": "size_skew", "edges": False, "copies": copies}
+    session = opened(scene, mesh, stator.case, **view)
+    before = colours(scene.plotter)
+    scene.update(changes.add_section(session, section))
+    image = colours(scene.plotter)
+    one = scene.sections.drawn["section:0"].polygons
+    values = session.first.quality.values[one.cells]
+    big = np.argsort(-areas(one))[:40]
+    at = to_display(scene.plotter, middles(one)[big])
+    width, height = scene.plotter.window_size
+    seen = image.reshape(height, width, 3)
+    wanted = np.array([scene.stage.table(float(value))[:3] for value in values[big]]) * 255
+    x, y = at.astype(int).T
+    assert np.abs(seen[height - 1 - y, x] - wanted).max() <= 2
+    # The rest of the passage is still there, as glass.
+    scene.update(changes.set_view(changes.add_section(session, section), hidden=set(scene.drawn)))
+    assert (np.abs(colours(scene.plotter) - image).max(axis=1) > 3).mean() > 0.05
+    scene.update(session)
+    assert np.array_equal(colours(scene.plotter), before)
+
+
+def middles(polygons):
+    """Return the means of the corners of polygons, (q, 3)."""
+    sums = np.add.reduceat(polygons.points[polygons.connectivity], polygons.offsets[:-1])
+    return sums / polygons.sizes[:, None]
+
+
+def areas(polygons):
+    """Return about how large each polygon is, (q,): the square of its corners' spread."""
+    far = polygons.points[polygons.connectivity] - np.repeat(
+        middles(polygons), polygons.sizes, axis=0
+    )
+    return np.add.reduceat((far**2).sum(axis=1), polygons.offsets[:-1])
+
+
+def test_neighbours_have_the_edges_of_the_mesh_itself(scene, stator):
+    """Actors with one mapper have one shader, that of the one drawn first."""
+    section = Section("cylinder", radius=0.27)
+    opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    own = scene.plotter.actors
+    twins = [actor for name, actor in own.items() if name.startswith("section:0:")]
+    assert len(twins) == 2
+    shader = own["section:0"].GetShaderProperty()
+    assert all(twin.GetShaderProperty() is shader for twin in twins)
+    copies = {
+        actor.name: actor
+        for actor in scene.plotter.renderer.GetActors()
+        if getattr(actor, "name", "").startswith("copy:1:")
+    }
+    assert copies
+    for name, copy in copies.items():
+        base = own[f"marker:{name.split(':', 2)[2]}"]
+        assert copy.GetShaderProperty() is base.GetShaderProperty()
+        assert copy.GetForceOpaque() == base.GetForceOpaque() == 1
+
+
 def test_inverted_cells_are_red_in_a_section(scene, cube):
     session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew", edges=False)
     scene.look_from("+z")

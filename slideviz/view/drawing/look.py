@@ -28,6 +28,8 @@ COLOUR_MAP = "viridis"
 
 INVERTED_COLOUR = "#e8112d"
 SELECTED_COLOUR = "#ffb000"
+VALUE_EDGE = "#000000"
+"""Lines between cells in the colours of values or roles: what all maps are seen best under."""
 CLASH_COLOUR = "#e8112d"
 """The motion ghost where it runs into another boundary."""
 

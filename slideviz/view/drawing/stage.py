@@ -7,20 +7,11 @@ from typing import Any, Protocol
 
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.view.drawing.actors import LIFT, VALUES, lookup_table, shown_values
-from slideviz.view.drawing.look import LIGHT, Look
+from slideviz.view.drawing.look import LIGHT, VALUE_EDGE, Look
+from slideviz.view.drawing.shaders import draw_fine_edges
 from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.legend import STRIP
 from slideviz.view.session.state import Session
-
-_EDGE = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
-"""How VTK's shader draws edges; a VTK that writes it otherwise draws all in one colour."""
-_EITHER_EDGE = """float edgeMix = min(emix * edgeOpacity, 0.99);
-  const vec3 luma = vec3(0.30, 0.59, 0.11);
-  vec3 face = ambientColor + diffuseColor / (1.0 - edgeMix);
-  float light = dot(face, luma);
-  vec3 darker = edgeColor * clamp((light - 0.30) / dot(edgeColor, luma), 0.0, 1.0);
-  vec3 line = light < 0.36 ? face + 0.32 : darker;
-  ambientColor = mix(ambientColor, line, edgeMix);"""
 
 
 class Layer(Protocol):
@@ -87,8 +78,7 @@ class Stage:
             copy_mesh=False,
             **options,
         )
-        # Lines on dark colours are light: one colour would not be seen on both ends of a map.
-        actor.GetShaderProperty().AddFragmentShaderReplacement(_EDGE, False, _EITHER_EDGE, False)
+        draw_fine_edges(actor)
         if valued:
             # The table's own range: pyvista gives each actor that of its data.
             actor.mapper.SetUseLookupTableScalarRange(True)
@@ -99,10 +89,10 @@ class Stage:
         """Remove an actor, if it is there."""
         self.plotter.remove_actor(name, reset_camera=False, render=False)
 
-    def edges(self, prop: Any, shown: bool) -> None:
-        """Draw the edges of an actor's cells, or do not."""
+    def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
+        """Draw the edges of an actor's cells, or do not; plain cells have the look's own colour."""
         prop.show_edges = shown
-        prop.edge_color = self.look.edge
+        prop.edge_color = self.look.edge if plain else VALUE_EDGE
         prop.edge_opacity = 0.55
 
     def lift(self, mesh: Mesh) -> float:

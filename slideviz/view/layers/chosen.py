@@ -12,6 +12,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.view.drawing import actors
 from slideviz.view.drawing.actors import VALUES
+from slideviz.view.drawing.shaders import see_through
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface, lifted
 from slideviz.view.inspect import chosen_cells
@@ -91,7 +92,7 @@ class ChosenLayer:
             return
         self._faded = chosen
         if session.mesh.dim == 3:
-            actor.prop.opacity = 0.12 if looks_inside(session) else 1.0
+            see_through(actor, 0.12 if looks_inside(session) else 1.0)
         if chosen:
             actor.mapper.scalar_visibility = False
             actor.prop.show_edges = False

@@ -165,6 +165,7 @@ class CopyLayer:
             for number, matrix in wanted.items():
                 copy = pv.Actor(mapper=mapper, prop=prop, name=f"copy:{number}:{name}")
                 copy.user_matrix = matrix
+                copy.SetShaderProperty(actor.GetShaderProperty())
                 copy.SetPickable(False)
                 renderer.AddActor(copy)
                 made.append(copy)
@@ -195,6 +196,7 @@ class CopyLayer:
             prop.edge_opacity = 0.5 * actor.prop.edge_opacity
             for copy in self._actors[name]:
                 copy.visibility = actor.visibility
+                copy.SetForceOpaque(actor.GetForceOpaque())
 
     def _pale_table(self) -> None:
         """Give the neighbours the colours of the values, paler, over the same range."""

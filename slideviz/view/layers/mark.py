@@ -17,21 +17,18 @@ from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface, lifted
 from slideviz.view.inspect import nodes_of
 from slideviz.view.layers.chosen import part_shape
-from slideviz.view.layers.mesh import BoundaryLayer
 from slideviz.view.session.state import Session
 
 OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
 IN_FRONT = -66_000.0
 """Units of depth that bring lines and points in front of all else; the whole range is 65536."""
-SEE_THROUGH = 0.25
-"""Opacity of boundaries around a marked cell that is not beside one of them."""
 
 
 class MarkLayer:
     """The cell that the view marks: edges, sides in the colour of its value, and a dot.
 
     The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
-    3D mesh, the boundaries let it be seen.
+    3D mesh, the boundaries let it be seen (`slideviz.view.layers.mesh.BoundaryLayer`).
 
     Attributes
     ----------
@@ -39,9 +36,8 @@ class MarkLayer:
         Which cell is drawn.
     """
 
-    def __init__(self, stage: Stage, boundaries: BoundaryLayer) -> None:
+    def __init__(self, stage: Stage) -> None:
         self.stage = stage
-        self.boundaries = boundaries
         self.clear()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -75,7 +71,6 @@ class MarkLayer:
             shape = self._shapes[FACES]
             shape.cell_data[VALUES] = np.full(shape.n_cells, self.stage.values(new)[cell])
             self._drawn[FACES].mapper.scalar_visibility = True
-        self._open_view(new, cell)
 
     def _add(self, mesh: Mesh, cell: int) -> None:
         """Make the actors of another cell."""
@@ -110,15 +105,3 @@ class MarkLayer:
         if FACES in self._shapes:
             faces = self._shapes[FACES]
             actors.place(faces, mesh.points[faces.point_data["vtkOriginalPointIds"]])
-
-    def _open_view(self, session: Session, cell: int) -> None:
-        """Let the cell be seen through boundaries that it is not beside."""
-        drawn, hidden = self.boundaries.drawn, session.view.hidden
-        if session.mesh is None or session.mesh.dim == 2:
-            return
-        shown = [one for name, one in drawn.items() if name not in hidden]
-        if any((one.surface.owner == cell).any() for one in shown):
-            return
-        for one in shown:
-            one.actor.prop.opacity = min(one.actor.prop.opacity, SEE_THROUGH)
-            one.actor.prop.show_edges = False

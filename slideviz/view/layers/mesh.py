@@ -11,6 +11,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.view.drawing import actors
 from slideviz.view.drawing.actors import VALUES, Band, Drawn
 from slideviz.view.drawing.look import ROLE_COLOURS, SELECTED_COLOUR
+from slideviz.view.drawing.shaders import see_through
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.session.state import Session
@@ -19,6 +20,8 @@ FADED = 0.3
 """Opacity of a 2D mesh while sections show the cells on them."""
 GLASS = 0.15
 """Opacity of boundaries around moving ones."""
+SEE_THROUGH = 0.25
+"""Opacity of boundaries around a marked cell that is not beside one of them."""
 _BESIDE = 1e-6
 """Part of a mesh's length that an enclosed boundary is at least away from its outside."""
 
@@ -83,8 +86,11 @@ class CellLayer:
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.look.cell
         inside = looks_inside(new)
-        self.actor.prop.opacity = 0.12 if inside else FADED if is_faded(new) else 1.0
-        self.stage.edges(self.actor.prop, new.view.edges and not inside)
+        if new.mesh.dim == 3:
+            see_through(self.actor, 0.12 if inside else 1.0)
+        else:
+            self.actor.prop.opacity = FADED if is_faded(new) else 1.0
+        self.stage.edges(self.actor.prop, new.view.edges and not inside, not by_value)
 
 
 class BoundaryLayer:
@@ -106,7 +112,7 @@ class BoundaryLayer:
         self.bands: dict[str, Band] = {}
         self.glass: frozenset[str] = frozenset()
         self._lift = 0.0
-        self._closed = False
+        self._closed = self._buried = False
         self._enclosed: frozenset[str] = frozenset()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -156,7 +162,7 @@ class BoundaryLayer:
             values = self.stage.values(new)
             for one in self.drawn.values():
                 one.shape.cell_data[VALUES] = values[one.surface.owner]
-        self.glass = self._glass(new)
+        self.glass, self._buried = self._glass(new), self._hides_mark(new)
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)
         # Half of the faces look away; nobody sees them from outside, and they take their time.
@@ -171,6 +177,14 @@ class BoundaryLayer:
         if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
             return frozenset()
         return frozenset(self.drawn) - self._enclosed
+
+    def _hides_mark(self, session: Session) -> bool:
+        """Tell whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
+        cell, mesh, hidden = session.view.marked, session.mesh, session.view.hidden
+        if cell is None or mesh is None or mesh.dim == 2 or not 0 <= cell < len(mesh.cells):
+            return False
+        shown = (one for name, one in self.drawn.items() if name not in hidden)
+        return not any((one.surface.owner == cell).any() for one in shown)
 
     def _place(self, points: FloatArray) -> None:
         for one in self.drawn.values():
@@ -195,8 +209,9 @@ class BoundaryLayer:
         else:
             self.stage.edges(one.actor.prop, view.edges)
             inside, glass = looks_inside(session), name in self.glass
-            one.actor.prop.opacity = 0.12 if inside else GLASS if glass else 1.0
-            if inside:
+            opacity = 0.12 if inside else GLASS if glass else SEE_THROUGH if self._buried else 1.0
+            see_through(one.actor, opacity)
+            if inside or self._buried:
                 one.actor.prop.show_edges = False
 
 

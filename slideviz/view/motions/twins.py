@@ -39,6 +39,8 @@ class Twins:
                 self.stage.plotter.add_actor(
                     twin, name=twin.name, reset_camera=False, render=False, pickable=False
                 )
+                # One mapper has one shader: that of the actor that is drawn first.
+                twin.SetShaderProperty(base.GetShaderProperty())
                 self.drawn[number] = twin
             self.drawn[number].user_matrix = matrix
             self.drawn[number].visibility = base.visibility
