@@ -8,10 +8,14 @@ import numpy as np
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QSplitter
 
+from slideviz.gui.canvas.canvas import View3D
 from slideviz.gui.canvas.flats import Flats, beside
 from slideviz.gui.canvas.handles import Handles
 from slideviz.gui.viewing import Viewing
+from slideviz.mesh.model import Mesh
+from slideviz.view.scene import Scene
 from slideviz.view.sections.cuts import can_cut
+from slideviz.view.sections.grip_round import outside, patch_in
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.unroll import plane_axes
 from slideviz.view.session import changes
@@ -35,7 +39,7 @@ class Cutting(QSplitter):
     chosen : int or None
         The place of the section in the list of the view.
     wants_handle : bool
-        Whether the chosen section gets a handle, if it is a plane, or in 2D.
+        Whether the chosen section gets a handle.
     handles
         Of the section, one in each view while they are wanted.
     flats
@@ -99,13 +103,16 @@ class Cutting(QSplitter):
             self.store.change(changes.lay_flat, self.chosen if wanted else None)
 
     def look_along(self) -> None:
-        """Look at the chosen section along its normal, or along its axis."""
-        section, mesh = self.section, self.store.session.mesh
-        if section is None or mesh is None or mesh.dim == 2:
+        """Look at the plane that is chosen along its normal, or at the cylinder from outside."""
+        section, session = self.section, self.store.session
+        if section is None or session.frame is None or session.frame.mesh.dim == 2:
             return
-        plane = Section("plane", section.origin, section.direction)
-        rows = plane_axes(plane).rows
-        camera = self.viewing.scene.plotter.camera
+        scene = self.viewing.scene
+        if section.kind == "plane":
+            rows = plane_axes(section).rows
+        else:
+            rows = outside(section, patch_in(section, session.frame.mesh, scene.sections.cuts))
+        camera = scene.plotter.camera
         camera.position = np.asarray(camera.focal_point) + rows[2] * camera.distance
         camera.up = rows[1]
         self.viewing.fit()
@@ -134,10 +141,16 @@ class Cutting(QSplitter):
     def _sync_handles(self, session: Session) -> None:
         mesh, section = session.mesh, self.section
         usable = section is not None and section.shown and can_cut(mesh, section)
-        if self.wants_handle and usable and (mesh.dim == 2 or section.kind == "plane"):
-            self.handles.show(self.viewing.pairs(), section, mesh, self.look)
+        if self.wants_handle and usable and session.frame is not None:
+            self.handles.show(self._shown(session), section, mesh, self.look)
         else:
             self.handles.clear()
+
+    def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
+        """Return the views, each with what it draws and the mesh it shows."""
+        sessions = (session, beside(session) or session)
+        pairs = zip(self.viewing.pairs(), sessions, strict=False)
+        return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
 
     def _replaced(self, section: Section) -> None:
         if self.section is not None and section != self.section:
@@ -224,8 +237,8 @@ def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool,
 
 
 def flat_one(sections: Sequence[Section]) -> int | None:
-    """Return the place of the section that is laid flat, if one is."""
-    return next((index for index, section in enumerate(sections) if section.flat), None)
+    """Return the place of the section that is laid flat and shown, if one is."""
+    return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
 
 
 def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:

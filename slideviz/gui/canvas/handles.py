@@ -10,10 +10,14 @@ import numpy as np
 from slideviz.gui.canvas.canvas import View3D
 from slideviz.gui.canvas.handle import Bounds, PlaneHandle
 from slideviz.gui.canvas.handle_flat import FlatHandle
+from slideviz.gui.canvas.handle_round import RoundHandle
 from slideviz.mesh.model import Mesh
 from slideviz.view.drawing.look import Look
 from slideviz.view.scene import Scene
+from slideviz.view.sections.grip_round import patch_in
 from slideviz.view.sections.model import Section, Triple
+
+Handle = PlaneHandle | FlatHandle | RoundHandle
 
 _ROOM = 0.03
 """The plane's frame is so much larger than the mesh, as a part of its length."""
@@ -33,9 +37,9 @@ class Handles:
     def __init__(self, moved: Callable[[Section], None], held: Callable[[bool], None]) -> None:
         self._moved, self._held = moved, held
         self._section: Section | None = None
-        self._of: dict[View3D, PlaneHandle | FlatHandle] = {}
+        self._of: dict[View3D, Handle] = {}
 
-    def of(self, view: View3D) -> PlaneHandle | FlatHandle | None:
+    def of(self, view: View3D) -> Handle | None:
         """Return the handle in a view, if it has one."""
         return self._of.get(view)
 
@@ -43,22 +47,41 @@ class Handles:
         return bool(self._of)
 
     def show(
-        self, views: list[tuple[View3D, Scene]], section: Section, mesh: Mesh, look: Look
+        self, views: list[tuple[View3D, Scene, Mesh]], section: Section, mesh: Mesh, look: Look
     ) -> None:
-        """Let every view have a handle of a section."""
+        """Let every view have a handle of a section.
+
+        Parameters
+        ----------
+        views : list of (View3D, Scene, Mesh)
+            Each with the mesh as it is shown there.
+        section : Section
+        mesh : Mesh
+            As it was opened.
+        look : Look
+        """
         self._section = section
-        for view, scene in views:
+        for view, scene, shown in views:
             handle = self._of.get(view)
-            if mesh.dim == 2:
-                if not isinstance(handle, FlatHandle):
-                    strip = scene.stage.strip
-                    handle = self._of[view] = FlatHandle(view, strip, self._moved, self._held)
+            wanted = kind_of(section, mesh)
+            if handle is not None and not isinstance(handle, wanted):
+                self.drop(view)
+                handle = None
+            if handle is None:
+                handle = self._of[view] = self._make(wanted, view, scene)
+            if isinstance(handle, FlatHandle):
                 handle.show(section, scene.stage.lift(mesh), look)
+            elif isinstance(handle, RoundHandle):
+                handle.show(section, patch_in(section, shown, scene.sections.cuts), look)
             else:
-                if not isinstance(handle, PlaneHandle):
-                    handle = self._of[view] = PlaneHandle(view, self._dragged, self._held)
                 handle.show(section, _around(mesh), look)
             view.render_soon()
+
+    def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:
+        if kind is PlaneHandle:
+            return PlaneHandle(view, self._dragged, self._held)
+        made = FlatHandle if kind is FlatHandle else RoundHandle
+        return made(view, scene.stage.strip, self._moved, self._held)
 
     def drop(self, view: View3D) -> None:
         """Take the handle from a view."""
@@ -81,6 +104,13 @@ class Handles:
             moved.basis[2], section.basis[2]
         ):
             self._moved(moved)
+
+
+def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
+    """Return what moves a section of a mesh."""
+    if mesh.dim == 2:
+        return FlatHandle
+    return PlaneHandle if section.kind == "plane" else RoundHandle
 
 
 def _around(mesh: Mesh) -> Bounds:

@@ -39,7 +39,9 @@ class SectionEditor(QWidget):
         self._mesh: Mesh | None = None
         self._span = (0.0, 1.0)
         self._span_of: tuple[object, ...] = ()
-        self._free = False
+        # The fields stay while numbers are typed into them, also those of an axis.
+        self._free = self._typing = False
+        self._place: int | None = None
         self._make_fields()
         self._place_fields()
         self._soon = QTimer(self)
@@ -94,10 +96,12 @@ class SectionEditor(QWidget):
 
     # What is shown ---------------------------------------------------------------------
 
-    def show_section(self, section: Section | None, mesh: Mesh | None) -> None:
-        """Show a section of a mesh, or nothing."""
-        other = self._section is None or section is None or section.kind != self._section.kind
-        self._section = section
+    def show_section(
+        self, section: Section | None, mesh: Mesh | None, place: int | None = None
+    ) -> None:
+        """Show a section of a mesh, or nothing; its place in the list tells it from others."""
+        other = (place, _way(section)) != (self._place, _way(self._section))
+        self._section, self._place = section, place
         self.setVisible(section is not None and mesh is not None)
         if section is None or mesh is None:
             return
@@ -105,7 +109,8 @@ class SectionEditor(QWidget):
             self._mesh, self._points = mesh, section_start.cell_points(mesh)
         cylinder, flat = section.kind == "cylinder", mesh.dim == 2
         word = _axis_of(section)
-        if other:
+        # Undone or turned by the handle, it is shown as what it is now.
+        if other and not self._typing:
             self._free = False
         self._free = self._free or word == FREE
         # The axis of a circle cannot be another.
@@ -172,14 +177,18 @@ class SectionEditor(QWidget):
         if self._section is None or self._points is None:
             return
         if word == FREE:
-            self.show_section(self._section, self._mesh)
+            self.show_section(self._section, self._mesh, self._place)
         else:
             self._offer(section_start.turned(self._section, AXES[word], self._points))
 
     def _direction_typed(self, values: tuple[float, ...]) -> None:
         direction = (*values, 0.0, 0.0)[:3]
         if any(direction) and self._section is not None and self._points is not None:
-            self._offer(section_start.turned(self._section, direction, self._points))
+            self._typing = True
+            try:
+                self._offer(section_start.turned(self._section, direction, self._points))
+            finally:
+                self._typing = False
         elif not any(direction):
             self.direction.fields[0].setToolTip("A direction is needed: not all may be 0.")
 
@@ -212,6 +221,10 @@ class SectionEditor(QWidget):
         # A cylinder has no radius 0, and a plane in the outermost nodes cuts nothing.
         share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
         self._offer(section_start.at_position(self._section, low + float(share) * (high - low)))
+
+
+def _way(section: Section | None) -> tuple[object, ...]:
+    return () if section is None else (section.kind, section.direction)
 
 
 def _axis_of(section: Section) -> str:

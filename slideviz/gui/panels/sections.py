@@ -24,6 +24,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui import dialogs
 from slideviz.gui.canvas.cutting import Cutting
 from slideviz.gui.panels.section_editor import SectionEditor
+from slideviz.gui.panels.section_words import HINTS, NAMES, TIPS, UNSEEN
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
@@ -43,14 +44,6 @@ SIZES = {
     "1600 pixels wide, for the screen…": Paper((1600, 1000)),
 }
 """Sizes of pictures, with the words of the menu; the height is the most."""
-HINTS = {
-    3: "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells "
-    "inside.",
-    2: "Lay a line or a circle through the mesh to see the cells on it, and their quality along "
-    "it.",
-}
-NAMES = {3: ("Plane", "Cylinder"), 2: ("Line", "Circle")}
-"""What sections are called, by the dimensions of the mesh."""
 
 
 class SectionsPanel(QWidget):
@@ -174,7 +167,7 @@ class SectionsPanel(QWidget):
             widget.setVisible(not sections)
         self.remove.setEnabled(chosen is not None)
         fits = chosen is not None and can_cut(mesh, chosen)
-        self.editor.show_section(chosen if fits else None, mesh)
+        self.editor.show_section(chosen if fits else None, mesh, self.cutting.chosen)
         self._sync_tools(chosen, flat)
 
     def _sync_list(self, session: Session) -> None:
@@ -201,26 +194,19 @@ class SectionsPanel(QWidget):
 
     def _sync_tools(self, chosen: Section | None, flat: bool) -> None:
         plane = chosen is None or chosen.kind == "plane"
-        self.handle.setVisible(plane or flat)
-        self.handle.setToolTip(
-            "Drag the plane in the view: its face moves it, the arrow turns it."
-            if not flat
-            else "Drag the line in the view: itself or its middle moves it, its ends turn it."
-            if plane
-            else "Drag the circle in the view: its middle moves it, itself changes the radius."
-        )
-        self.handle.setEnabled(chosen is not None and chosen.shown)
+        kind = ("line" if plane else "circle") if flat else ("plane" if plane else "cylinder")
+        tips = TIPS[kind]
+        shown = chosen is not None and chosen.shown
+        for box, words, tip in (
+            (self.handle, "Handle", tips.handle),
+            (self.flat, "Curve" if flat else "Flat view" if plane else "Unrolled", tips.flat),
+        ):
+            box.setText(words)
+            box.setEnabled(shown)
+            box.setToolTip(tip if shown else UNSEEN)
         self.handle.setChecked(self.cutting.wants_handle)
-        self.flat.setText("Curve" if flat else "Flat view" if plane else "Unrolled")
         self.flat.setChecked(self.cutting.is_flat)
-        self.flat.setToolTip(
-            "Show the quality of the cells along the section beside the view."
-            if flat
-            else "Show the section along its normal beside the 3D view."
-            if plane
-            else "Show the cylinder unrolled to axis and r θ beside the 3D view."
-        )
-        self.look.setToolTip("Look along the normal." if plane else "Look along the axis.")
+        self.look.setToolTip(tips.look)
         self.look.setVisible(not flat)
 
     # What is wanted --------------------------------------------------------------------

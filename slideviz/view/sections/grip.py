@@ -98,7 +98,7 @@ def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], bo
     size = float((box[1] - box[0]).max())
     if section.kind == "cylinder" and part != "middle":
         radius = float(np.linalg.norm(now - np.asarray(section.origin[:2])))
-        return replace(section, radius=_rounded(max(radius, 1e-4 * size), size))
+        return replace(section, radius=rounded(max(radius, 1e-4 * size), size))
     if part == "end":
         centre = pivot(section, box)
         return _turned(section, centre, now - centre)
@@ -126,10 +126,10 @@ def _within(points: FloatArray, box: Box) -> FloatArray:
 
 
 def _place(point: FloatArray, size: float) -> Triple:
-    return _rounded(float(point[0]), size), _rounded(float(point[1]), size), 0.0
+    return rounded(float(point[0]), size), rounded(float(point[1]), size), 0.0
 
 
-def _rounded(value: float, size: float) -> float:
+def rounded(value: float, size: float) -> float:
     """Return a number without digits that are nothing beside a size."""
     return round(value, _DIGITS - int(np.floor(np.log10(max(size, 1e-300))))) + 0.0
 
