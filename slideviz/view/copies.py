@@ -14,6 +14,7 @@ from slideviz.mesh.periodic import Pair, axis_basis, find_pairs, pair_up
 from slideviz.view.drawing.polygons import Polygons
 from slideviz.view.drawing.surfaces import padded
 from slideviz.view.guess import guess_by_name
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
 
@@ -121,7 +122,11 @@ def keeps(section: Section, matrix: FloatArray) -> bool:
 
 
 def show_passages(
-    cutter: Cutter, points: FloatArray, section: Section, matrices: Mapping[int, FloatArray]
+    cutter: Cutter,
+    points: FloatArray,
+    section: Section,
+    matrices: Mapping[int, FloatArray],
+    only: Choice | None = None,
 ) -> dict[int, Polygons]:
     """Return what one section shows of every passage (see `Cutter.show`), by its number.
 
@@ -131,8 +136,8 @@ def show_passages(
     found = {}
     for number, matrix in matrices.items():
         if keeps(section, matrix):
-            base = cutter.show(points, section) if base is None else base
+            base = cutter.show(points, section, only) if base is None else base
             found[number] = base.with_points(moved(base.points, matrix))
         else:
-            found[number] = cutter.show(moved(points, matrix), section)
+            found[number] = cutter.show(moved(points, matrix), section, only)
     return found

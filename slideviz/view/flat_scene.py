@@ -18,10 +18,11 @@ from slideviz.view.drawing.stage import Stage
 from slideviz.view.layers.copies import Period, matrices
 from slideviz.view.layers.mark import IN_FRONT
 from slideviz.view.motions.twins import Twins
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cuts import Cuts
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
-from slideviz.view.sections.unroll import Label, flat_labels, flatten, plane_axes
+from slideviz.view.sections.unroll import Label, flat_labels, flatten, middle_angle, plane_axes
 from slideviz.view.session.state import COLOUR_BY, Session
 
 FILL = 0.94
@@ -57,6 +58,7 @@ class FlatScene:
         self.beside: FlatScene | None = None
         self.section: Section | None = None
         self.polygons: Polygons | None = None
+        self._all: Polygons | None = None
         self._shown = PolygonActor(self.stage, "flat")
         self._twins = Twins(self.stage, self._shown)
         self._mark = PolygonActor(self.stage, "marked", pickable=False)
@@ -78,20 +80,31 @@ class FlatScene:
         self.session, self.section = session, section
         self.stage.set_colours(session)
         by_value = session.view.colour_by != "role"
-        cut = self.cuts.of(session.frame.mesh, section)
-        key = (cut, section, session.frame if by_value else None)
+        cut, only = self.cuts.of(session.frame.mesh, section), self.stage.chosen(session)
+        key = (cut, only, section, session.frame if by_value else None)
         if key != self._made_of:
             self._made_of = key
-            self._place(cut, section, session)
+            self._place(cut, only, section, session)
         self._shown.colour(self.stage.values(session) if by_value else None)
         self._style(section)
         self._draw_neighbours(section)
         self._draw_mark()
 
-    def _place(self, cut: Polygons, section: Section, session: Session) -> None:
-        """Lay the polygons flat and draw them."""
+    def _place(
+        self, cut: Polygons, only: Choice | None, section: Section, session: Session
+    ) -> None:
+        """Lay the polygons flat and draw them, but for cells that are not chosen."""
+        assert session.frame is not None
         flat = flatten(cut, section) if len(cut) else cut
-        if not section.whole and len(cut) and session.frame is not None:
+        # Where the section lies stays, whatever cells of it are shown.
+        self._all = flat
+        if only is not None and section.whole and len(cut):
+            part = self.cuts.of(session.frame.mesh, section, only=only)
+            near = middle_angle(flat, section) if section.kind == "cylinder" else None
+            flat = flatten(part, section, near) if len(part) else part
+        elif only is not None:
+            flat = only.among(flat)
+        if not section.whole and len(flat):
             # Nothing is in front of another, but folded cells overlap: they are drawn last.
             folded = session.frame.quality.status[flat.cells] == INVERTED
             flat = flat.take(np.argsort(folded, kind="stable")) if folded.any() else flat
@@ -133,9 +146,16 @@ class FlatScene:
 
     @property
     def summary(self) -> str:
-        """Return in words how many cells are cut, and their min, mean and inverted ones."""
-        if self.section is None or self.polygons is None or not len(self.polygons):
+        """Return in words how many cells are cut, and their min, mean and inverted ones.
+
+        While a range chooses cells, these are those of the cells that it leaves.
+        """
+        if self.polygons is None or self._all is None or not len(self._all):
             return "it cuts no cell"
+        only = self.stage.chosen(self.session)
+        cells, every = self.polygons.cell_ids, len(self._all.cell_ids)
+        if only is not None and not len(cells):
+            return f"none of {every:,} cells cut is shown: {only.words}"
         frame, mesh = self.session.frame, self.session.mesh
         assert frame is not None
         what = self.session.view.colour_by
@@ -146,7 +166,7 @@ class FlatScene:
             frame.quality.status == INVERTED,
             self.session.colour_range,
         )
-        return paint.sentence(self.polygons.cell_ids)
+        return paint.sentence(cells) if only is None else paint.sentence(cells, every, only.words)
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None."""
@@ -167,9 +187,9 @@ class FlatScene:
 
     def bounds(self) -> tuple[FloatArray, FloatArray] | None:
         """Return the lowest and highest corner (2,) of all that is drawn, or None."""
-        if self.polygons is None or not len(self.polygons):
+        if self._all is None or not len(self._all):
             return None
-        own = self.polygons.points
+        own = self._all.points
         parts = [moved(own, np.array(twin.user_matrix)) for twin in self._twins.drawn.values()]
         parts.append(own)
         low = np.min([part.min(axis=0) for part in parts], axis=0)

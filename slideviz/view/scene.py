@@ -19,7 +19,7 @@ from slideviz.view.drawing.eye import Eye
 from slideviz.view.drawing.look import LIGHT, Look
 from slideviz.view.drawing.stage import Layer, Stage
 from slideviz.view.drawing.surfaces import Surface
-from slideviz.view.inspect import cell_at, chosen_cells, surroundings
+from slideviz.view.inspect import cell_at, surroundings
 from slideviz.view.layers.chosen import ChosenLayer
 from slideviz.view.layers.copies import CopyLayer
 from slideviz.view.layers.ghosts import GhostLayer
@@ -185,7 +185,10 @@ class Scene:
         self.eye.zoom_at(x, y, factor)
 
     def pick(self, x: float, y: float) -> str | None:
-        """Return the visible boundary at a pixel counted from the lower left, or None."""
+        """Return the visible boundary at a pixel counted from the lower left, or None.
+
+        Sections and chosen cells in 3D are no boundaries, and what is in front of them is glass.
+        """
         hidden = self.session.view.hidden
         drawn = [one for name, one in self.drawn.items() if name not in hidden]
         if not drawn:
@@ -193,6 +196,9 @@ class Scene:
         if drawn[0].surface.flat:
             return pick.nearest_line(self.plotter, x, y, drawn)
         # What is seen through glass is meant, not the glass.
+        solid = [*self.sections.actors(), *(actor for actor, _ in self._chosen.pickable())]
+        if pick.meets(self.plotter, x, y, solid):
+            return None
         within = [one for one in drawn if one.surface.name not in self._boundaries.glass]
         found = pick.front_surface(self.plotter, x, y, within) if within else None
         return pick.front_surface(self.plotter, x, y, drawn) if found is None else found
@@ -209,11 +215,9 @@ class Scene:
             values = self.stage.values(session)
             # Where cells overlap, an inverted one is told of before the others.
             rank = np.where(np.isnan(values), -np.inf, values)
-            if session.view.threshold is not None:
-                some = np.full(len(values), np.nan)
-                chosen = chosen_cells(values, session.view.threshold)
-                some[chosen] = rank[chosen]
-                rank = some
+            only = self.stage.chosen(session)
+            if only is not None:
+                rank = np.where(only.mask, rank, np.nan)
             at = pick_cell.on_plane(self.plotter, x, y)
             return cell_at(session.frame.mesh, *at, rank)
         # Boundaries in front of a section are glass.
@@ -223,7 +227,7 @@ class Scene:
     def _pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""
         if self._chosen.cells is not None:
-            return [(self._chosen.actor, self._chosen.owner)] if len(self._chosen.cells) else []
+            return self._chosen.pickable()
         hidden = self.session.view.hidden
         shown = [
             (one.actor, one.surface.owner) for name, one in self.drawn.items() if name not in hidden

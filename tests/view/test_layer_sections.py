@@ -20,6 +20,9 @@ from slideviz.view.drawing.polygon_actor import plain_colour
 from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.flat_scene import FlatScene
 from slideviz.view.layers.mesh import looks_inside
+from slideviz.view.pictures.figure import Figure
+from slideviz.view.pictures.figure_vector import draw_vector
+from slideviz.view.pictures.studio import Studio
 from slideviz.view.sections import picture as section_picture
 from slideviz.view.sections import start as section_start
 from slideviz.view.sections.cuts import KEPT, Cuts
@@ -217,6 +220,71 @@ def test_neighbours_have_the_edges_of_the_mesh_itself(scene, stator):
         base = own[f"marker:{name.split(':', 2)[2]}"]
         assert copy.GetShaderProperty() is base.GetShaderProperty()
         assert copy.GetForceOpaque() == base.GetForceOpaque() == 1
+
+
+def halved(session):
+    """Return the session with a range that leaves about half of the cells, and which these are."""
+    values = session.first.quality.values
+    low, high = float(values.min()), float(np.median(values))
+    kept = np.flatnonzero((values >= low) & (values <= high))
+    return changes.set_view(session, threshold=(low, high)), kept
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_range_leaves_its_cells_of_a_section_only(scene, cube, whole):
+    section = replace(MIDDLE, whole=whole)
+    session = opened(scene, bent(cube), sections=(section,), colour_by="size_skew")
+    cut, full = cells_of(scene), scene.sections.drawn["section:0"].polygons
+    some, kept = halved(session)
+    scene.update(some)
+    assert 0 < len(np.intersect1d(cut, kept)) < len(cut)
+    assert cells_of(scene).tolist() == np.intersect1d(cut, kept).tolist()
+    if whole:
+        # Cells have sides where their neighbours are left out.
+        here = scene.sections.drawn["section:0"].polygons
+        assert len(here) > np.isin(full.cells, kept).sum()
+    scene.update(changes.set_view(some, threshold=(-1.0, -0.5)))
+    assert not scene.plotter.actors["section:0"].visibility
+    scene.update(session)
+    assert cells_of(scene).tolist() == cut.tolist()
+
+
+def bent(cube):
+    """Return the cube with cells of different qualities in every layer."""
+    points = cube.points.copy()
+    points[:, 0] += 0.05 * np.sin(3.0 * points[:, 0]) * points[:, 1]
+    return cube.with_points(points)
+
+
+def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
+    session = opened(scene, cube, colour_by="size_skew")
+    scene.look_from("iso")
+    on, beside = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46], [0.9, 0.9, 0.99]]))
+    assert scene.pick(*on)
+    cut = changes.add_section(session, MIDDLE)
+    scene.update(cut)
+    assert scene.pick(*on) is None
+    assert scene.pick(*beside), "glass alone is still found"
+    scene.update(session)
+    assert scene.pick(*on)
+    scene.update(changes.set_view(session, threshold=(0.0, 2.0)))
+    assert scene.pick(*on) is None, "nor are cells of a range"
+
+
+def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
+    section = Section("cylinder", radius=0.27)
+    session = opened(scene, stator.mesh, stator.case, copies=1, colour_by="size_skew")
+    scene.update(changes.add_section(session, section))
+    twin = scene.plotter.actors["section:0:1"]
+    points = moved(middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix))
+    asked = []
+    for x, y in to_display(scene.plotter, points)[::7]:
+        scene.update(session)
+        glass = scene.pick(x, y)
+        scene.update(changes.add_section(session, section))
+        asked.append((glass, scene.pick(x, y)))
+    assert any(glass for glass, _ in asked), "some are behind the mesh's own boundaries"
+    assert all(found is None for _, found in asked)
 
 
 def test_inverted_cells_are_red_in_a_section(scene, cube):
@@ -419,6 +487,40 @@ def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, fla
     assert flat.pick_cell(x, y) is None
 
 
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plotter, cube, whole):
+    section = replace(MIDDLE, whole=whole)
+    session = opened(scene, bent(cube), sections=(section,), colour_by="size_skew")
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, section)
+    bounds, every = flat.bounds(), flat.polygons.cell_ids
+    some, kept = halved(session)
+    flat.update(some, section)
+    mine = np.intersect1d(every, kept)
+    assert flat.polygons.cell_ids.tolist() == mine.tolist()
+    values = session.first.quality.values[mine]
+    low, high = some.view.threshold
+    assert flat.summary == (
+        f"size-skew: min {values.min():.4f}, mean {values.mean():.4f}; "
+        f"{len(mine)} of {len(every)} cells cut (shown: {low:.3g} to {high:.3g})"
+    )
+    assert np.allclose(flat.bounds(), bounds), "the section stays where it was"
+    flat.update(changes.set_view(session, threshold=(-1.0, -0.5)), section)
+    assert flat.summary == f"none of {len(every)} cells cut is shown: inverted cells"
+
+
+def test_flat_neighbours_can_be_picked(scene, flat_plotter, stator):
+    section = Section("cylinder", radius=0.27)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    flat = FlatScene(flat_plotter, scene.sections.cuts)
+    flat.update(session, section)
+    flat.fit()
+    big = int(np.argmax(areas(flat.polygons)))
+    twin = np.array(flat_plotter.actors["flat:1"].user_matrix)
+    at = moved(middles(flat.polygons)[big][None], twin)
+    assert flat.pick_cell(*to_display(flat_plotter, at)[0]) == flat.polygons.cells[big]
+
+
 def test_flat_neighbours_lie_one_period_on(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
     session = opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
@@ -528,6 +630,45 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
     with Image.open(file) as image:
         assert image.size == paper.size == (1004, 756)
         assert image.info["dpi"] == pytest.approx((300.0, 300.0), abs=0.1)
+
+
+def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, monkeypatch):
+    mesh = bent(cube)
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.set_view(session, colour_by="size_skew")
+    some, kept = halved(session)
+    drawn = []
+    real = section_picture.draw_section
+    monkeypatch.setattr(
+        section_picture, "draw_section", lambda *v: drawn.append(real(*v)) or drawn[-1]
+    )
+    going = (Paper((1600, 1000)), lambda _: None, lambda: False)
+    save_section(tmp_path / "a.png", some, MIDDLE, *going)
+    figure, _ = drawn[0]
+    cut = shapes_cells(session, MIDDLE)
+    assert len(figure.axes[0].collections[0].get_paths()) == np.isin(cut, kept).sum() < len(cut)
+    assert any("shown: " in text.get_text() for text in figure.texts)
+    nothing = changes.set_view(session, threshold=(-1.0, -0.5))
+    with pytest.raises(CaseError, match=r"cuts no cell that is shown \(inverted cells\)"):
+        save_section(tmp_path / "b.png", nothing, MIDDLE, *going)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
+    session = changes.open_mesh(Frame(square, quality(square)), None)
+    session = changes.set_view(
+        session, colour_by="size_skew", sections=(replace(LINE, whole=whole),)
+    )
+
+    def coloured():
+        axes = draw_vector(studio, Figure((400, 300), legend=False)).axes[0]
+        above = [each for each in axes.collections if 1.0 < each.get_zorder() < 2.0]
+        return [each for each in above if each.get_array() is not None]
+
+    with Studio(session, find_surfaces(square)) as studio:
+        assert coloured()
+        studio.session = changes.set_view(session, threshold=(2.0, 3.0))
+        assert not coloured()
 
 
 def shapes_cells(session, section):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,18 @@ def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> s
         names[one.actor] = one.surface.name
     picker.Pick(x, y, 0.0, plotter.renderer)
     return names.get(picker.GetActor())
+
+
+def meets(plotter: Any, x: float, y: float, actors: Sequence[Any]) -> bool:
+    """Tell whether the line of sight through a pixel meets one of some actors."""
+    if not actors:
+        return False
+    picker = _cell_picker()
+    picker.SetTolerance(0.0)
+    for actor in actors:
+        picker.AddPickList(actor)
+    picker.Pick(x, y, 0.0, plotter.renderer)
+    return picker.GetActor() is not None
 
 
 def _cell_picker() -> Any:

@@ -11,6 +11,7 @@ from slideviz.view.drawing.look import LIGHT, VALUE_EDGE, Look
 from slideviz.view.drawing.shaders import draw_fine_edges
 from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.legend import STRIP
+from slideviz.view.sections.choice import Choice
 from slideviz.view.session.state import Session
 
 
@@ -62,6 +63,7 @@ class Stage:
         self.has_legend = True
         self.has_plate = True
         self._values: tuple[object, FloatArray] | None = None
+        self._chosen: tuple[FloatArray, object, Choice] | None = None
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:
         """Return the actor of a new data set; cells have no colour of their values yet."""
@@ -116,6 +118,16 @@ class Stage:
         if self._values is None or self._values[0] != key:
             self._values = key, shown_values(frame, what, session.mesh)
         return self._values[1]
+
+    def chosen(self, session: Session) -> Choice | None:
+        """Return which cells the range of the view leaves, None where there is no range."""
+        threshold = session.view.threshold
+        if threshold is None:
+            return None
+        values = self.values(session)
+        if self._chosen is None or self._chosen[0] is not values or self._chosen[1] != threshold:
+            self._chosen = values, threshold, Choice.of(values, threshold)
+        return self._chosen[2]
 
     def set_colours(self, session: Session) -> None:
         """Give the table the map and the range of the session."""

@@ -68,6 +68,12 @@ class ChosenLayer:
         """Return the cell that each polygon of the shape is a side of, (f,)."""
         return np.asarray(self.shape.cell_data[CELL])
 
+    def pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actor of the chosen cells, if there are some, with their polygons' cells."""
+        if self.cells is None or not len(self.cells):
+            return []
+        return [(self.actor, self.owner)]
+
     def update(self, old: Session | None, new: Session) -> None:
         """Show another state."""
         chosen = new.view.threshold is not None and new.frame is not None

@@ -92,6 +92,11 @@ class SectionLayer:
             if name.startswith(NAME) and name.count(":") == 1 and len(one.polygons)
         ]
 
+    def actors(self) -> list[Any]:
+        """Return all that sections show, of neighbours too."""
+        twins = (twin for one in self._twins.values() for twin in one.drawn.values())
+        return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *twins]
+
     def update(self, old: Session | None, new: Session) -> None:
         """Show another state; only what differs is cut or coloured again."""
         if new.frame is None or not (new.view.sections or self.drawn):
@@ -163,12 +168,13 @@ class SectionLayer:
         frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
         assert frame is not None
         # The view's way to find the period may change with the case, and so the matrix.
-        key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes())
+        only = self.stage.chosen(session)
+        key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes(), only)
         one = self.drawn.get(name)
         if one is None:
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
-            polygons = self.cuts.of(frame.mesh, section, matrix)
+            polygons = self.cuts.of(frame.mesh, section, matrix, only)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
             one.made_of, again = key, True
         if not by_value:

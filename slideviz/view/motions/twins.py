@@ -37,7 +37,7 @@ class Twins:
                 name = f"{base.name}:{number}"
                 twin = pv.Actor(mapper=self.base.mapper, prop=base.prop, name=name)
                 self.stage.plotter.add_actor(
-                    twin, name=twin.name, reset_camera=False, render=False, pickable=False
+                    twin, name=twin.name, reset_camera=False, render=False, pickable=True
                 )
                 # One mapper has one shader: that of the actor that is drawn first.
                 twin.SetShaderProperty(base.GetShaderProperty())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.polygons import Polygons
 from slideviz.view.layers.sections import BAND, NAME, RIM, WIDTHS, shown_sections
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.line import box_around, trace
 from slideviz.view.sections.model import Section
@@ -39,12 +41,14 @@ def draw_sections(axes: Any, session: Session, style: dict[str, Any], point: flo
     mesh = session.frame.mesh
     cutter = Cutter.of(mesh)
     box = box_around(mesh.points[cutter.used])
+    threshold = session.view.threshold if "values" in style else None
+    only = None if threshold is None else Choice.of(style["values"], threshold)
     for _, section in shown_sections(session):
-        cut = cutter.cut(mesh.points, section)
+        cut = cutter.show(mesh.points, replace(section, whole=False), only)
         if len(cut):
             _band(axes, cut, style, point)
             if section.whole:
-                _whole(axes, cutter.crinkle(mesh.points, section), style)
+                _whole(axes, cutter.show(mesh.points, section, only), style)
         _line(axes, section, box, point)
 
 

@@ -12,6 +12,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.view.drawing.polygons import Polygons, offsets_of
 from slideviz.view.drawing.surfaces import padded
 from slideviz.view.sections.cases import cut_cases
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.model import Section
 
 
@@ -104,9 +105,14 @@ class Cutter:
         """Return the surface of all cells; in 2D the cells."""
         return self.surface(points, np.concatenate([block.ids for block in self._blocks]))
 
-    def show(self, points: FloatArray, section: Section) -> Polygons:
-        """Return the cut cells, whole or cut as the section says."""
-        return (self.crinkle if section.whole else self.cut)(points, section)
+    def show(self, points: FloatArray, section: Section, only: Choice | None = None) -> Polygons:
+        """Return the cut cells, whole or cut as the section says; some of them if not all."""
+        if not section.whole:
+            found = self.cut(points, section)
+            return found if only is None else only.among(found)
+        ids = self.which_cells(points, section)
+        # What is beside cells that are left out is a side that was between cells before.
+        return self.surface(points, ids if only is None else ids[only.mask[ids]])
 
     def surface(self, points: FloatArray, ids: IntArray) -> Polygons:
         """Return the sides that only one of the cells ``ids`` (c,) has; in 2D the cells.

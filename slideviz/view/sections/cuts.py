@@ -7,6 +7,7 @@ from dataclasses import replace
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 from slideviz.view.copies import moved
 from slideviz.view.drawing.polygons import Polygons
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
 
@@ -24,7 +25,7 @@ class Cuts:
         self._cells: Cells | None = None
         self._cutter: Cutter | None = None
         self._points: FloatArray | None = None
-        self._found: dict[tuple[Section, bytes], Polygons] = {}
+        self._found: dict[tuple[Section, bytes, Choice | None], Polygons] = {}
 
     def cutter(self, mesh: Mesh) -> Cutter:
         """Return what cuts the cells of a mesh; the steps of a deformation share it."""
@@ -33,19 +34,28 @@ class Cuts:
             self._points = None
         return self._cutter
 
-    def of(self, mesh: Mesh, section: Section, matrix: FloatArray | None = None) -> Polygons:
-        """Return what a section shows of a mesh, or of its image under a matrix (4, 4)."""
+    def of(
+        self,
+        mesh: Mesh,
+        section: Section,
+        matrix: FloatArray | None = None,
+        only: Choice | None = None,
+    ) -> Polygons:
+        """Return what a section shows of a mesh, or of its image under a matrix (4, 4).
+
+        ``only`` says which cells are shown at all; left out, every one.
+        """
         cutter = self.cutter(mesh)
         if self._points is not mesh.points:
             self._points = mesh.points
             self._found.clear()
         one = replace(section, name="", shown=True, flat=False)
-        key = one, b"" if matrix is None else matrix.tobytes()
+        key = one, b"" if matrix is None else matrix.tobytes(), only
         if key not in self._found:
             while len(self._found) >= KEPT:
                 self._found.pop(next(iter(self._found)))
             points = mesh.points if matrix is None else moved(mesh.points, matrix)
-            self._found[key] = cutter.show(points, section)
+            self._found[key] = cutter.show(points, section, only)
         return self._found[key]
 
 

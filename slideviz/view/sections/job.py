@@ -9,9 +9,11 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.view.copies import show_passages
+from slideviz.view.drawing.actors import shown_values
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layers.copies import Period, matrices
 from slideviz.view.sections.around import surroundings
+from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import PAINT_BY, PaintBy, paint
@@ -46,8 +48,8 @@ def save_section(
     Raises
     ------
     CaseError
-        No mesh is open, the section cuts no cell, the name has another end than a picture's, or
-        the file cannot be written.
+        No mesh is open, the section cuts no cell that is shown, the name has another end than a
+        picture's, or the file cannot be written.
     """
     frame = session.frame
     if frame is None:
@@ -63,16 +65,37 @@ def save_section(
     around = matrices(session, Period().of(session) if session.view.copies else None)
     every = {0: np.eye(4)} | around
     cutter, points = Cutter.of(frame.mesh), frame.mesh.points
-    pieces = show_passages(cutter, points, section, every)
+    only = _choice(session, section)
+    pieces = show_passages(cutter, points, section, every, only)
+    if only is not None and not any(len(piece) for piece in pieces.values()):
+        raise CaseError(
+            f"{section.describe()}: it cuts no cell that is shown ({only.words}), so there is "
+            "nothing to draw; show all cells, or a wider range of them"
+        )
     require_going(stopped)
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     state = state_words(session)
     style = SectionStyle(
-        paper.size, True, session.view.edges, name=name, state=state, dpi=paper.dpi
+        paper.size,
+        True,
+        session.view.edges,
+        name=name,
+        state=state,
+        dpi=paper.dpi,
+        note="" if only is None else f"shown: {only.words}",
     )
     section_picture(pieces, section, painted, path, style, surroundings(cutter, points, every))
     return path
+
+
+def _choice(session: Session, section: Section) -> Choice | None:
+    """Return the cells that the range of the view leaves; a curve goes through all of them."""
+    frame, threshold = session.frame, session.view.threshold
+    curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
+    if frame is None or threshold is None or curve:
+        return None
+    return Choice.of(shown_values(frame, session.view.colour_by, session.mesh), threshold)
 
 
 def state_words(session: Session) -> str:

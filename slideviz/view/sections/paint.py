@@ -74,12 +74,17 @@ class Paint:
             "worst_cell": int(worst),
         }
 
-    def sentence(self, cells: IntArray) -> str:
-        """Return the summary in words, for people."""
+    def sentence(self, cells: IntArray, of: int | None = None, shown: str = "") -> str:
+        """Return the summary in words, for people.
+
+        Where the cells are only some ``of`` so many, ``shown`` says which.
+        """
         found = self.summary(cells)
         end = "max" if self.label == "displacement" else "min"
         number = ".4g" if self.label == "displacement" else ".4f"
         count = f"{len(cells):,} cell{'s' if len(cells) > 1 else ''} cut"
+        if of is not None:
+            count = f"{len(cells):,} of {of:,} cells cut (shown: {shown})"
         if found["inverted"]:
             count += f", {found['inverted']:,} inverted"
         return f"{self.label}: {end} {found[end]:{number}}, mean {found['mean']:{number}}; {count}"
