@@ -10,7 +10,7 @@ from typing import Any
 from slideviz.case.model import Role
 from slideviz.view.drawing.look import ROLE_COLOURS, Look
 from slideviz.view.drawing.plate import Rect
-from slideviz.view.plots.ticks import tick_format, ticks
+from slideviz.view.plots.ticks import bar_ticks
 
 STRIP = 104
 """Pixels at the right edge that are kept free of the mesh, at normal letter size."""
@@ -21,6 +21,10 @@ UNITS = {"displacement": "[mesh units]"}
 _VTK_FONT_FILE = 4
 _AIR = 12.0
 """Pixels around the colour bar and its letters."""
+_BAR, _LONG = 20.0, 11
+"""Pixels that the colour bar is wide; letters of a title that needs all of the strip."""
+_LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
+"""Pixels that a number beside the colour bar is high, those between both, and its title's."""
 
 
 @lru_cache(maxsize=1)
@@ -107,14 +111,10 @@ def add_colour_bar(
     plotter: Any, mapper: Any, title: str, inverted: bool, style: tuple[Look, float]
 ) -> None:
     """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-
     look, font_scale = style
-    at = ticks(*mapper.lookup_table.scalar_range)
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
-        fmt=tick_format(at),
         vertical=True,
         interactive=False,
         color=look.text,
@@ -124,14 +124,13 @@ def add_colour_bar(
     unit = UNITS.get(title, "")
     bar.SetTitle(f"{title}\n{unit}" if unit else title)
     # Longer words would be cut off at the edge of the view.
-    size = (14 if len(title) < 11 else 13) if not unit else 12
+    size = (14 if len(title) < _LONG else 13) if not unit else 12
     set_letters(bar.GetTitleTextProperty(), look, size * font_scale)
     set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
-    bar.SetBarRatio(0.24)
     bar.SetVerticalTitleSeparation(round(8 * font_scale))
+    bar.SetTextPad(round(_GAP * font_scale))
     bar.SetUseCustomLabels(True)
-    bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
     bar.SetDrawNanAnnotation(inverted)
     bar.SetDrawAnnotations(inverted)
     bar.SetNanAnnotation("inverted" if inverted else "")
@@ -145,12 +144,26 @@ def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect
     width, height = (max(side, 1) for side in plotter.window_size)
     bar, bottom = plotter.scalar_bars[title], 0.16
     bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
-    bar.SetWidth((STRIP - 20) * font_scale / width)
+    # The title is in the middle of that: short ones keep away from the edge of the view.
+    wide = STRIP - 20 if len(title) >= _LONG else 66
+    bar.SetWidth(wide * font_scale / width)
+    bar.SetBarRatio(_BAR / wide)
     free = 1.0 - below * font_scale / height
     part = max(min(0.68, free - bottom), 0.2)
     bar.SetHeight(part)
+    _number(bar, max(part * height - _HEAD * font_scale, 1.0) / font_scale)
     room = _AIR * font_scale
     return _rect(plotter, bottom * height - room, (bottom + part) * height + room, font_scale)
+
+
+def _number(bar: Any, length: float) -> None:
+    """Write as many numbers beside a bar as have room in its length in pixels at normal size."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    low, high = bar.GetLookupTable().GetRange()
+    at, form = bar_ticks(low, high, lambda _: _LABEL / length)
+    bar.SetLabelFormat(form)
+    bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
 
 
 def lines_room(plotter: Any, end: float, font_scale: float) -> Rect:

@@ -18,7 +18,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
 from slideviz.gui.export import exporter as export
 from slideviz.gui.export.film import FilmDialog
-from slideviz.gui.export.film_form import length_words
+from slideviz.gui.export.film_form import FilmForm, length_words
 from slideviz.gui.export.picture import PictureDialog
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
@@ -618,3 +618,26 @@ def test_about_and_details_for_a_report(opened):
     assert f"2D, {len(mesh.cells)} cells" in text
     assert "OpenGL" in text
     assert "opened" in text
+
+
+def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_wanted(ran):
+    ran.window.store.change(changes.mark, 3)
+    with ran.window.exports._studio() as studio:
+        dialog = PictureDialog(ran.window, studio)
+        assert dialog.figure.showing(studio.session).view.marked == 3
+        dialog.options["marked"].setChecked(False)
+        assert dialog.figure.showing(studio.session).view.marked is None
+        assert dialog._form.isRowVisible(dialog.options["marked"])
+        form = FilmForm(studio)
+        assert form.layout().isRowVisible(form.mark)
+        assert form.figure.showing(studio.session).view.marked is None
+        form.mark.setChecked(True)
+        assert form.figure.showing(studio.session).view.marked == 3
+
+
+def test_without_a_marked_cell_nothing_is_asked_about_it(ran):
+    with ran.window.exports._studio() as studio:
+        dialog = PictureDialog(ran.window, studio)
+        assert not dialog._form.isRowVisible(dialog.options["marked"])
+        form = FilmForm(studio)
+        assert not form.layout().isRowVisible(form.mark)

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
 from slideviz.view import jobs_export
-from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.view.drawing.look import ROLE_COLOURS, SELECTED_COLOUR
 from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.view.layers.mesh import FADED
@@ -18,8 +19,10 @@ from slideviz.view.pictures import figure_vector, film
 from slideviz.view.pictures import studio as studio_module
 from slideviz.view.pictures.figure import TITLE_ROOM, Figure, panes, title_of, words_of_size
 from slideviz.view.pictures.figure_vector import draw_vector, require_vector, write_vector
+from slideviz.view.pictures.mark_words import mark_words
 from slideviz.view.pictures.reel import Reel
 from slideviz.view.pictures.studio import Studio, sees_all
+from slideviz.view.pictures.titles import fitting, pair_titles
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
 from slideviz.view.session import changes
@@ -164,14 +167,78 @@ def test_pictures_of_two_runs_name_both_also_without_titles(session, studio, mon
     assert len(written) == 2, "alone it has none"
 
 
+def two_runs(session, **settings):
+    """A session with a second run beside the first."""
+    second = changes.start_run(changes.set_case(session, **settings))
+    second = changes.end_run(changes.add_frames(second, session.runs[0].frames), "done")
+    return changes.show_beside(changes.show_run(second, 1), 2)
+
+
+def test_titles_of_two_runs_have_one_form_and_all_that_sets_them_apart(session, studio):
+    pair = two_runs(session, sliding="ds", periodic="fixed")
+    studio.session = pair
+    first, second = pair, studio.beside
+    lines = pair_titles((first, second), quality=True)
+    assert lines[0].startswith("Run 1, no sliding, not periodic\nstep 2 of 2: min 0.")
+    assert lines[1].startswith("Run 2, direct sliding, fixed vertices\nstep 2 of 2: min 0.")
+    studio.session = changes.show_beside(pair, changes.UNDEFORMED)
+    lines = pair_titles((studio.session, studio.beside), quality=True)
+    assert lines[0].startswith("Run 1, no sliding\nstep 2 of 2: min 0.")
+    assert lines[1] == "Undeformed\nmin 1.0000, mean 1.0000"
+    again = studio.image(replace(PLAIN, size=(900, 400), title=True))
+    assert drawn(again)[0] > 0, "both lines are in the picture"
+
+
+def test_titles_that_are_too_long_get_smaller_then_shorter():
+    assert fitting(["ab\ncd", "efg"], 10.0) == (["ab\ncd", "efg"], 1.0)
+    titles, part = fitting(["a" * 20, "b\nc"], 16.0)
+    assert (titles, part) == (["a" * 20, "b\nc"], 0.8)
+    titles, part = fitting(["a" * 100, "b"], 12.0)
+    assert part == pytest.approx(0.6)
+    assert titles == ["a" * 19 + "…", "b"]
+
+
+def test_a_marked_cell_is_named_in_both_views_or_left_out(session, studio):
+    studio.session = changes.mark(two_runs(session, sliding="ds"), 5)
+    colour = np.array(to_rgb(SELECTED_COLOUR)) * 255
+
+    def orange(figure):
+        image = studio.image(figure)
+        found = (np.abs(image.astype(float) - colour).max(axis=2) < 8).any(axis=0)
+        return found[: found.size // 2].any(), found[found.size // 2 :].any()
+
+    wide = replace(PLAIN, size=(900, 300))
+    assert orange(wide) == (True, True)
+    words = studio._plotter.actors["mark:words"].input
+    value = studio.session.frame.quality.values[5]
+    assert words == f"cell 5: {value:.4f}"
+    assert orange(replace(wide, marked=False)) == (False, False)
+    assert "mark:words" not in studio._plotter.actors
+    assert mark_words(changes.set_view(studio.session, colour_by="role")) == "cell 5"
+    assert "cell 5" in texts_of(draw_vector(studio, wide))
+    assert "cell 5" not in texts_of(draw_vector(studio, replace(wide, marked=False)))
+
+
+def texts_of(sheet):
+    return "; ".join(text.get_text() for axes in sheet.axes for text in axes.texts)
+
+
+def test_drawings_of_two_runs_stand_as_the_views_do(session, studio):
+    studio.session = changes.set_view(two_runs(session, sliding="ds"), swapped=True)
+    sheet = draw_vector(studio, replace(PLAIN, size=(900, 300), title=True))
+    left, right = sorted(sheet.texts, key=lambda text: text.get_position()[0])
+    assert left.get_text().startswith("Run 2, direct sliding")
+    assert right.get_text().startswith("Run 1, no sliding")
+
+
 def test_a_film_has_the_titles_of_its_preview(session, studio, square, tmp_path, monkeypatch):
     said = {"film": [], "studio": []}
     for name, module in (("film", film), ("studio", studio_module)):
         write = module.write_title
 
-        def keep(plotter, text, look, at=0.5, *, name=name, write=write):
-            said[name].append((text, at))
-            write(plotter, text, look, at)
+        def keep(plotter, text, look, *, name=name, write=write):
+            said[name].append(text)
+            write(plotter, text, look)
 
         monkeypatch.setattr(module, "write_title", keep)
     for _ in film.film_of(
@@ -183,7 +250,7 @@ def test_a_film_has_the_titles_of_its_preview(session, studio, square, tmp_path,
         studio.session = changes.show_frame(session, frame)
         studio.image(figure.within((320, 300)))
     assert said["studio"] == said["film"]
-    assert said["film"][2][0].startswith("Run 1, no sliding, step 2 of 2: min")
+    assert said["film"][2].startswith("Run 1, no sliding, step 2 of 2: min")
 
 
 def test_sizes_in_words():

@@ -202,6 +202,20 @@ def test_the_legend_says_roles_or_shows_the_bar(scene, session):
     assert not list(scene.plotter.scalar_bars.keys())
 
 
+@pytest.mark.parametrize(("height", "count"), [(700, 6), (180, 5), (100, 2)])
+def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
+    scene.plotter.window_size = 500, height
+    session = opened(scene, session)
+    scene.update(changes.set_view(session, colour_by="size_skew", colour_range=(0.946, 0.967)))
+    bar = scene.plotter.scalar_bars["size-skew"]
+    labels = bar.GetCustomLabels()
+    values = [labels.GetValue(row) for row in range(labels.GetNumberOfTuples())]
+    assert (values[0], values[-1]) == (0.946, 0.967)
+    assert len(values) == count
+    assert bar.GetLabelFormat() == "%.3f"
+    assert bar.GetTextPad() >= 4, "they do not touch the bar"
+
+
 def test_another_mesh_replaces_all_actors(scene, session, cube):
     opened(scene, session)
     opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))

@@ -1,6 +1,7 @@
 """Pictures of sections: what is drawn where, in which colour, and the files."""
 
 import re
+from itertools import pairwise
 
 import matplotlib as mpl
 import numpy as np
@@ -67,6 +68,28 @@ def test_cells_have_the_colours_of_their_values():
         nodes = mesh.points[mesh.cells.by_type[12][1]].mean(axis=1)
         cell = cells[np.argmin(np.linalg.norm(nodes[cells] - at, axis=1))]
         assert face == pytest.approx(mpl.colormaps[COLOUR_MAP](painted.values[cell]))
+
+
+@pytest.mark.parametrize(
+    "size", [(1004, 756), (2008, 1252), (2953, 1654), (1600, 1000), (600, 300)]
+)
+@pytest.mark.parametrize("high", [0.3, 2.0])
+def test_numbers_of_a_narrow_range_do_not_run_together(size, high):
+    mesh = cube(4, block=False)
+    mesh = mesh.with_points(mesh.points * [1.0, high, 1.0])
+    painted = paint(mesh, quality(mesh), "size-skew").within(0.946, 0.967)
+    section = Section("plane", (0, 0, 0.4))
+    pieces = show_passages(Cutter.of(mesh), mesh.points, section, {0: np.eye(4)})
+    figure, _ = draw_section(pieces, section, painted, SectionStyle(size, trimmed=True))
+    figure.canvas.draw()
+    axes = figure.axes[1]
+    upright = axes.get_position().height > axes.get_position().width
+    labels = (axes.get_yticklabels() if upright else axes.get_xticklabels())[:]
+    words = [label.get_text() for label in labels]
+    assert (words[0], words[-1]) == ("0.946", "0.967")
+    boxes = [label.get_window_extent() for label in labels]
+    ends = [(box.y0, box.y1) if upright else (box.x0, box.x1) for box in boxes]
+    assert all(one[1] < other[0] for one, other in pairwise(ends))
 
 
 def test_inverted_cells_are_red_on_top_and_explained():

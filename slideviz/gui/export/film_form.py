@@ -62,6 +62,8 @@ class FilmForm(QWidget):
         self.fill = QCheckBox("Fill the images with the mesh")
         self.fill.setToolTip("Else they show what the view shows of the mesh.")
         self.fill.setChecked(studio.like is None or sees_all(studio.like))
+        self.mark = QCheckBox("Marked cell")
+        self.mark.setToolTip("Its outline, with its number and its value.")
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow("Kind", self.kind)
@@ -70,9 +72,10 @@ class FilmForm(QWidget):
         form.addRow("Frames per second", self.fps)
         form.addRow("Interpolated frames between steps", self.between)
         form.addRow("Last frame stays", self.hold)
-        for option in (self.white, self.fill):
+        for option in (self.white, self.fill, self.mark):
             option.toggled.connect(self._changed)
             form.addRow("", option)
+        form.setRowVisible(self.mark, studio.session.view.marked is not None)
         self._kind_chosen(self.kind.currentData())
 
     def _make_size(self) -> None:
@@ -133,6 +136,7 @@ class FilmForm(QWidget):
             both=False,
             letters=1.25,
             film=True,
+            marked=self.mark.isChecked(),
         )
 
     def _kind_chosen(self, kind: str) -> None:

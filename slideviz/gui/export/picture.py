@@ -62,6 +62,7 @@ OPTIONS = {
     "triad": ("Directions of the axes", "Small arrows in the lower left corner."),
     "title": ("Title with the quality", "Run and step, with minimum, mean and inverted cells."),
     "fill": ("Fill the picture with the mesh", "Else it shows what the view shows of the mesh."),
+    "marked": ("Marked cell", "Its outline, with its number and its value."),
     "both": ("Both runs beside each other", "As the two views, with one legend."),
 }
 
@@ -170,6 +171,8 @@ class PictureDialog(QDialog):
             self.options[name] = box
             self._form.addRow("", box)
         self._form.setRowVisible(self.options["both"], self.studio.beside is not None)
+        marked = self.studio.session.view.marked is not None
+        self._form.setRowVisible(self.options["marked"], marked)
 
     def _make_buttons(self) -> QDialogButtonBox:
         buttons = QDialogButtonBox(
@@ -318,5 +321,5 @@ def _kinds(studio: Studio) -> str:
         return f"Saved as PNG; SVG and PDF have room for {MOST_CELLS:,} cells."
     return (
         "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
-        "boundaries, without points, sections, neighbouring passages and axes."
+        "boundaries, without points, neighbouring passages and axes."
     )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from slideviz.view.legend import STRIP
-from slideviz.view.pictures.offscreen import SMALLEST, font_scale
+from slideviz.view.pictures.offscreen import CAPTION_AT, SMALLEST, font_scale
 from slideviz.view.pictures.titles import (
     LETTER_WIDTH,
     LONGEST,
+    fitting,
     name_words,
+    pair_titles,
     place_words,
     title_words,
 )
@@ -24,7 +27,7 @@ BACKGROUNDS: dict[Background, str] = {
 }
 """What is behind the mesh, and the words for it."""
 TITLE_ROOM = 40.0
-"""Pixels at the top that are the title's, at normal letter size."""
+"""Pixels at the top that are the title's, at normal letter size; a second line has 20 more."""
 GAP = 12.0
 """Pixels between two pictures beside each other, at normal letter size."""
 
@@ -51,9 +54,13 @@ class Figure:
     dpi : float or None
         Pixels per inch on paper, for programs that place the picture.
     film : bool
-        Whether it is an image of a film, whose title begins at the left.
+        Whether it is an image of a film.
     named : bool
         Say which run it is also without a title: it stands beside that of another.
+    marked : bool
+        Draw the cell that is marked, if one is, and name it.
+    lines : int
+        Lines of the title.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -68,11 +75,18 @@ class Figure:
     dpi: float | None = None
     film: bool = False
     named: bool = False
+    marked: bool = True
+    lines: int = 1
 
     @property
     def headed(self) -> bool:
         """Tell whether there are words above the picture."""
         return self.title or self.named
+
+    @property
+    def title_room(self) -> float:
+        """Return how many pixels at the top are the title's, at normal letter size."""
+        return TITLE_ROOM + 20.0 * (self.lines - 1)
 
     @property
     def scale(self) -> float:
@@ -97,6 +111,7 @@ class Figure:
             # Of a result, it would hide what is to be seen.
             motion_ghost=session.view.motion_ghost and session.view.colour_by == "role",
             selected=(),
+            marked=session.view.marked if self.marked else None,
         )
         return replace(session, view=view)
 
@@ -111,7 +126,8 @@ def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     first = max(round((width - strip - gap) / 2.0), 1)
     sizes = (first, height), (max(width - first - gap, 1), height)
     # Letters go by the height, which is that of the whole.
-    left, right = (replace(figure, size=size, named=True) for size in sizes)
+    lines = 2 if figure.title else 1
+    left, right = (replace(figure, size=size, named=True, lines=lines) for size in sizes)
     return replace(left, legend=False), right
 
 
@@ -125,6 +141,15 @@ def title_of(session: Session, figure: Figure) -> str:
         return name_words(session, letters)
     longest = LONGEST.format(steps) if figure.film else ""
     return title_words(session, frame, place_words(at, steps), letters, longest)
+
+
+def titles_of(pair: Sequence[Session], figure: Figure) -> tuple[list[str], float]:
+    """Return the words above two pictures beside each other, and how large their letters are.
+
+    ``figure`` is the narrower of both; 1 is the size of other titles.
+    """
+    letters = (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / (LETTER_WIDTH * figure.scale)
+    return fitting(pair_titles(pair, figure.title), letters)
 
 
 def words_of_size(figure: Figure) -> str:

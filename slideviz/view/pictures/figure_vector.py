@@ -18,10 +18,12 @@ from slideviz.view.drawing.plate import OPACITY
 from slideviz.view.inspect import chosen_cells
 from slideviz.view.layers.mesh import FADED, is_faded
 from slideviz.view.legend import STRIP
-from slideviz.view.pictures.figure import GAP, Figure, panes, title_of
+from slideviz.view.pictures.figure import GAP, Figure, panes, title_of, titles_of
 from slideviz.view.pictures.figure_sections import draw_sections
-from slideviz.view.pictures.offscreen import TITLE
-from slideviz.view.pictures.studio import Studio
+from slideviz.view.pictures.mark_words import draw_mark
+from slideviz.view.pictures.offscreen import CAPTION_AT, TITLE
+from slideviz.view.pictures.studio import Studio, ordered
+from slideviz.view.plots.bar import number_bar
 from slideviz.view.session.state import COLOUR_BY, Session
 
 SUFFIXES = (".svg", ".pdf")
@@ -87,12 +89,17 @@ def draw_vector(studio: Studio, figure: Figure) -> Any:
     sheet = Sheet(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
     other = studio.beside if figure.both else None
     parts = [(studio.session, figure, 0)]
+    titles: tuple[list[str], float] = [""], 1.0
+    if figure.headed:
+        titles = [title_of(studio.session, figure)], 1.0
     if other is not None:
         gap = round(GAP * figure.scale)
         left, right = panes(figure, gap)
-        parts = [(studio.session, left, 0), (other, right, left.size[0] + gap)]
+        pair = ordered(studio.session, other)
+        parts = [(pair[0], left, 0), (pair[1], right, left.size[0] + gap)]
+        titles = titles_of(pair, left)
     reach: tuple[tuple[float, float], tuple[float, float]] | None = None
-    for session, part, start in parts:
+    for (session, part, start), title in zip(parts, titles[0], strict=True):
         axes = sheet.add_axes((start / width, 0.0, part.size[0] / width, 1.0))
         axes.set_axis_off()
         if reach is None:
@@ -104,7 +111,8 @@ def draw_vector(studio: Studio, figure: Figure) -> Any:
         axes.set_ylim(*y)
         _mesh(axes, session, part, 72.0 / dpi * figure.scale)
         if part.headed:
-            _title(sheet, session, part, (start + part.size[0] / 2.0) / width)
+            at = (start + CAPTION_AT * part.size[0]) / width
+            _title(sheet, part, (title, titles[1]), at)
     if figure.legend:
         _legend(sheet, studio.session, figure)
     return sheet
@@ -155,6 +163,8 @@ def _mesh(axes: Any, session: Session, figure: Figure, point: float) -> None:
             colour = ROLE_COLOURS[session.role(name)]
             parts = list(_lines(mesh, name))
             axes.add_collection(LineCollection(parts, colors=colour, linewidths=_LINE * point))
+    if figure.marked:
+        draw_mark(axes, session, point)
 
 
 def _lines(mesh: Mesh, name: str) -> FloatArray:
@@ -163,15 +173,16 @@ def _lines(mesh: Mesh, name: str) -> FloatArray:
     return np.concatenate([part for part in parts if part.shape[1] == 2] or [np.empty((0, 2, 2))])
 
 
-def _title(sheet: Any, session: Session, figure: Figure, middle: float) -> None:
+def _title(sheet: Any, figure: Figure, title: tuple[str, float], left: float) -> None:
     dpi, height = sheet.dpi, figure.size[1]
+    words, part = title
     sheet.text(
-        middle,
-        1.0 - 20.0 * figure.scale / height,
-        title_of(session, figure),
-        ha="center",
+        left,
+        1.0 - 0.5 * figure.title_room * figure.scale / height,
+        words,
+        ha="left",
         va="center",
-        fontsize=TITLE * figure.scale * 72.0 / dpi,
+        fontsize=part * TITLE * figure.scale * 72.0 / dpi,
         color=PAPER.text,
     )
 
@@ -220,7 +231,9 @@ def _legend(sheet: Any, session: Session, figure: Figure) -> None:
     scalar = ScalarMappable(Normalize(*session.colour_range), colours)
     bar = sheet.colorbar(scalar, cax=place, extend="min" if inverted else "neither")
     bar.outline.set_visible(False)
-    place.tick_params(labelsize=letters, length=0, labelcolor=PAPER.text)
+    room = 0.3 * letters  # the numbers do not touch the bar
+    place.tick_params(labelsize=letters, length=0, pad=room, labelcolor=PAPER.text)
+    number_bar(bar, session.colour_range, 0.62 * height / sheet.dpi, letters)
     place.set_title(
         COLOUR_BY[session.view.colour_by], fontsize=letters, loc="left", color=PAPER.text
     )

@@ -20,8 +20,8 @@ from slideviz.view.drawing.pieces import Beside, GoingOn, appearing, never
 from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.motions.moved import Zoom
 from slideviz.view.pictures.encode import Pixels
+from slideviz.view.pictures.mark_words import name_mark
 from slideviz.view.pictures.offscreen import (
-    CAPTION_AT,
     LETTERS,
     font_scale,
     image_of,
@@ -79,7 +79,7 @@ def film(
             shot = shot_at(frames, position)
             portrait.show(shot.frame)
             words = portrait.caption(shot.words, shot.frame.quality)
-            write_title(plotter, words, PAPER, CAPTION_AT)
+            write_title(plotter, words, PAPER)
             return image_of(plotter)
 
         yield from expose(len(frames), path, reel, draw)
@@ -156,7 +156,8 @@ def filming_of(
             shot = yield Beside(lambda going_on: shot_at(frames, position, going_on))
             scene.update(_showing(session, shot.frame))
             words = title_words(session, shot.frame, shot.place, letters, longest)
-            write_title(plotter, words, look, CAPTION_AT)
+            write_title(plotter, words, look)
+            name_mark(plotter, scene, LETTERS * font_scale(size))
             yield None
             return image_of(plotter)
 

@@ -102,7 +102,7 @@ def film_pair(
                 shot = shot_at(run.frames, round(at, 9 if reel.between else 0))
                 portrait.show(shot.frame)
                 plotter = portrait.plotter
-                write_title(plotter, f"{title}\n{_caption(shot)}", PAPER, CAPTION_AT, letters)
+                write_title(plotter, f"{title}\n{_caption(shot)}", PAPER, letters)
                 images.append(image_of(plotter))
             return _joined(images, strip, reel.pixels(path))
 

@@ -25,7 +25,7 @@ TITLE = 16
 _NORMAL_HEIGHT = 620
 """A picture this high has letters of normal size."""
 CAPTION_AT = 0.02
-"""Where in the width the words above a film begin."""
+"""Where in the width the words above a picture or a film begin."""
 LETTERS = 1.25
 """Letters of a film are this much larger than those of the view: it is often shown small."""
 
@@ -68,14 +68,11 @@ def font_scale(size: tuple[int, int]) -> float:
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
-def write_title(
-    plotter: Any, words: str, look: Look, at: float = 0.5, letters: float = TITLE
-) -> None:
+def write_title(plotter: Any, words: str, look: Look, letters: float = TITLE) -> None:
     """Write ``words``, a line or two, along the upper edge, in place of what stood there.
 
-    ``at`` is the place in the width, 0 to 1; in the middle they are centred about it, elsewhere
-    they begin there, so that the words of a film do not tremble when a digit more comes.
-    ``letters`` is their height in pixels, at normal size.
+    They begin at the left, so that those of a film do not tremble when a digit more comes, and
+    pictures have them where films do. ``letters`` is their height in pixels, at normal size.
     """
     import pyvista as pv
 
@@ -86,12 +83,10 @@ def write_title(
     # The mesh of a view that was zoomed into may lie behind.
     title.prop.SetBackgroundColor(*pv.Color(look.background_top).float_rgb)
     title.prop.SetBackgroundOpacity(0.7)
-    if at == 0.5:
-        title.prop.SetJustificationToCentered()
     title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
     middle = (10 + 10 * len(words.splitlines())) * scale
-    title.GetPositionCoordinate().SetValue(at, 1.0 - middle / plotter.window_size[1])
+    title.GetPositionCoordinate().SetValue(CAPTION_AT, 1.0 - middle / plotter.window_size[1])
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
 
 

@@ -15,9 +15,9 @@ from slideviz.mesh.atomic import atomic_write
 from slideviz.view.drawing.look import PAPER, Look
 from slideviz.view.drawing.pieces import appearing, whole
 from slideviz.view.drawing.surfaces import Surface
-from slideviz.view.pictures.figure import GAP, TITLE_ROOM, Figure, panes, title_of
+from slideviz.view.pictures.figure import GAP, Figure, panes, title_of, titles_of
+from slideviz.view.pictures.mark_words import name_mark
 from slideviz.view.pictures.offscreen import (
-    CAPTION_AT,
     LETTERS,
     TITLE,
     check_png,
@@ -135,13 +135,13 @@ class Studio:
         other = self.beside if figure.both else None
         if other is None:
             return (yield from self._pane(shown, figure, aim))
+        pair = ordered(shown, other)
         gap = max(round(GAP * figure.scale), 1)
         first, second = panes(figure, gap)
-        swapped = self.session.view.swapped
-        pair = (other, shown) if swapped else (shown, other)
-        left = yield from self._pane(pair[0], first, aim)
+        titles, part = titles_of(pair, first)
+        left = yield from self._pane(pair[0], first, aim, (titles[0], part))
         # The same camera, so that a length is as long in both.
-        right = yield from self._pane(pair[1], second, aim=False)
+        right = yield from self._pane(pair[1], second, False, (titles[1], part))
         between = np.repeat(left[:, -1:], gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
@@ -186,21 +186,26 @@ class Studio:
             out.write(data.getvalue())
 
     def _pane(
-        self, session: Session, figure: Figure, aim: bool = True
+        self,
+        session: Session,
+        figure: Figure,
+        aim: bool = True,
+        title: tuple[str, float] | None = None,
     ) -> Generator[None, None, Pixels]:
         self._prepare(session, figure, aim)
         yield
         plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
         if figure.headed and session.frame is not None:
-            at = CAPTION_AT if figure.film else 0.5
-            write_title(plotter, title_of(session, figure), self._scene.look, at)
+            words, part = title or (title_of(session, figure), 1.0)
+            write_title(plotter, words, self._scene.look)
             # Of the same size as the other letters; of a film as they are there.
-            title = plotter.actors["title"]
+            drawn = plotter.actors["title"]
             scale = figure.scale / (LETTERS if figure.film else 1.0)
-            title.prop.SetFontSize(round(TITLE * scale))
-            high = 1.0 - 0.5 * TITLE_ROOM * scale / figure.size[1]
-            title.GetPositionCoordinate().SetValue(at, high)
+            drawn.prop.SetFontSize(round(TITLE * scale * part))
+            high = 1.0 - 0.5 * figure.title_room * scale / figure.size[1]
+            drawn.GetPositionCoordinate().SetValue(drawn.GetPosition()[0], high)
+        name_mark(plotter, self._scene, figure.scale)
         return image_of(plotter, figure.background == "transparent")
 
     def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
@@ -234,13 +239,18 @@ class Studio:
 
     def _top(self, figure: Figure) -> float:
         """Return which part of the height is the title's."""
-        return min(TITLE_ROOM * figure.scale / figure.size[1], 0.3) if figure.headed else 0.0
+        return min(figure.title_room * figure.scale / figure.size[1], 0.3) if figure.headed else 0.0
 
     def _keep_room(self, figure: Figure) -> None:
         """Keep the rooms of legend and title free of the mesh."""
         right = self._scene.stage.strip() / figure.size[0]
         self._plotter.camera.SetWindowCenter(right, self._top(figure))
         self._plotter.renderer.ResetCameraClippingRange()
+
+
+def ordered(first: Session, second: Session) -> tuple[Session, Session]:
+    """Return what two views show as they stand, the left one first."""
+    return (second, first) if first.view.swapped else (first, second)
 
 
 def _keep_width(scene: Scene, like: Scene) -> None:

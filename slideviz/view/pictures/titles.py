@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from slideviz.view.pictures.portrait import caption
-from slideviz.view.session.runs_words import apart, run_words
-from slideviz.view.session.state import Frame, Session
+from slideviz.view.session.runs_words import apart, differing, method_words, run_words
+from slideviz.view.session.state import Frame, Run, Session
 
 LETTER_WIDTH = 9.6
 """Pixels that a letter of a title takes, at normal size."""
+_SMALLEST = 0.6
+"""Letters of two titles beside each other become so small, as a part of their size."""
 LONGEST = "step {0}.00 of {0}, interpolated"
 """The place in a film that needs most room: a title must not change from image to image."""
 
@@ -79,3 +83,66 @@ def name_words(session: Session, letters: float) -> str:
     """Return which run or mesh is shown, without its quality, in so many letters."""
     names = ["Undeformed"] if session.view.frame == 0 else names_of(session)
     return next((name for name in names if len(name) <= letters), names[-1])
+
+
+def pair_names(pair: Sequence[Session]) -> list[str]:
+    """Return what the runs of two views are called, in one form, with all that sets them apart."""
+    runs = [one.run_shown for one in pair]
+    # Beside the undeformed mesh both views have the same run.
+    alone = runs[0] is runs[1]
+    both = [run for run in runs if run is not None]
+    names = []
+    for one, run in zip(pair, runs, strict=True):
+        if run is None or (alone and one.view.frame == 0):
+            names.append("Undeformed")
+            continue
+        words = [f"Run {run.number}", run_words(run)]
+        words += [method_words(run.case)] if run.name and _methods_differ(both) else []
+        names.append(", ".join(filter(None, [*words, "" if alone else differing(run, both)])))
+    return names
+
+
+def _methods_differ(runs: Sequence[Run]) -> bool:
+    return len({method_words(run.case) for run in runs}) > 1
+
+
+def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
+    """Return the words above two pictures beside each other, in one form.
+
+    Parameters
+    ----------
+    pair : (Session, Session)
+        What they show.
+    quality : bool
+        With a second line: step, minimum, mean and inverted cells.
+    """
+    names = pair_names(pair)
+    if not quality:
+        return names
+    several = any(len(one.frames) > 2 for one in pair)
+    found = []
+    for one, name in zip(pair, names, strict=True):
+        frame, steps = one.frame, len(one.frames) - 1
+        assert frame is not None
+        at = min(one.view.frame, steps)
+        place = (f"step {at} of {steps}" if several else "") if at else "undeformed"
+        place = "" if name == "Undeformed" else place
+        numbers = caption(place, frame.quality, one.view.colour_by).removeprefix(": ")
+        found.append(f"{name}\n{numbers}")
+    return found
+
+
+def fitting(titles: Sequence[str], letters: float) -> tuple[list[str], float]:
+    """Return titles of a line or two that have room for so many letters, and how large they are.
+
+    All are as much smaller as the longest line asks for, 1 being as they were; where that would
+    be too small to be read, lines end with an ellipsis.
+    """
+    longest = max(len(line) for title in titles for line in title.splitlines())
+    part = min(1.0, max(letters / longest, _SMALLEST))
+    most = int(letters / part)
+    return ["\n".join(_cut(line, most) for line in title.splitlines()) for title in titles], part
+
+
+def _cut(line: str, most: int) -> str:
+    return line if len(line) <= most else line[: max(most - 1, 1)].rstrip(" ,") + "…"

@@ -16,6 +16,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER
 from slideviz.view.drawing.polygons import Polygons, joined
 from slideviz.view.legend import UNITS
+from slideviz.view.plots.bar import number_bar
 from slideviz.view.plots.style import PRINT
 from slideviz.view.sections.around import draw_around, window
 from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
@@ -293,6 +294,9 @@ def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
     bar = figure.colorbar(colours_of(paint), cax=axes, orientation=direction)
     bar.set_label(paint.label, fontsize=LETTERS)
     bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
+    side = 3 if layout.upright_bar else 2
+    inches = layout.bar[side] * figure.get_size_inches()[side - 2]
+    number_bar(bar, paint.limits, inches, LETTERS - 1)
     bar.outline.set_linewidth(0.6)
     bar.solids.set_rasterized(False)
     bar.solids.set_edgecolor("face")

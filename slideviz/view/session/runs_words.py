@@ -125,9 +125,14 @@ def apart(run: Run, among: Sequence[Run]) -> str:
     """
     if not any(other is not run and run_words(other) == run_words(run) for other in among):
         return ""
-    cases = [other.case for other in among]
     words = [method_words(run.case)] if run.name else []
-    words += [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
+    return ", ".join(filter(None, [*words, differing(run, among)]))
+
+
+def differing(run: Run, among: Sequence[Run]) -> str:
+    """Return which settings of a run differ among those of a list, which has it; not its method."""
+    cases = [other.case for other in among]
+    words = [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
     words += [text for text, differs in _told(run, cases) if differs]
     return ", ".join(filter(None, words))
 
