@@ -438,7 +438,8 @@ def test_positions_move_a_plane_along_its_normal():
 def test_a_turned_plane_still_cuts(cube):
     points = section_start.cell_points(cube)
     outside = Section("plane", (0.0, 5.0, 0.3), (0.0, 0.0, 1.0))
-    assert section_start.turned(outside, (0.0, 1.0, 0.0), points).origin[1] == pytest.approx(0.5)
+    within = section_start.turned(outside, (0.0, 1.0, 0.0), points).origin[1]
+    assert within == pytest.approx(0.5, abs=0.1)
     kept = section_start.turned(MIDDLE, (0.0, 1.0, 1.0), points)
     assert kept.origin == MIDDLE.origin
 

@@ -14,6 +14,8 @@ from slideviz.view.session.state import Session
 
 _LAYER = 1e-4
 """Part of the span of a mesh within which nodes are on one layer."""
+_NEAR = 0.03
+"""Where no layer is, a round number may be so far from the middle, as a part of the span."""
 
 
 def cell_points(mesh: Mesh) -> FloatArray:
@@ -22,18 +24,18 @@ def cell_points(mesh: Mesh) -> FloatArray:
 
 
 def first_plane(session: Session) -> Section:
-    """Return a plane through the middle of the mesh, across its longest extent."""
-    assert session.mesh is not None
-    points = cell_points(session.mesh)
+    """Return a plane about through the middle of what is shown, across its longest extent."""
+    points = _shown_points(session)
     low, high = points.min(axis=0), points.max(axis=0)
-    normal = np.eye(3)[int(np.argmax(high - low))]
-    return Section(
-        "plane", _triple((low + high) / 2.0), _triple(normal), whole=session.mesh.dim == 2
-    )
+    axis = int(np.argmax(high - low))
+    origin = (low + high) / 2.0
+    origin[axis] = round_middle(points[:, axis])
+    whole = session.mesh is not None and session.mesh.dim == 2
+    return Section("plane", _triple(origin), _triple(np.eye(3)[axis]), whole=whole)
 
 
 def first_cylinder(session: Session, pair: Pair | None) -> Section:
-    """Return a cylinder about the axis of the machine, about halfway between the radii of the mesh.
+    """Return a cylinder about the axis of the machine, about halfway between the radii shown.
 
     The axis is that of the period, where it is a rotation; otherwise that of the case. In 2D it
     is a circle, about the middle of what moves where no rotation has an axis in the mesh's plane.
@@ -48,22 +50,63 @@ def first_cylinder(session: Session, pair: Pair | None) -> Section:
         axis, origin = case.axis, case.origin
     at, way = _triple(np.asarray(origin)), _triple(np.asarray(axis))
     section = Section("cylinder", at, way, 1.0, whole=mesh.dim == 2)
-    local = section.frame(cell_points(mesh))
-    return replace(section, radius=_beside_layer(np.hypot(local[:, 0], local[:, 1])) or 1.0)
+    local = section.frame(_shown_points(session))
+    return replace(section, radius=round_middle(np.hypot(local[:, 0], local[:, 1])) or 1.0)
 
 
-def _beside_layer(radii: FloatArray) -> float:
-    """Return the middle of radii (n,); where a layer of nodes lies there, the middle of cells.
+def round_middle(values: FloatArray) -> float:
+    """Return a round number about in the middle of values (n,), well between layers of nodes.
 
     On a layer rounding decides which cells are cut: those on one side, on the other, or both.
     """
-    low, high = float(radii.min()), float(radii.max())
-    middle, near = (low + high) / 2.0, _LAYER * (high - low)
-    # Scattered nodes are that near to it by chance, but only so many of them.
-    if np.count_nonzero(np.abs(radii - middle) <= near) <= max(10 * _LAYER * len(radii), 3):
+    low, high = float(values.min()), float(values.max())
+    middle, span = (low + high) / 2.0, high - low
+    if not span > 0:
         return middle
-    beyond = radii[radii > middle + near]
-    return (middle + float(beyond.min())) / 2.0 if len(beyond) else middle
+    below, above = _layers_around(values, middle)
+    # Cells are cut in their middle half: those that the middle is in, or beyond a layer there.
+    room = (above - below) / 4.0
+    first, last = below + room, above - room
+    near = max(middle - _NEAR * span, first), min(middle + _NEAR * span, last)
+    if near[0] <= near[1] and middle - below > _LAYER * span:
+        first, last = near
+    return _roundest(first, last, min(max(middle, first), last))
+
+
+def _layers_around(values: FloatArray, middle: float) -> tuple[float, float]:
+    """Return the layers of nodes that are next to a number; that above, where it is on one."""
+    low, high = float(values.min()), float(values.max())
+    near = _LAYER * (high - low)
+    # Scattered nodes are that near to each other by chance, but only so many of them.
+    chance = 2.0 * _LAYER * len(values)
+    least = chance + 6.0 * np.sqrt(chance) + 6.0
+    rising = np.sort(values)
+    count = np.searchsorted(rising, rising + near, "right") - np.searchsorted(
+        rising, rising - near, "left"
+    )
+    layers = np.concatenate([[low], rising[count > least], [high]])
+    return (
+        float(layers[layers <= middle + near].max()),
+        float(layers[layers > middle + near].min()),
+    )
+
+
+def _roundest(first: float, last: float, wanted: float) -> float:
+    """Return the number of fewest digits from ``first`` to ``last``; of several, the nearest."""
+    digits = -int(np.floor(np.log10(max(abs(first), abs(last), 1e-300)))) - 1
+    while True:
+        unit = 10.0**-digits
+        low, high = np.ceil(first / unit), np.floor(last / unit)
+        if low <= high or digits > 300:
+            return round(float(np.clip(np.round(wanted / unit), low, high)) * unit, digits) + 0.0
+        digits += 1
+
+
+def _shown_points(session: Session) -> FloatArray:
+    """Return the nodes (u, 3) of the cells at the step that is shown."""
+    shown = session.mesh if session.frame is None else session.frame.mesh
+    assert shown is not None
+    return cell_points(shown)
 
 
 def _middle_of_moving(session: Session) -> FloatArray:
@@ -116,7 +159,15 @@ def turned(section: Section, direction: Triple, points: FloatArray) -> Section:
     low, high = span(new, points)
     if low < position(new) < high:
         return new
-    return at_position(new, (low + high) / 2.0)
+    return at_position(new, round_middle(_reached(new, points)))
+
+
+def _reached(section: Section, points: FloatArray) -> FloatArray:
+    """Return the positions (n,) of points (n, 3), as `position` counts them."""
+    local = section.frame(points)
+    if section.kind == "cylinder":
+        return np.asarray(np.hypot(local[:, 0], local[:, 1]))
+    return np.asarray(local[:, 2] + position(section))
 
 
 def _unit(section: Section) -> FloatArray:
