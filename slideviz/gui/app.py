@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from qtpy.QtCore import QCoreApplication, QStandardPaths, Qt, QTimer
+from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 from threadpoolctl import ThreadpoolController
 
@@ -40,6 +41,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     """
     ready_numerics()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
+    QSurfaceFormat.setDefaultFormat(_graphics())
     app = QApplication.instance() or QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")
     app.setWindowIcon(logo())
@@ -65,6 +67,18 @@ def launch(path: Path | None = None, run: bool = False) -> int:
         sys.stderr.flush()
         os._exit(code)
     return code
+
+
+def _graphics() -> QSurfaceFormat:
+    """Return what VTK draws with, for all that Qt shares with it.
+
+    pyvistaqt asks for the same, but for Qt too late: it warns that it may not be had.
+    """
+    graphics = QSurfaceFormat.defaultFormat()
+    graphics.setRenderableType(QSurfaceFormat.RenderableType.OpenGL)
+    graphics.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    graphics.setVersion(3, 2)
+    return graphics
 
 
 def ready_numerics() -> None:

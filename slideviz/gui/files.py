@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -53,9 +54,15 @@ class Files(QObject):
         self.settings.setValue("folder", str(path.parent))
 
     def folder(self) -> Path:
-        """Return where file dialogs start."""
-        path = Path(str(self.settings.value("folder", "")) or Path.home())
-        return path if path.is_dir() else Path.home()
+        """Return where file dialogs start: beside the last file, or where the program did.
+
+        From a desktop that is no place of the user's.
+        """
+        path = Path(str(self.settings.value("folder", "")))
+        if self.settings.value("folder", "") and path.is_dir():
+            return path
+        here = Path.cwd()
+        return here if here != Path(here.anchor) and os.access(here, os.W_OK) else Path.home()
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""

@@ -55,6 +55,7 @@ QDockWidget {{ font-weight: 600; titlebar-close-icon: url("{signs}/close_{name}.
     titlebar-normal-icon: url("{signs}/float_{name}.svg"); }}
 QDockWidget::title {{ background: {title}; padding: 5px 8px; }}
 QDockWidget > QWidget {{ font-weight: 400; }}
+QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 QToolBar {{ border: none; spacing: 2px; padding: 2px 4px; }}
 QToolButton {{ padding: 3px; border-radius: 4px; border: 1px solid transparent; }}
 QToolButton:hover {{ background: {hover}; }}

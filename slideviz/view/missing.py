@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from slideviz.case.model import FromFile
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
 from slideviz.view.session.state import Session
 
 Place = Literal["open", "boundaries", "motion", "method"]
@@ -33,6 +33,8 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
         for name in moving
         if name not in given and "" not in given
     ]
+    if case.motions and all(moves_nothing(motion) for motion in case.motions):
+        found.append(Missing("Nothing moves yet: type how far in the motion.", "motion"))
     for motion in case.motions:
         if isinstance(motion, FromFile) and not motion.path.is_file():
             text = f"The displacement file {motion.path} does not exist."
@@ -45,6 +47,17 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
     if not found and session.clash:
         found = [Missing(session.clash, "motion")]
     return tuple(found)
+
+
+def moves_nothing(motion: Motion) -> bool:
+    """Tell whether a motion leaves its boundary where it is; of a file nobody knows."""
+    if isinstance(motion, Translate):
+        return not any(motion.vector)
+    if isinstance(motion, Rotate):
+        return motion.angle_deg == 0
+    if isinstance(motion, Scale):
+        return all(factor == 1 for factor in motion.factors)
+    return isinstance(motion, Radial) and motion.factor == 1 and motion.distance == 0
 
 
 def _problems(session: Session) -> list[str]:

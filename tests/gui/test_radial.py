@@ -31,7 +31,7 @@ def test_three_percent_about_the_machines_axis(stator):
     panel = stator.window.motions
     panel.add_actions[Radial].trigger()
     editor = panel.editor
-    assert editor.about.currentText() == "the machine's axis"
+    assert editor.about.currentText() == "the machine's axis (z)"
     assert not editor.point.isVisible()
     assert not editor.axis.isVisible()
     typed(editor.percent, "3")
@@ -54,7 +54,7 @@ def test_another_axis_can_be_chosen_and_the_machines_again(stator):
     panel = stator.window.motions
     panel.add_actions[Rotate].trigger()
     editor = panel.editor
-    assert editor.about.currentText() == "the machine's axis"
+    assert editor.about.currentText() == "the machine's axis (z)"
     row = editor.about.findData("point")
     editor.about.setCurrentIndex(row)
     editor.about.activated.emit(row)

@@ -154,3 +154,12 @@ def test_cards_follow_the_theme(window):
     window.set_theme("dark")
     QApplication.processEvents()
     assert shown() != light
+
+
+def test_the_first_file_dialog_opens_where_the_program_was_started(window, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert window.files.folder() == tmp_path
+    monkeypatch.chdir("/")
+    assert window.files.folder() == Path.home(), "from a desktop"
+    window.files.remember(tmp_path / "mesh.su2")
+    assert window.files.folder() == tmp_path

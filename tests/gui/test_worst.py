@@ -13,7 +13,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.case.samples import sample
 from slideviz.gui.panels import worst
 from slideviz.gui.panels.worst import WorstPanel, info_text
-from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE
+from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE, digits_apart
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
@@ -386,3 +386,10 @@ def test_the_sign_of_the_order_does_not_touch_the_word(full):
     assert header.fontMetrics().horizontalAdvance(words) + 14 < full.table.columnWidth(QUALITY)
     full.table.sortByColumn(CELL, Qt.SortOrder.AscendingOrder)
     assert full.model.headerData(QUALITY, Qt.Orientation.Horizontal) == "Quality"
+
+
+def test_qualities_have_as_many_digits_as_tell_them_apart():
+    assert digits_apart(np.array([0.1, 0.2, 0.3])) == 4
+    assert digits_apart(np.array([0.94915, 0.94916, 0.94917, 0.94918])) == 5
+    assert digits_apart(np.full(9, 0.5)) == 4
+    assert digits_apart(np.empty(0)) == 4

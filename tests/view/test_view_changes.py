@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, FromFile, Rotate, Translate
+from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.view.inspect import ONLY_INVERTED
 from slideviz.view.sections.model import Section
@@ -130,6 +130,25 @@ def test_what_is_missing_is_told_in_the_order_of_work(session):
     session = changes.set_case(session, periodic="moving")
     assert first(session)[1] == "method"
     assert first(changes.set_case(session, sliding="ps")) is None
+
+
+@pytest.mark.parametrize(
+    ("still", "moves"),
+    [
+        (Translate("left", (0.0, 0.0)), Translate("left", (0.0, 0.1))),
+        (Rotate("left", 0.0), Rotate("left", -0.1)),
+        (Scale("left", (1.0, 1.0)), Scale("left", (1.0, 1.1))),
+        (Radial("left", point=(0.0, 0.0)), Radial("left", 1.0, 0.01, point=(9.0, 9.0))),
+    ],
+)
+def test_motions_that_move_nothing_are_not_ready(session, still, moves):
+    session = changes.set_role(session, ("left",), "moving")
+    session = changes.add_motion(session, still)
+    (missing,) = changes.is_missing(session)
+    assert missing.place == "motion"
+    assert "Nothing moves yet" in missing.text
+    # One of several may stay.
+    assert changes.is_missing(changes.add_motion(session, moves)) == ()
 
 
 def test_what_the_case_finds_wrong_is_passed_on(session):
@@ -284,6 +303,15 @@ def test_the_colours_fit_all_steps_whichever_is_shown(ran):
     for frame in range(len(session.frames)):
         again = changes.fit_colours(changes.set_view(fitted, frame=frame))
         assert again.view.colour_range == (low, high)
+
+
+def test_the_colours_fit_the_step_that_is_shown(ran):
+    session = changes.set_view(ran, colour_by="size_skew", frame=1)
+    low, high = changes.fit_colours(session, every=False).view.colour_range
+    values = session.frames[1].quality.values
+    assert low <= values.min() < low + 0.02
+    assert high - 0.02 < values.max() <= high
+    assert low > session.frames[2].quality.min + 0.02
 
 
 def test_inverted_cells_do_not_widen_the_colours(ran):

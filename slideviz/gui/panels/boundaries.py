@@ -21,7 +21,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.model import ROLES
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.icons import icon, role_icon
+from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.view.drawing.look import ROLE_MEANING
 from slideviz.view.session import changes
@@ -219,7 +219,7 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
         menu.addAction(act)
     menu.addSeparator()
     if any(name in store.session.guesses for name in names):
-        keep = menu.addAction(icon("check"), "Keep the guess")
+        keep = menu.addAction("Keep the guess")
         keep.triggered.connect(_later(store, changes.confirm, names))
     for text, function, values in (
         ("Hide", changes.show, (names, False)),

@@ -43,7 +43,7 @@ SHOWN: dict[str, tuple[str, str]] = {
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
     "range": "The values at the ends of the colour bar.",
-    "fit": "From the lowest to the highest value of all steps, of both runs in a comparison (R).",
+    "fit": "From the lowest to the highest value of what is shown now; of all steps: R.",
 }
 ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
@@ -92,7 +92,7 @@ class DisplayPanel(QWidget):
         row = QHBoxLayout()
         row.setSpacing(3)
         row.addWidget(self.range, 1)
-        fit = partial(self.store.change, changes.fit_colours)
+        fit = partial(self.store.change, changes.fit_colours, every=False)
         self.fit_range = self._button("fit_range", "Fit", fit)
         self.reset_range = self._button("reset_range", "Reset", self._reset_range)
         row.addWidget(self.fit_range)
@@ -187,8 +187,7 @@ class DisplayPanel(QWidget):
         self.threshold.set_tip(low_high if on else "Switch on “Only cells” to choose a range.")
         self.only.setChecked(view.threshold is not None)
         self.threshold.setEnabled(view.threshold is not None)
-        if view.threshold is not None:
-            self.threshold.show_values(view.threshold)
+        self.threshold.show_values(view.threshold or _worse_half(session))
         self.points.show_value(view.points)
         self._sync_copies(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():
@@ -227,10 +226,14 @@ class DisplayPanel(QWidget):
         self._set(colour_range=None)
 
     def _only(self, on: bool) -> None:
-        low, high = self.store.session.colour_range
-        # The worse half of the qualities is what one looks for.
-        self._set(threshold=(low, low + 0.5 * (high - low)) if on else None)
+        self._set(threshold=_worse_half(self.store.session) if on else None)
 
     def _copies(self, value: int) -> None:
         whole = self.copies.around is not None and value == self.copies.maximum()
         self._set(copies=-1 if whole else value)
+
+
+def _worse_half(session: Session) -> tuple[float, float]:
+    """Return the lower half of the colours: of qualities, what one looks for."""
+    low, high = session.colour_range
+    return low, low + 0.5 * (high - low)

@@ -11,6 +11,7 @@ from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Transla
 from slideviz.gui.panels.motion_form import ABOUT, MotionForm
 from slideviz.gui.panels.motion_kinds import new_motion
 from slideviz.view.motions.places import Axis
+from slideviz.view.motions.words import direction_words
 
 ALL_MOVING = ""
 Z = (0.0, 0.0, 1.0)
@@ -91,10 +92,11 @@ class MotionEditor(MotionForm):
         offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
         if self._machine is not None and not isinstance(motion, Scale):
             offered.insert(-1, "axis")
-        if [self.about.itemData(row) for row in range(self.about.count())] != offered:
+        words = [self._about_words(what) for what in offered]
+        if [self.about.itemText(row) for row in range(self.about.count())] != words:
             self.about.clear()
-            for what in offered:
-                self.about.addItem(ABOUT[what], what)
+            for what, word in zip(offered, words, strict=True):
+                self.about.addItem(word, what)
         what = "centroid" if motion.point == "centroid" else "point"
         if "axis" in offered and self._is_machine(motion) and self.about.currentData() != "point":
             what = "axis"
@@ -105,6 +107,12 @@ class MotionEditor(MotionForm):
             self.axis.show_value(motion.axis)
         turns = not isinstance(motion, Scale) and dim == 3 and what != "axis"
         return ({"point"} if what == "point" else set()) | ({"axis"} if turns else set())
+
+    def _about_words(self, what: str) -> str:
+        if what != "axis" or self._dim == 2:
+            return ABOUT[what]
+        axis, _ = self._machine
+        return f"{ABOUT[what]} ({direction_words(axis)})"
 
     def _is_machine(self, motion: Rotate | Radial) -> bool:
         """Tell whether a motion is about the machine's axis."""

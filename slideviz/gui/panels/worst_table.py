@@ -9,12 +9,13 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from qtpy.QtGui import QBrush, QColor
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from slideviz.mesh.model import FloatArray
 from slideviz.view.drawing.look import INVERTED_COLOUR
 from slideviz.view.inspect import WorstCells
 from slideviz.view.where import Around, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
-COLUMNS = ("Cell", "Quality", "Worse\nsince")
+COLUMNS = ("Cell", "Quality", "Worst\nat step")
 CELL, QUALITY, SINCE = range(3)
 """The first columns; the coordinates follow, and the type where there are several."""
 LAST = "Type"
@@ -23,11 +24,22 @@ ARROW, GAP = 20, "\N{NO-BREAK SPACE}"
 _RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 _LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 _MIDDLE = int(Qt.AlignmentFlag.AlignCenter)
+FEWEST, MOST = 4, 5
+"""Digits of a quality."""
 TIPS = {
     CELL: "Number of the cell, from 0 as in an SU2 file",
     QUALITY: "Quality of the step that is shown",
-    SINCE: "Worse since step: the first step at which the cell was at its worst",
+    SINCE: "The first step at which the cell was at its worst",
 }
+
+
+def digits_apart(values: FloatArray) -> int:
+    """Return the digits behind the point by which most of so many values (n,) can be told apart."""
+    different = len(np.unique(values.round(MOST)))
+    for digits in range(FEWEST, MOST):
+        if not len(values) or len(np.unique(values.round(digits))) > 0.5 * different:
+            return digits
+    return MOST
 
 
 class WorstModel(QAbstractTableModel):
@@ -40,6 +52,7 @@ class WorstModel(QAbstractTableModel):
         self.places = np.empty((0, 0))
         self._decimals: tuple[int, ...] = ()
         self._mixed = False
+        self._digits = FEWEST
         self.order = np.empty(0, np.int64)
         self._by, self._down = QUALITY, False
 
@@ -53,6 +66,7 @@ class WorstModel(QAbstractTableModel):
                 min(decimals(column), 2) if "°" in name else decimals(column)
                 for name, column in zip(self.names, self.places.T, strict=True)
             )
+            self._digits = digits_apart(worst.values[~worst.inverted])
             self._mixed = len(set(worst.kinds)) > 1
         self._arrange()
         self.endResetModel()
@@ -113,7 +127,7 @@ class WorstModel(QAbstractTableModel):
     def _text(self, at: int, column: int) -> str:
         worst = self.worst
         if column == QUALITY:
-            return "inverted" if worst.inverted[at] else f"{worst.values[at]:.4f}"
+            return "inverted" if worst.inverted[at] else f"{worst.values[at]:.{self._digits}f}"
         if column in (CELL, SINCE):
             return str((worst.cells if column == CELL else worst.steps)[at])
         axis = column - len(COLUMNS)

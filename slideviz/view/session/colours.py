@@ -14,23 +14,23 @@ _PARTS = 100.0
 """The range is rounded outwards to about so many parts of it."""
 
 
-def fit_colours(session: Session) -> Session:
-    """Return the session with colours from the lowest to the highest value of all steps.
+def fit_colours(session: Session, every: bool = True) -> Session:
+    """Return the session with colours from the lowest to the highest value.
 
-    They are those of the run that is shown, and of the other one that is compared with it: played
-    and compared, a colour says the same. Inverted cells have a colour of their own. Unchanged where
-    all values are alike.
+    Of all steps, so that played a colour says the same, or of the one that is shown, which has
+    more colours then; of both runs where two are compared. Inverted cells have a colour of their
+    own. Unchanged where all values are alike.
     """
-    limits = _limits(session)
+    limits = _limits(session, every)
     return session if limits is None else set_view(session, colour_range=limits)
 
 
-def _limits(session: Session) -> tuple[float, float] | None:
+def _limits(session: Session, every: bool) -> tuple[float, float] | None:
     what = session.view.colour_by
     if what == "role" or session.mesh is None:
         return None
     lows, highs = [], []
-    for frame in _frames(session):
+    for frame in _frames(session, every):
         values = frame.values(what, session.mesh)
         values = values[(frame.quality.status != INVERTED) & np.isfinite(values)]
         if len(values):
@@ -41,15 +41,16 @@ def _limits(session: Session) -> tuple[float, float] | None:
     return _outwards(min(lows), max(highs))
 
 
-def _frames(session: Session) -> set[Frame]:
-    """Return every step that can be seen."""
+def _frames(session: Session, every: bool) -> set[Frame]:
+    """Return what is seen now, or every step that can be."""
     shown: set[Frame] = set()
     for one in (session, seen_beside(session)):
-        # Nothing is displaced further than in the last step, and each would take its time.
-        far = one.view.colour_by == "displacement"
-        shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
         if one.frame is not None:
             shown.add(one.frame)
+        if every:
+            # Nothing is displaced further than in the last step, and each would take its time.
+            far = one.view.colour_by == "displacement"
+            shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
     return shown
 
 
