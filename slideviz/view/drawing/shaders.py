@@ -29,7 +29,7 @@ _MIX = "ambientColor = mix( ambientColor, edgeColor, emix * edgeOpacity);"
 _STRONGER = """vec3 luma = vec3(0.30, 0.59, 0.11);
   float gap = abs(dot(ambientColor + diffuseColor / max(1.0 - emix * edgeOpacity, 0.01), luma)
     - dot(edgeColor, luma));
-  float strong = mix(min(1.7 * edgeOpacity, 1.0), edgeOpacity, smoothstep(0.1, 0.5, gap));
+  float strong = mix(min(2.1 * edgeOpacity, 1.0), edgeOpacity, smoothstep(0.1, 0.5, gap));
   ambientColor = mix(ambientColor, edgeColor, emix * strong);
   diffuseColor *= (1.0 - emix * strong) / max(1.0 - emix * edgeOpacity, 0.01);"""
 """The same, less seen through where the face is nearly as dark as the line.

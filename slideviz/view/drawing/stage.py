@@ -95,7 +95,7 @@ class Stage:
         """Draw the edges of an actor's cells, or do not; plain cells have the look's own colour."""
         prop.show_edges = shown
         prop.edge_color = self.look.edge if plain else VALUE_EDGE
-        prop.edge_opacity = 0.55
+        prop.edge_opacity = 0.45
 
     def lift(self, mesh: Mesh) -> float:
         """Return how far lines of a mesh are drawn above its cells, in its length unit."""
