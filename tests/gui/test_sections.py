@@ -140,6 +140,8 @@ def test_a_free_normal(window, driver, panel):
     assert plane.direction[1] == 1.0
     low, high = panel.editor._span
     assert low < panel.editor.number.value < high
+    assert panel.list.item(0).text() == plane.brief()
+    assert plane.describe() in panel.list.item(0).toolTip()
     driver.choose(panel.editor.axis, "y")
     assert sections(window)[0].direction == (0.0, 1.0, 0.0)
     assert not panel.editor.direction.isVisible()
@@ -654,6 +656,19 @@ def test_rulers_have_round_numbers():
     assert tick_text(1e-17, 0.1) == "0"
     assert tick_text(30.0, 10.0) == "30"
     assert tick_text(3e-6, 1e-6) == "3e-06"
+
+
+@pytest.mark.parametrize("upright", [False, True])
+def test_a_short_ruler_has_two_numbers_at_least(qtbot, upright):
+    ruler = Ruler(upright=upright)
+    qtbot.addWidget(ruler)
+    ruler.resize(*((58, 60) if upright else (200, 34)))
+    for low, high in ((-0.009, 0.009), (0.448, 0.464), (0.41, 0.49), (0.0011, 0.0187)):
+        ruler.show_range(low, high, "")
+        at = np.array(ruler.ticks())
+        assert len(at) >= 2
+        assert low <= at[0] < at[-1] <= high
+        assert np.diff(at).min() / (high - low) * (60 if upright else 200) >= (11, 40)[not upright]
 
 
 def test_a_ruler_writes_its_numbers(qtbot):

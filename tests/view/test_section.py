@@ -317,6 +317,28 @@ def test_in_2d_sections_are_lines_and_circles(section, words):
     assert section.describe(2) == words
 
 
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        (Section("plane", (0, 0, 0.5)), "plane z = 0.5"),
+        (
+            Section("plane", (0.00987929, 0.277571194, -0.00384), (-0.3082, 0.3082, 0.9)),
+            "plane ⊥ (-0.31, 0.31, 0.9) at 0.079",
+        ),
+        (Section("cylinder", (0, 0, 3), radius=0.2512), "cylinder r = 0.2512 about z"),
+        (
+            Section("cylinder", (0.1234, 1, 0), (0.70711, 0.70711, 0), 2),
+            "cylinder r = 2 about (0.71, 0.71, 0) at (0.12, 1, 0)",
+        ),
+    ],
+)
+def test_in_a_list_words_are_short(section, words):
+    assert section.brief() == words
+    assert (
+        Section("plane", (0.25, 0.5, 0), (-1, 1, 0)).brief(2) == "line at 45° through (0.25, 0.5)"
+    )
+
+
 def test_wrong_sections_are_refused():
     with pytest.raises(CaseError, match="the radius 0 is not positive"):
         Section("cylinder")

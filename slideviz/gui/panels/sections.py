@@ -180,12 +180,13 @@ class SectionsPanel(QWidget):
             for row, section in enumerate(sections):
                 item = self.list.item(row)
                 dim = session.mesh.dim if session.mesh is not None else 3
-                text = section.name or section.describe(dim)
-                text = text if can_cut(session.mesh, section) else f"{text} (needs a 3D mesh)"
+                why = "" if can_cut(session.mesh, section) else " (needs a 3D mesh)"
+                text = (section.name or section.brief(dim)) + why
+                tip = wrapped((section.name or section.describe(dim)) + why)
                 state = Qt.CheckState.Checked if section.shown else Qt.CheckState.Unchecked
-                if item.text() != text:
+                if (item.text(), item.toolTip()) != (text, tip):
                     item.setText(text)
-                    item.setToolTip(wrapped(text))
+                    item.setToolTip(tip)
                 if item.checkState() != state or not item.flags() & Qt.ItemFlag.ItemIsUserCheckable:
                     item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
                     item.setCheckState(state)

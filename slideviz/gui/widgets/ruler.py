@@ -39,8 +39,18 @@ class Ruler(QWidget):
     def ticks(self) -> list[float]:
         """Return the numbers that are written, rising."""
         length = self.height() if self.upright else self.width()
-        room = 34 if self.upright else 70
-        return nice_ticks(self.low, self.high, max(length // room, 2))
+        room, least = (34, 15) if self.upright else (70, 50)
+        most = max(length // room, 2)
+        found = nice_ticks(self.low, self.high, most)
+        for more in range(most + 1, most + 6):
+            # One number says nothing of the scale: closer ones, where they do not touch.
+            if len(found) > 1:
+                break
+            closer = nice_ticks(self.low, self.high, more)
+            apart = closer[1] - closer[0] if len(closer) > 1 else 0.0
+            if apart * length >= least * (self.high - self.low):
+                found = closer
+        return found
 
     def paintEvent(self, _event) -> None:
         painter = QPainter(self)

@@ -19,6 +19,8 @@ Triple = tuple[float, float, float]
 ON_SECTION = 1e-9
 """Nodes nearer than this part of the largest distance are on the section: a layer of nodes that
 lies in it up to rounding gives one layer of cells, not a random mix of both."""
+_DIGITS, _FEW = 4, 2
+"""Digits of each number of a direction or point in words, and where there is little room."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,19 @@ class Section:
             return f"plane {where} = {self.origin['xyz'.index(where)]:.6g}"
         return f"plane with normal {where} through {_triple(self.origin)}"
 
+    def brief(self, dim: int = 3) -> str:
+        """Return the section in few words, for a list that has what `describe` says beside it."""
+        where = _axis_word(self.direction, _FEW)
+        if dim == 2 or (self.kind == "plane" and where in "xyz"):
+            return self.describe(dim)
+        if self.kind == "plane":
+            position = float(np.asarray(self.origin) @ self.basis[2])
+            return f"plane ⊥ {where} at {position:.3g}"
+        centre = np.asarray(self.origin)
+        off_axis = np.linalg.norm(np.cross(centre, self.basis[2]))
+        at = f" at {_triple(self.origin, _FEW)}" if off_axis > 0 else ""
+        return f"cylinder r = {self.radius:.6g} about {where}{at}"
+
     def _in_plane(self, where: str) -> str:
         """Return in words what it is in the plane of a 2D mesh."""
         at = _triple(self.origin[:2])
@@ -152,14 +167,14 @@ class Section:
         return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
 
 
-def _axis_word(direction: Triple) -> str:
+def _axis_word(direction: Triple, digits: int = _DIGITS) -> str:
     """Return x, y or z where the direction is that axis, either way, else its components."""
     unit = np.asarray(direction) / np.linalg.norm(direction)
     for word, axis in zip("xyz", np.eye(3), strict=True):
         if np.abs(unit @ axis) > 1.0 - 1e-12:
             return word
-    return _triple(direction)
+    return _triple(direction, digits)
 
 
-def _triple(values: Sequence[float]) -> str:
-    return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+def _triple(values: Sequence[float], digits: int = _DIGITS) -> str:
+    return f"({', '.join(f'{value + 0.0:.{digits}g}' for value in values)})"
