@@ -100,9 +100,13 @@ def test_bars_are_paler_where_lines_cross_them(frames):
     own, white = np.array(to_rgb(SHOWN)), np.array(to_rgb(PAPER.background))
     seen = np.array(axes.containers[0].patches[0].get_facecolor()[:3])
     assert 0.3 < np.linalg.norm(seen - own) / np.linalg.norm(white - own) < 0.6
-    alone = Figure().add_subplot()
-    draw_distribution(alone, Bars("run 1", one, [SHOWN] * BINS), [], "skew quality [-]")
-    assert to_rgb(alone.containers[0].patches[0].get_facecolor()) == to_rgb(SHOWN)
+    for others in ([], [Outline("undeformed", one, None)]):
+        alone = Figure().add_subplot()
+        draw_distribution(alone, Bars("run 1", one, [SHOWN] * BINS), others, "skew quality [-]")
+        assert to_rgb(alone.containers[0].patches[0].get_facecolor()) == to_rgb(SHOWN)
+        boxes = alone.get_legend().findobj(Rectangle) if others else []
+        shown = [to_rgb(box.get_facecolor()) for box in boxes if box.get_fill()]
+        assert not others or to_rgb(SHOWN) in shown
 
 
 def test_the_legend_shows_what_is_drawn_as_it_is_drawn(frames):

@@ -9,13 +9,13 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from qtpy.QtGui import QBrush, QColor
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from slideviz.gui.theme import alarm
 from slideviz.mesh.model import FloatArray
-from slideviz.view.drawing.look import INVERTED_COLOUR
 from slideviz.view.inspect import WorstCells
 from slideviz.view.where import Around, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
-COLUMNS = ("Cell", "Quality", "Worst\nat step")
+COLUMNS = ("Cell", "Quality", "Worst\nstep")
 CELL, QUALITY, SINCE = range(3)
 """The first columns; the coordinates follow, and the type where there are several."""
 LAST = "Type"
@@ -119,7 +119,7 @@ class WorstModel(QAbstractTableModel):
             where = ", ".join(f"{value:.8g}" for value in self.worst.positions[at])
             return f"{self.worst.kinds[at]} at {'x, y, z'[: 3 * len(self.names) - 2]} = {where}"
         if role == Qt.ItemDataRole.ForegroundRole and self.worst.inverted[at]:
-            return QBrush(QColor(INVERTED_COLOUR)) if index.column() == QUALITY else None
+            return QBrush(QColor(alarm())) if index.column() == QUALITY else None
         return (
             self._alignment(index.column()) if role == Qt.ItemDataRole.TextAlignmentRole else None
         )

@@ -85,8 +85,10 @@ def draw_distribution(
     """
     dress(axes, style, metric, "cells [-]")
     foot = 0.5 if log else 0.0
+    # The undeformed mesh, in dots, can be told from any colour.
+    paler = any(outline.series is not None for outline in outlines)
     if bars is not None:
-        _fill(axes, bars, bool(outlines), foot, style)
+        _fill(axes, bars, paler, foot, style)
     for outline in outlines:
         counts, edges = outline.distribution.counts, outline.distribution.edges
         look = _look(outline, style)
@@ -104,7 +106,7 @@ def draw_distribution(
     _counts_axis(axes, bars, outlines, log)
     inset = (low - left) / (high - left)
     box = (inset, 0.0, 1.0 - inset, 1.0)
-    add_legend(axes, style, **_entries(axes, bars, style), loc="best", bbox_to_anchor=box)
+    add_legend(axes, style, **_entries(axes, bars, paler, style), loc="best", bbox_to_anchor=box)
 
 
 def _look(outline: Outline, style: Style) -> dict[str, Any]:
@@ -204,7 +206,7 @@ def _strip(
     )
 
 
-def _entries(axes: Axes, bars: Bars | None, style: Style) -> dict[str, Any]:
+def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[str, Any]:
     """Return what a legend has: the bars first, with the colours that they have."""
     from matplotlib.patches import Patch
 
@@ -212,7 +214,7 @@ def _entries(axes: Axes, bars: Bars | None, style: Style) -> dict[str, Any]:
     if bars is None:
         return {"handles": handles, "labels": labels}
     key = Patch(edgecolor=style.look.text)
-    colours, there = _colours(bars, bool(handles), style), np.flatnonzero(bars.distribution.counts)
+    colours, there = _colours(bars, paler, style), np.flatnonzero(bars.distribution.counts)
     first, last = (there[0], there[-1]) if len(there) else (0, len(colours) - 1)
     some = [colours[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
     return {
