@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from slideviz.view.drawing.actors import VALUES
-from slideviz.view.drawing.look import DARK, LIGHT
+from slideviz.view.drawing.look import DARK, LIGHT, VALUE_EDGE
 from slideviz.view.drawing.stage import Stage
 
 SIZE = 240
@@ -56,3 +56,13 @@ def test_edges_fade_where_cells_are_hardly_wider_than_lines(stage):
     near = stage.plotter.screenshot(return_img=True).astype(float) @ (0.30, 0.59, 0.11)
     assert np.ptp(near[SIZE // 2]) > 30, "seen from near they are there"
     assert actor.prop.show_edges
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK])
+def test_cells_without_values_have_the_lines_of_the_look(look, stage):
+    stage.look = look
+    _, actor = light_of(stage, (2, 2), np.full(4, 0.5))
+    stage.edges(actor.prop, True, plain=True)
+    assert actor.prop.edge_color == pv.Color(look.edge)
+    stage.edges(actor.prop, True)
+    assert actor.prop.edge_color == pv.Color(VALUE_EDGE)
