@@ -131,6 +131,20 @@ def test_who_looks_along_the_radius_pulls_upwards(window, driver, panel):
     assert sections(window)[0].radius < before.radius
 
 
+def test_what_the_mouse_would_take_is_shown(window, panel):
+    at = QPoint(*pixel(window.view, ball(window)).round().astype(int))
+    shapes = Qt.CursorShape
+    QTest.mouseMove(window.view, at)
+    assert window.view.cursor().shape() == shapes.SizeAllCursor
+    assert len(blue(window.view)) < 10
+    # It goes from below the mouse by itself.
+    window.viewing.look_from("+z")
+    window.scene.eye.aim(ball(window) + 0.01, 0.05, 1.0)
+    window.view.snapshot()
+    assert window.view.cursor().shape() == shapes.ArrowCursor
+    assert len(blue(window.view)) > 30
+
+
 def test_what_is_dragged_beside_it_turns_the_view(window, panel):
     camera, before = window.scene.eye.place, sections(window)
     start = pixel(window.view, ball(window)) + np.array([0.0, 60.0])
@@ -151,6 +165,8 @@ def test_in_a_detail_it_is_in_reach(window, panel):
 
 def test_it_leaves_nothing(window, driver, panel):
     assert marks(window.view)
+    frame = window.view.actors["handle:frame"].mapper.dataset
+    assert (frame.n_verts, frame.n_lines) == (0, 4)
     panel.handle.click()
     assert not marks(window.view)
     assert len(blue(window.view)) < 10

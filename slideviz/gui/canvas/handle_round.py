@@ -59,6 +59,7 @@ class RoundHandle(QObject):
         self.place: Place | None = None
         self._mark = PullMark(view)
         self._over = False
+        self._mouse = QPoint(-1, -1)
         self._start: tuple[Section, Place, FloatArray] | None = None
         self._at: FloatArray | None = None
         self._soon = QTimer(self)
@@ -102,6 +103,9 @@ class RoundHandle(QObject):
         self.place = self._start[1] if self._start is not None else self._in_reach(self._patch)
         at, way, _ = pull(self.seen, self.section, self.place, self.section.radius)
         self._mark.draw_ball(at, way / np.linalg.norm(way))
+        if self._over and not self.dragging and not self._is_at(self._mouse):
+            # It went from below the mouse, which stayed.
+            self._point_at(False)
 
     def _in_reach(self, patch: Patch) -> Place:
         """Return where the ball lies: in the middle, or beside it in a detail of the view."""
@@ -150,6 +154,7 @@ class RoundHandle(QObject):
         return True
 
     def _move(self, where: QPoint, pressed: bool) -> bool:
+        self._mouse = where
         if self.dragging:
             self._at = self._pixel(where)
             self._soon.start()
@@ -160,6 +165,7 @@ class RoundHandle(QObject):
 
     def _release(self, where: QPoint) -> bool:
         self._soon.stop()
+        self._mouse = where
         if self._at is not None:
             self._at = self._pixel(where)
             self.tell()

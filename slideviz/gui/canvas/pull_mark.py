@@ -64,7 +64,9 @@ class PullMark:
 
     def draw_frame(self, lines: list[FloatArray]) -> None:
         """Draw the frame, lines (k, 3) each."""
-        shape = pv.PolyData(np.concatenate(lines))
+        shape = pv.PolyData()
+        # Given at once, points would be drawn as such.
+        shape.points = np.concatenate(lines)
         shape.SetLines(_cells(lines))
         actor = self.view.actors.get(FRAME)
         if actor is None:
