@@ -89,7 +89,7 @@ def pair_names(pair: Sequence[Session]) -> list[str]:
     """Return what the runs of two views are called, in one form, with all that sets them apart."""
     runs = [one.run_shown for one in pair]
     # Beside the undeformed mesh both views have the same run.
-    alone = runs[0] is runs[1]
+    alone = runs[0] is runs[-1]
     both = [run for run in runs if run is not None]
     names = []
     for one, run in zip(pair, runs, strict=True):

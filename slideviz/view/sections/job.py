@@ -12,14 +12,19 @@ from slideviz.view.copies import show_passages
 from slideviz.view.drawing.actors import shown_values
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layers.copies import Period, matrices
+from slideviz.view.pictures.titles import pair_names
 from slideviz.view.sections.around import surroundings
 from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import PAINT_BY, PaintBy, paint
 from slideviz.view.sections.picture import SectionStyle, require_picture_name, section_picture
+from slideviz.view.sections.picture_pair import Shown, pair_picture
+from slideviz.view.session.changes import UNDEFORMED, seen_beside
 from slideviz.view.session.runs_words import run_words
 from slideviz.view.session.state import COLOUR_BY, Session
+
+_SHOWN = "shown: "
 
 
 @dataclass(frozen=True)
@@ -45,17 +50,52 @@ def save_section(
 ) -> Path:
     """Write the picture of a section as the view shows it: step, colours, neighbours.
 
+    Of two views beside each other both are in it.
+
     Raises
     ------
     CaseError
         No mesh is open, the section cuts no cell that is shown, the name has another end than a
         picture's, or the file cannot be written.
     """
-    frame = session.frame
-    if frame is None:
+    if session.frame is None:
         raise CaseError("no mesh is open, so there is no section to draw")
     require_picture_name(path)
     report(Doing(f"Cutting for {path.name}"))
+    views = shown_views(session)
+    shown = [_shown(*one, section) for one in zip(views, pair_names(views), strict=True)]
+    if not any(one.drawn for one in shown) and shown[0].note:
+        words = shown[0].note.removeprefix(_SHOWN)
+        raise CaseError(
+            f"{section.describe()}: it cuts no cell that is shown ({words}), so there is "
+            "nothing to draw; show all cells, or a wider range of them"
+        )
+    require_going(stopped)
+    report(Doing(f"Drawing {path.name}"))
+    name = session.path.name if session.path is not None else ""
+    style = SectionStyle(paper.size, True, session.view.edges, name=name, dpi=paper.dpi)
+    if len(shown) == 2:
+        pair_picture((shown[0], shown[1]), section, path, style)
+        return path
+    (one,) = shown
+    style = replace(style, state=state_words(session), note=one.note)
+    section_picture(one.pieces, section, one.paint, path, style, one.around)
+    return path
+
+
+def shown_views(session: Session) -> tuple[Session, ...]:
+    """Return what the views show, the left one first: the session, or that and the one beside."""
+    other = session.view.beside
+    if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return (session,)
+    second = seen_beside(session)
+    return (second, session) if session.view.swapped else (session, second)
+
+
+def _shown(session: Session, name: str, section: Section) -> Shown:
+    """Return what a section shows of a view that is called so."""
+    frame = session.frame
+    assert frame is not None
     word = COLOUR_BY[session.view.colour_by]
     by: PaintBy = next((one for one in PAINT_BY if one == word), "size-skew")
     painted = paint(frame.mesh, frame.quality, by, session.mesh)
@@ -66,27 +106,15 @@ def save_section(
     every = {0: np.eye(4)} | around
     cutter, points = Cutter.of(frame.mesh), frame.mesh.points
     only = _choice(session, section)
-    pieces = show_passages(cutter, points, section, every, only)
-    if only is not None and not any(len(piece) for piece in pieces.values()):
-        raise CaseError(
-            f"{section.describe()}: it cuts no cell that is shown ({only.words}), so there is "
-            "nothing to draw; show all cells, or a wider range of them"
-        )
-    require_going(stopped)
-    report(Doing(f"Drawing {path.name}"))
-    name = session.path.name if session.path is not None else ""
-    state = state_words(session)
-    style = SectionStyle(
-        paper.size,
-        True,
-        session.view.edges,
-        name=name,
-        state=state,
-        dpi=paper.dpi,
-        note="" if only is None else f"shown: {only.words}",
+    at = session.view.frame
+    return Shown(
+        show_passages(cutter, points, section, every, only),
+        painted,
+        surroundings(cutter, points, every),
+        name,
+        f"step {min(at, len(session.frames) - 1)}" if at else "",
+        "" if only is None else _SHOWN + only.words,
     )
-    section_picture(pieces, section, painted, path, style, surroundings(cutter, points, every))
-    return path
 
 
 def _choice(session: Session, section: Section) -> Choice | None:

@@ -10,16 +10,16 @@ from slideviz.mesh.model import FloatArray
 
 Box = tuple[float, float, float, float]
 
-_LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.6, 0.68
+LEFT, RIGHT, BOTTOM, TOP = 0.85, 0.25, 0.6, 0.68
 _EDGE = 0.25
-_BAR, _BESIDE, _BELOW = 0.16, 1.05, 0.75
+BAR, BESIDE, BELOW = 0.16, 1.05, 0.75
 """Thickness of the colour bar, and the room that it needs beside or below the axes, in inches."""
 
 _THIN = 25.0
 """Sections longer than so many times their height get air around them."""
 
 _MARGIN = 0.02
-_LOWEST = 1.5
+LOWEST = 1.5
 """Inches that a picture is high at least."""
 
 
@@ -84,12 +84,12 @@ def lay_out(
     bare : bool
         The axes have no ticks and labels.
     """
-    low, high = _aired(*box)
+    low, high = aired(*box)
     width, height = inches
-    left, bottom = (_EDGE, _EDGE) if bare else (_LEFT, _BOTTOM)
+    left, bottom = (_EDGE, _EDGE) if bare else (LEFT, BOTTOM)
     free = {
-        True: (width - left - _BESIDE, height - bottom - _TOP),
-        False: (width - left - _RIGHT, height - bottom - _TOP - _BELOW),
+        True: (width - left - BESIDE, height - bottom - TOP),
+        False: (width - left - RIGHT, height - bottom - TOP - BELOW),
     }
     scale = {
         upright: max(min(room[0] / (high[0] - low[0]), room[1] / (high[1] - low[1])), 0.0)
@@ -101,17 +101,17 @@ def lay_out(
     x = left + max(room[0] - size[0], 0.0) / 2.0
     if upright:
         y = bottom + max(room[1] - size[1], 0.0) / 2.0
-        long = min(max(size[1], 1.8), height - bottom - _TOP)
-        bar = (x + size[0] + 0.15, y + (size[1] - long) / 2.0, _BAR, long)
+        long = min(max(size[1], 1.8), height - bottom - TOP)
+        bar = (x + size[0] + 0.15, y + (size[1] - long) / 2.0, BAR, long)
     else:
-        y = bottom + _BELOW + max(room[1] - size[1], 0.0) / 2.0
+        y = bottom + BELOW + max(room[1] - size[1], 0.0) / 2.0
         long = min(max(0.6 * size[0], 2.5), width - 1.8)
-        bar = (x + (size[0] - long) / 2.0, y - bottom - 0.3, long, _BAR)
+        bar = (x + (size[0] - long) / 2.0, y - bottom - 0.3, long, BAR)
     return Layout(
         low,
         high,
-        _parts((x, y, float(size[0]), float(size[1])), inches),
-        _parts(bar, inches),
+        parts((x, y, float(size[0]), float(size[1])), inches),
+        parts(bar, inches),
         (float(size[0]), float(size[1])),
         upright,
     )
@@ -133,28 +133,28 @@ def height_for(
         Inches, not more than the given height.
     """
     layout, height = lay_out(box, inches, bare), inches[1]
-    bottom = (_EDGE if bare else _BOTTOM) + (0.0 if layout.upright_bar else _BELOW)
+    bottom = (_EDGE if bare else BOTTOM) + (0.0 if layout.upright_bar else BELOW)
     inside = layout.inches[1]
     if layout.upright_bar:
         inside = max(inside, layout.bar[3] * height)
-    return float(min(max(bottom + inside + _TOP, _LOWEST), height))
+    return float(min(max(bottom + inside + TOP, LOWEST), height))
 
 
 def room_ratio(inches: tuple[float, float]) -> float:
     """Return width by height of what is left for axes beside an upright colour bar."""
     width, height = inches
-    return max(width - _LEFT - _BESIDE, 0.1) / max(height - _BOTTOM - _TOP, 0.1)
+    return max(width - LEFT - BESIDE, 0.1) / max(height - BOTTOM - TOP, 0.1)
 
 
 def plot_layout(inches: tuple[float, float]) -> Layout:
     """Return the layout of a plot, whose axes have no common scale, without a colour bar."""
     width, height = inches
-    size = (max(width - _LEFT - 2 * _RIGHT, 0.1), max(height - _BOTTOM - _TOP, 0.1))
-    box = _parts((_LEFT, _BOTTOM, *size), inches)
+    size = (max(width - LEFT - 2 * RIGHT, 0.1), max(height - BOTTOM - TOP, 0.1))
+    box = parts((LEFT, BOTTOM, *size), inches)
     return Layout(np.zeros(2), np.ones(2), box, box, size, upright_bar=True)
 
 
-def _aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the box with a margin, and not thinner than one part in ``_THIN``."""
     size = high - low
     longest = float(size.max()) or 1.0
@@ -163,6 +163,7 @@ def _aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     return low - extra, high + extra
 
 
-def _parts(box: Box, inches: tuple[float, float]) -> Box:
+def parts(box: Box, inches: tuple[float, float]) -> Box:
+    """Return a box in inches as parts of a figure of so many."""
     x, y, wide, high = box
     return x / inches[0], y / inches[1], wide / inches[0], high / inches[1]

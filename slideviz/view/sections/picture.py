@@ -12,14 +12,14 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
-from slideviz.mesh.model import FloatArray
-from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.polygons import Polygons, joined
 from slideviz.view.legend import UNITS
-from slideviz.view.plots.bar import number_bar
 from slideviz.view.plots.style import PRINT
 from slideviz.view.sections.around import draw_around, window
 from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.view.sections.dress import add_bar, dress_axes
 from slideviz.view.sections.layout import (
     Layout,
     height_for,
@@ -30,14 +30,12 @@ from slideviz.view.sections.layout import (
 )
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
-from slideviz.view.sections.shapes import colours_of, shapes_of
+from slideviz.view.sections.shapes import shapes_of
 from slideviz.view.sections.space import in_space
 from slideviz.view.sections.title import LETTERS, write_title
 from slideviz.view.sections.unroll import Label, flat_labels, flatten, middle_angle
 
 SUFFIXES = (".png", ".svg", ".pdf")
-_LETTER_WIDTH = 0.075
-"""Inches that a letter of a label takes."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +113,22 @@ def section_picture(
     CaseError
         There is nothing to draw, the name has another end, or the file cannot be written.
     """
-    from matplotlib import rc_context
-
     target, style = Path(file), style or SectionStyle()
     require_picture_name(target)
     figure, dpi = draw_section(pieces, section, paint, style, around)
+    write_figure(figure, dpi, target)
+
+
+def write_figure(figure: Any, dpi: float, target: Path) -> None:
+    """Write a matplotlib figure, whole or not at all.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be written.
+    """
+    from matplotlib import rc_context
+
     data = BytesIO()
     kind = target.suffix.lower()[1:]
     # Without the date, and with names that are not random, the same section gives the same file.
@@ -144,28 +153,39 @@ def draw_section(
     CaseError
         There is nothing to draw.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     drawn = {number: piece for number, piece in pieces.items() if len(piece)}
     if not drawn:
         raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
-    width, height, dpi = inches_of(style.size, style.dpi)
-    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure, dpi = empty_figure(style)
     lines = all(piece.sizes.max() == 2 for piece in drawn.values())
     if lines:
         layout = _curve(figure, joined(list(drawn.values())), section, paint)
     else:
         layout = _cells(figure, drawn, section, paint, style, around)
-    every = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
-    ids = drawn[0].cell_ids if 0 in drawn else every
+    ids = ids_of(drawn)
     in_plane = not any(piece.points[:, 2].any() for piece in drawn.values())
     what = section.describe(2 if in_plane else 3)
     words = ", ".join(part for part in (style.state, what) if part)
     numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
     write_title(figure, layout, (style.name, words), numbers)
     return figure, dpi
+
+
+def empty_figure(style: SectionStyle) -> tuple[Any, float]:
+    """Return an empty figure of the size that is asked for, and its pixels per inch."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    width, height, dpi = inches_of(style.size, style.dpi)
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure, dpi
+
+
+def ids_of(drawn: Mapping[int, Polygons]) -> IntArray:
+    """Return the cells that are cut: of the mesh itself, or, where it is not cut, of all."""
+    every = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
+    return drawn[0].cell_ids if 0 in drawn else every
 
 
 def _cells(
@@ -177,7 +197,7 @@ def _cells(
     around: Polygons | None,
 ) -> Layout:
     """Draw polygons, with a colour bar."""
-    flat, labels = _flat(drawn, section, style)
+    flat, labels = laid_flat(drawn, section, style)
     if not section.whole:
         # Nothing is in front of another, but folded cells overlap: show them.
         flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
@@ -194,11 +214,11 @@ def _cells(
         draw_around(axes, around, section, (layout.low, layout.high))
     shapes = shapes_of(flat, paint, layout.points_per_length, style.edges, lit=style.in_space)
     axes.add_collection(shapes)
-    _dress(axes, layout, labels)
+    dress_axes(axes, layout, labels)
     if style.in_space:
         _triad(figure, drawn, section)
     inverted = any(paint.inverted[piece.cells].any() for piece in drawn.values())
-    _bar(figure, layout, paint, inverted)
+    add_bar(figure, layout, paint, inverted)
     return layout
 
 
@@ -213,10 +233,16 @@ def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layo
     return layout
 
 
-def _flat(
-    pieces: Mapping[int, Polygons], section: Section, style: SectionStyle
+def laid_flat(
+    pieces: Mapping[int, Polygons],
+    section: Section,
+    style: SectionStyle,
+    beside: float | None = None,
 ) -> tuple[Polygons, tuple[Label, Label] | None]:
-    """Return the pieces as they lie on paper, the nearest last, and what the axes are called."""
+    """Return the pieces as they lie on paper, the nearest last, and what the axes are called.
+
+    The mesh itself lies where its middle is nearest to that of another, ``beside``.
+    """
     if style.in_space:
         return in_space(list(pieces.values()), section), None
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
@@ -228,39 +254,17 @@ def _flat(
         sorted((number for number in pieces if number < 0), reverse=True),
     ):
         # Each passage beside the one before, from the mesh itself outwards.
-        near = _middle(found[min(found)], section) if found else None
+        near = middle_of(found[min(found)], section) if found else beside
         for number in numbers:
             found[number] = flatten(pieces[number], section, near)
-            near = _middle(found[number], section)
+            near = middle_of(found[number], section)
     flat = joined([found[number] for number in sorted(found)])
     return flat.by_depth(), flat_labels(section)
 
 
-def _middle(flat: Polygons, section: Section) -> float | None:
+def middle_of(flat: Polygons, section: Section) -> float | None:
+    """Return where the middle of something unrolled is; None of what was flat already."""
     return middle_angle(flat, section) if section.kind == "cylinder" else None
-
-
-def _dress(axes: Any, layout: Layout, labels: tuple[Label, Label] | None) -> None:
-    """Set limits, ticks and labels of the axes."""
-    from matplotlib.ticker import MaxNLocator
-
-    axes.set_xlim(layout.low[0], layout.high[0])
-    axes.set_ylim(layout.low[1], layout.high[1])
-    if labels is None:
-        axes.set_axis_off()
-        return
-    for put, label, inches in zip(
-        (axes.set_xlabel, axes.set_ylabel), labels, layout.inches, strict=True
-    ):
-        fits = len(label.full) * _LETTER_WIDTH <= inches
-        put(label.full if fits else label.short, fontsize=LETTERS)
-    axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
-    room = (layout.inches[0] / 0.65, layout.inches[1] / 0.4)
-    for axis, bins in zip((axes.xaxis, axes.yaxis), room, strict=True):
-        number = int(np.clip(bins, 2, 9))
-        axis.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1))
-    for spine in axes.spines.values():
-        spine.set_linewidth(0.6)
 
 
 def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:
@@ -283,39 +287,3 @@ def _line(ends: FloatArray) -> Any:
     from matplotlib.lines import Line2D
 
     return Line2D(ends[:, 0], ends[:, 1], color=PAPER.text, linewidth=1.0)
-
-
-def _bar(figure: Any, layout: Layout, paint: Paint, inverted: bool) -> None:
-    """Draw the colour bar, with the colour of inverted cells where there are some."""
-    from matplotlib.patches import Rectangle
-
-    axes = figure.add_axes(layout.bar)
-    direction = "vertical" if layout.upright_bar else "horizontal"
-    bar = figure.colorbar(colours_of(paint), cax=axes, orientation=direction)
-    bar.set_label(paint.label, fontsize=LETTERS)
-    bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
-    side = 3 if layout.upright_bar else 2
-    inches = layout.bar[side] * figure.get_size_inches()[side - 2]
-    number_bar(bar, paint.limits, inches, LETTERS - 1)
-    bar.outline.set_linewidth(0.6)
-    bar.solids.set_rasterized(False)
-    bar.solids.set_edgecolor("face")
-    if not inverted:
-        return
-    width, height = figure.get_size_inches()
-    x, y, wide, high = layout.bar
-    if layout.upright_bar:
-        box, at = (x, y - 0.3 / height), (x + wide + 0.06 / width, y - 0.3 / height)
-        side = wide * width
-    else:
-        side = high * height
-        box = (x + wide + 0.2 / width, y)
-        at = (box[0] + (side + 0.06) / width, y)
-    figure.add_artist(
-        Rectangle(
-            box, side / width, side / height, color=INVERTED_COLOUR, transform=figure.transFigure
-        )
-    )
-    figure.text(
-        at[0], at[1] + side / height / 2, "inverted", fontsize=8, ha="left", va="center_baseline"
-    )

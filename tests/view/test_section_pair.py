@@ -1,0 +1,139 @@
+"""Pictures of a section of two runs that are compared: both in one file, alike in all but shape."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from PIL import Image
+
+from slideviz.errors import CaseError
+from slideviz.mesh.quality import quality
+from slideviz.view.sections import picture_pair
+from slideviz.view.sections.job import Paper, save_section
+from slideviz.view.sections.layout_pair import lay_out_pair
+from slideviz.view.sections.model import Section
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
+from tests.builders import cube, passage, square
+
+PAPERS = [Paper.of_cm(8.5, 6.4), Paper.of_cm(17.0, 10.6), Paper((1600, 1000))]
+LEVEL = Section("plane", (0.5, 0.5, 0.4))
+
+
+def compared(mesh):
+    """A session with two runs side by side, one of which deforms more."""
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    for sliding, part in (("ps", 0.1), ("ds", 0.2)):
+        session = changes.start_run(changes.set_case(session, sliding=sliding))
+        push = part * np.prod(np.sin(np.pi * mesh.points), axis=1)
+        moved = mesh.with_points(mesh.points + np.eye(mesh.dim)[0] * push[:, None])
+        frames = [Frame(moved, quality(moved, mesh))]
+        session = changes.end_run(changes.add_frames(session, frames), "done")
+    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.2, 0.9))
+    return changes.show_beside(changes.show_run(session, 2), 1)
+
+
+@pytest.fixture
+def save(tmp_path, monkeypatch):
+    """Save a section and return its figure."""
+    drawn = []
+    real = picture_pair.draw_pair
+    monkeypatch.setattr(picture_pair, "draw_pair", lambda *v: drawn.append(real(*v)) or drawn[-1])
+
+    def run(session, section=LEVEL, paper=PAPERS[1]):
+        file = tmp_path / "a.png"
+        save_section(file, session, section, paper, lambda _: None, lambda: False)
+        with Image.open(file) as image:
+            assert image.size[0] == paper.size[0]
+        return drawn[-1][0] if drawn else None
+
+    return run
+
+
+def panes(figure):
+    """Return the axes of the two sections; the colour bar comes last."""
+    return figure.axes[:2]
+
+
+def words(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+def test_both_runs_are_in_the_picture_alike_with_one_bar(save):
+    figure = save(compared(cube(4, block=False)))
+    first, second = panes(figure)
+    assert len(figure.axes) == 3, "and one colour bar"
+    assert (first.get_xlim(), first.get_ylim()) == (second.get_xlim(), second.get_ylim())
+    shapes = [axes.collections[0] for axes in (first, second)]
+    assert all(isinstance(one, PolyCollection) for one in shapes)
+    faces = [one.get_facecolor() for one in shapes]
+    assert not np.allclose(*faces)
+    said = words(figure)
+    assert "plane z = 0.4" in said
+    assert any(line.startswith("Run 2, direct sliding") for line in said)
+    assert any(line.startswith("step 1: min 0.") for line in said)
+    assert said.index("Run 2, direct sliding") < said.index("Run 1, pseudo sliding")
+
+
+def test_the_first_is_what_stands_to_the_left(save):
+    session = changes.set_view(compared(cube(4, block=False)), swapped=True)
+    said = words(save(session))
+    assert said.index("Run 1, pseudo sliding") < said.index("Run 2, direct sliding")
+
+
+def test_beside_the_undeformed_mesh_that_is_said(save):
+    session = changes.show_beside(compared(cube(4, block=False)), changes.UNDEFORMED)
+    assert "Undeformed" in words(save(session))
+
+
+def test_one_view_is_one_section_as_before(save):
+    session = changes.show_beside(compared(cube(4, block=False)), None)
+    assert save(session) is None
+
+
+def test_curves_along_a_line_are_in_one_plot(save):
+    figure = save(compared(square(8, block=False)), Section("plane", (0.5, 0.4, 0), (0, 1, 0)))
+    (axes,) = figure.axes
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels[:2] == ["Run 1, pseudo sliding", "Run 2, direct sliding"]
+
+
+def test_cylinders_lie_unrolled_in_the_same_place(save):
+    mesh = passage()
+    first, second = panes(save(compared(mesh), Section("cylinder", radius=0.75)))
+    assert first.get_xlim() == second.get_xlim()
+    centres = [axes.collections[0].get_datalim(axes.transData).y0 for axes in (first, second)]
+    assert centres[0] == pytest.approx(centres[1], abs=0.05)
+
+
+def test_a_section_beside_the_mesh_is_refused(save):
+    with pytest.raises(CaseError, match="it cuts no cell, so there is nothing to draw"):
+        save(compared(cube(4, block=False)), Section("plane", (0.5, 0.5, 7.0)))
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+@pytest.mark.parametrize("stretch", [(1.0, 4.0, 1.0), (1.0, 1.0, 1.0), (5.0, 1.0, 1.0)])
+def test_nothing_in_the_picture_overlaps(save, paper, stretch):
+    mesh = cube(4, block=False)
+    session = compared(mesh.with_points(mesh.points * stretch))
+    figure = save(session, paper=paper)
+    figure.canvas.draw()
+    texts = [text.get_window_extent() for text in figure.texts]
+    boxes = texts + [axes.get_tightbbox() for axes in figure.axes]
+    width, height = figure.get_size_inches() * figure.dpi
+    for one, other in combinations(boxes, 2):
+        across = min(one.x1, other.x1) - max(one.x0, other.x0)
+        along = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert min(across, along) < 1.0
+    for box in boxes:
+        assert min(box.x0, box.y0) >= 0
+        assert (box.x1, box.y1) <= (width, height)
+
+
+def test_long_shapes_are_above_each_other_and_high_ones_beside():
+    page = (6.7, 4.2)
+    for size, beside in (((4.0, 1.0), False), ((1.0, 3.0), True)):
+        assert lay_out_pair((np.zeros(2), np.array(size)), page).beside is beside
+    narrow = lay_out_pair((np.zeros(2), np.array((1.0, 3.0))), (3.3, 2.5))
+    assert not narrow.beside, "titles beside each other would be too small there"
