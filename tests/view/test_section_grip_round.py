@@ -104,4 +104,5 @@ def test_along_the_radius_upwards_is_outwards():
     at, way, steep = pull(parallel, section, place, 0.7)
     assert steep
     assert way == pytest.approx((0.0, 100.0))
-    assert radius_at(parallel, section, place, (at, at + np.array([5.0, 20.0]))) == pytest.approx(0.9)
+    way = at, at + np.array([5.0, 20.0])
+    assert radius_at(parallel, section, place, way) == pytest.approx(0.9)
