@@ -340,3 +340,13 @@ def test_a_square_section_fills_its_picture_as_before():
     whole, *_ = drawn(mesh, section, size=(1600, 1000))
     figure, *_ = drawn(mesh, section, size=(1600, 1000), trimmed=True)
     assert figure.get_figheight() == pytest.approx(whole.get_figheight(), abs=0.01)
+
+
+def test_a_thin_strip_has_two_numbers_on_its_short_side():
+    for height in (0.009, 0.016, 0.0245):
+        mesh = cube(6, block=False)
+        mesh = mesh.with_points((mesh.points - (0.0, 0.5, 0.5)) * (0.35, 2.0 * height, 2.0))
+        figure, _, _ = drawn(mesh, Section("plane", (0, 0, 0.1)), size=(1600, 1000), trimmed=True)
+        axes = figure.axes[0]
+        low, high = axes.get_ylim()
+        assert sum(low <= tick <= high for tick in axes.get_yticks()) >= 2
