@@ -9,6 +9,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.quality import INVERTED
 from slideviz.view.drawing.look import PAPER, SELECTED_COLOUR
+from slideviz.view.drawing.surfaces import padded
 from slideviz.view.inspect import nodes_of
 from slideviz.view.legend import set_letters
 from slideviz.view.session.state import Session
@@ -48,13 +49,14 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     words = mark_words(scene.session)
     if not words:
         return
-    corners = _corners(scene.session)
-    middle = np.zeros(3)
-    middle[: corners.shape[1]] = corners.mean(axis=0)
-    place = vtkCoordinate()
+    corners = padded(_corners(scene.session))
+    place, spots = vtkCoordinate(), []
     place.SetCoordinateSystemToWorld()
-    place.SetValue(*middle)
-    seen = np.array(place.GetComputedDoubleViewportValue(plotter.renderer)) / plotter.window_size
+    for corner in (*corners, corners.mean(axis=0)):
+        place.SetValue(*corner)
+        spots.append(place.GetComputedDoubleViewportValue(plotter.renderer))
+    *around, middle = np.array(spots)
+    seen = middle / plotter.window_size
     if not ((seen >= 0.0) & (seen <= 1.0)).all():
         return
     text = pv.Text(words)
@@ -69,7 +71,10 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     at = text.GetPositionCoordinate()
     at.SetReferenceCoordinate(place)
     at.SetCoordinateSystemToViewport()
-    at.SetValue(side * _AWAY * scale, 0.0)
+    # Beside the outline, unless it fills the picture.
+    reach = max(side * (spot - middle)[0] for spot in around)
+    reach = min(reach, 0.2 * plotter.window_size[0])
+    at.SetValue(side * (reach + _AWAY * scale), 0.0)
     plotter.add_actor(text, name=NAME, reset_camera=False, render=False, pickable=False)
 
 
