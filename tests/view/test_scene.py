@@ -216,6 +216,19 @@ def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
     assert bar.GetTextPad() >= 4, "they do not touch the bar"
 
 
+def test_the_title_of_the_bar_keeps_away_from_the_edge_in_a_view_of_any_size(scene, session):
+    session = opened(scene, session)
+    scene.update(changes.set_view(session, colour_by="size_skew"))
+    for width in (900, 400, 900):
+        scene.plotter.window_size = width, 600
+        scene.resized()
+        bar = scene.plotter.scalar_bars["size-skew"]
+        left, wide = bar.GetPosition()[0] * width, bar.GetPosition2()[0] * width
+        assert left == pytest.approx(width - 90)
+        # The title is in the middle of that, and 68 pixels wide.
+        assert width - (left + wide / 2 + 34) > 20
+
+
 def test_another_mesh_replaces_all_actors(scene, session, cube):
     opened(scene, session)
     opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
