@@ -8,7 +8,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.gui.canvas.canvas import View3D
 from slideviz.gui.canvas.handle import HANDLE_COLOUR
-from slideviz.gui.canvas.handle_flat import POINT_PX, RIM_PX
+from slideviz.gui.canvas.pulled import POINT_PX, RIM_PX
 from slideviz.mesh.model import FloatArray
 from slideviz.view.drawing.look import SELECTED_COLOUR, Look
 from slideviz.view.layers.mark import IN_FRONT
