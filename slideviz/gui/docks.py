@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from qtpy.QtCore import QEvent, QObject, Qt, QTimer
+from qtpy.QtCore import QByteArray, QEvent, QObject, Qt, QTimer
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.dock_tabs import DockTabs
@@ -96,7 +96,6 @@ class Docks(QObject):
         self.panels: dict[str, QWidget] = {}
         for row in DOCKS:
             self._make(row)
-        self.arrange()
         bare = {self.by_name[row.name] for row in DOCKS if row.named}
         self.tabs = DockTabs(window, self.by_name.values(), bare)
 
@@ -110,6 +109,23 @@ class Docks(QObject):
             dock.setMinimumWidth(LEFT_WIDTH if row.area == LEFT else RIGHT_WIDTH)
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
+
+    def restore(self, state: QByteArray | None) -> None:
+        """Put every dock where it was, or, where nobody knows of that, where it belongs at first.
+
+        Not one after the other: Qt would leave tab bars that belong to nothing over the panels.
+        """
+        window = self.window
+        if state is None or not window.restoreState(state):
+            self.arrange()
+            self.share_room()
+            return
+        for row in DOCKS:
+            dock = self.by_name[row.name]
+            if window.dockWidgetArea(dock) == Side.NoDockWidgetArea and not dock.isFloating():
+                window.addDockWidget(row.area, dock)  # a version of that time had none
+        # When the docks have their places.
+        QTimer.singleShot(0, self, self.follow)
 
     def arrange(self) -> None:
         """Put every dock where it belongs at first."""

@@ -179,11 +179,7 @@ class MainWindow(QMainWindow):
         state, geometry = self.settings.value("state"), self.settings.value("geometry")
         if geometry is not None:
             self.restoreGeometry(geometry)
-        if state is None or not self.restoreState(state):
-            self.docks_.share_room()
-        else:
-            # When the docks have their places.
-            QTimer.singleShot(0, self, self.docks_.follow)
+        self.docks_.restore(state)
 
     def _keep_session(self, folder: Path | None) -> None:
         self.autosave: Autosave | None = None

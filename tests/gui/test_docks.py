@@ -270,3 +270,29 @@ def test_a_panel_without_a_tab_has_a_title_to_be_moved_by(start, qtbot):
     settled(qtbot, window)
     assert not is_titled(window.docks["histogram"])
     assert run_is_seen(window)
+
+
+def tabs(window):
+    """Return the titles in every tab bar; one alone is outside of the window."""
+    bars = window.docks_.tabs.bars()
+    inside = [bar for bar in bars if window.rect().intersects(bar.geometry())]
+    return sorted([bar.tabText(index) for index in range(bar.count())] for bar in inside)
+
+
+def test_no_tab_is_left_over_the_panels(start, qtbot, monkeypatch):
+    first = start(SMALL)
+    every = tabs(first)
+    assert [len(titles) for titles in every] == [3, 2, 3]
+    close(first, monkeypatch)
+    second = start()
+    assert tabs(second) == every, "after a restart"
+    second.docks["curves"].setFloating(True)
+    settled(qtbot, second)
+    second.actions_.by_name["restore_layout"].trigger()
+    settled(qtbot, second)
+    assert tabs(second) == every, "after the layout was put back"
+    close(second, monkeypatch)
+    third = start()
+    third.resize(1700, 900)
+    settled(qtbot, third)
+    assert tabs(third) == every
