@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
@@ -44,7 +45,7 @@ class Actions:
         self._make_file()
         self._make_view()
         self._make_help()
-        self.bar = ToolBar(window, self.by_name)
+        self.bar = ToolBar(window, self.by_name, self.colours)
         window.addToolBar(self.bar)
 
     def _add(self, name: str, text: str, function=None, keys="", image: str = "") -> QAction:
@@ -130,9 +131,21 @@ class Actions:
     def _make_edit(self) -> None:
         store, standard = self.window.store, QKeySequence.StandardKey
         menu = self.window.menuBar().addMenu("&Edit")
-        menu.addAction(self._add("undo", "&Undo", store.undo, standard.Undo, "undo"))
-        menu.addAction(self._add("redo", "&Redo", store.redo, standard.Redo, "redo"))
+        undo = partial(self._again, store.undo, "Undone")
+        redo = partial(self._again, store.redo, "Done again")
+        menu.addAction(self._add("undo", "&Undo", undo, standard.Undo, "undo"))
+        menu.addAction(self._add("redo", "&Redo", redo, standard.Redo, "redo"))
+        again = self.by_name["redo"]
+        again.setShortcuts([*again.shortcuts(), QKeySequence("Ctrl+Y")])
         self.edit = menu
+
+    def _again(self, step: Callable[[], None], done: str) -> None:
+        """Undo or redo, and say in the status bar what that was."""
+        store = self.window.store
+        words = store.can_undo if step == store.undo else store.can_redo
+        step()
+        if words:
+            self.window.say(f"{done}: {words}")
 
     def _make_view(self) -> None:
         window = self.window
@@ -145,10 +158,24 @@ class Actions:
             act.toggled.connect(partial(self._toggle, name))
             menu.addAction(act)
         menu.addSeparator()
-        colours = self._add("fit_colours", "Fit &colours", None, "R", "colours")
-        colours.setCheckable(True)
-        colours.triggered.connect(self._fit_colours)
-        menu.addAction(colours)
+        self.colours = self._menu(menu, "colours", "&Colours")
+        change = window.store.change
+        for name, text, function, keys in (
+            (
+                "fit_colours",
+                "Fit to this step",
+                partial(change, changes.fit_colours, every=False),
+                "R",
+            ),
+            (
+                "fit_all_colours",
+                "Fit to all steps",
+                partial(change, changes.fit_colours, every=True),
+                "Shift+R",
+            ),
+            ("usual_colours", "As ever", partial(change, changes.set_view, colour_range=None), ""),
+        ):
+            self.colours.addAction(self._add(name, text, function, keys))
         menu.addAction(self._add("fit", "&Fit all", window.fit, "F", "fit"))
         sides = self._menu(menu, "look_from", "Look &from")
         for side, keys in {**SIDE_KEYS, "iso": "0"}.items():
@@ -202,18 +229,15 @@ class Actions:
         if getattr(self.window.store.session.view, name) != checked:
             self.window.store.change(changes.set_view, **{name: checked})
 
-    def _fit_colours(self, wanted: bool) -> None:
-        if wanted:
-            self.window.store.change(changes.fit_colours)
-        else:
-            self.window.store.change(changes.set_view, colour_range=None)
-        # Nothing changes where all values are alike.
-        self._sync_colours(self.window.store.session)
-
     def _sync_colours(self, session: Session) -> None:
-        fit, view = self.by_name["fit_colours"], session.view
-        fit.setChecked(view.colour_range is not None and view.colour_by != "role")
-        fit.setEnabled(session.mesh is not None and view.colour_by != "role")
+        view = session.view
+        valued = session.mesh is not None and view.colour_by != "role"
+        for name in ("fit_colours", "fit_all_colours"):
+            self.by_name[name].setEnabled(valued)
+        usual = self.by_name["usual_colours"]
+        far = view.colour_by == "displacement"
+        usual.setText("0 to the largest of all runs" if far else "0 to 1")
+        usual.setEnabled(valued and view.colour_range is not None)
 
     def _sync_export(self, session: Session, busy: bool) -> None:
         """Show which exports there can be, and say why not."""
@@ -237,6 +261,7 @@ class Actions:
         """Redraw the icons in another colour."""
         for name, image in self._icons.items():
             self.by_name[name].setIcon(icon(image, colour))
+        self.bar.take_theme(colour)
 
     def sync(self, session: Session, busy: bool, ready: bool) -> None:
         """Show the session: what is checked, what can be done."""

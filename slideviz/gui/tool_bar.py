@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction
-from qtpy.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
+from qtpy.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import TIPS, wrapped
 from slideviz.view.session import changes
 from slideviz.view.session.state import COLOUR_BY, Session
 
@@ -26,7 +28,7 @@ class ToolBar(QToolBar):
     colour, zone : Choice
     """
 
-    def __init__(self, window, by_name: Mapping[str, QAction]) -> None:
+    def __init__(self, window, by_name: Mapping[str, QAction], colours: QMenu) -> None:
         super().__init__("Tools")
         self.setObjectName("tools")
         self.setMovable(False)
@@ -35,7 +37,7 @@ class ToolBar(QToolBar):
         self._add(by_name, *FIRST)
         self._add(by_name, "undo", "redo")
         self._add_colour(window.store)
-        self._add(by_name, "fit_colours")
+        self._add_range(colours)
         self._add(by_name, *SHOWN)
         for side, text in SIDES.items():
             by_name[f"side{side}"].setIconText(text)
@@ -61,6 +63,19 @@ class ToolBar(QToolBar):
         self.colour.chosen.connect(lambda value: store.change(changes.set_view, colour_by=value))
         self.addWidget(self.colour)
 
+    def _add_range(self, colours: QMenu) -> None:
+        self.range = QToolButton()
+        self.range.setObjectName("colour_range")
+        self.range.setToolTip(wrapped(TIPS["colours"]))
+        self.range.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.range.setMenu(colours)
+        self.addWidget(self.range)
+        self.addSeparator()
+
+    def take_theme(self, colour: str) -> None:
+        """Redraw the icons that no action has, in another colour."""
+        self.range.setIcon(icon("colours", colour))
+
     def _add_zone(self, open_zone) -> None:
         self.zone = Choice({})
         self.zone.setObjectName("zone")
@@ -73,6 +88,7 @@ class ToolBar(QToolBar):
         """Show the session."""
         opened = session.mesh is not None
         self.colour.setEnabled(opened)
+        self.range.setEnabled(opened and session.view.colour_by != "role")
         self.colour.show_value(session.view.colour_by)
         zones = session.mesh.zones if opened else 1
         if self.zone.count() != zones:

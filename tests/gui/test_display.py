@@ -210,24 +210,28 @@ def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
     assert len(synced) == 1
 
 
-def test_colours_fit_at_a_click_and_are_as_ever_at_the_next(shown):
-    fit = shown.window.actions_.by_name["fit_colours"]
-    assert not fit.isEnabled(), "roles have no range"
-    shown.window.store.change(changes.set_view, colour_by="skew")
-    assert fit.isEnabled()
-    assert not fit.isChecked()
-    fit.trigger()
-    values = shown.session.frame.quality.skew
+def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):
+    window, acts = shown.window, shown.window.actions_.by_name
+    one, every, usual = (acts[f"{n}_colours"] for n in ("fit", "fit_all", "usual"))
+    assert not one.isEnabled(), "roles have no range"
+    assert not window.actions_.bar.range.isEnabled()
+    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    window.start_run()
+    shown.settle()
+    assert not usual.isEnabled()
+    values = shown.session.frame.quality.values
+    one.trigger()
     assert view(shown).colour_range == pytest.approx((values.min(), values.max()), abs=0.02)
-    assert fit.isChecked()
     assert shown.window.store.can_undo == "colour range"
-    fit.trigger()
+    high = view(shown).colour_range[1]
+    every.trigger()
+    assert view(shown).colour_range[1] > high, "the undeformed mesh is better"
+    usual.trigger()
     assert view(shown).colour_range is None
-    assert not fit.isChecked()
+    shown.window.store.change(changes.show_frame, 0)
     shown.window.store.change(changes.set_view, colour_by="size")
-    fit.trigger()
+    one.trigger()
     assert view(shown).colour_range is None, "all cells have the size they had"
-    assert not fit.isChecked()
 
 
 def test_the_range_fits_both_views_of_a_comparison(shown):

@@ -12,6 +12,7 @@ from qtpy.QtWidgets import QApplication
 from slideviz.case.samples import write_sample
 from slideviz.gui import dialogs
 from slideviz.gui.canvas.cutting import followed, place_for
+from slideviz.gui.canvas.flats import stack
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.view.drawing.pick import to_display
 from slideviz.view.sections.model import Section
@@ -308,6 +309,37 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     assert not window.cutting.handles
     assert handle.widget.GetInteractor() is None
     assert interactor is window.view.iren.interactor
+
+
+def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver, panel):
+    driver.click(panel.add_plane)
+    panel.handle.click()
+    handle = window.cutting.handles.of(window.view)
+    for state, then in (("MovingOrigin", "Pushing"), ("Rotating", "Rotating")):
+        handle.shape.SetInteractionState(getattr(handle.shape, state))
+        handle.widget.InvokeEvent("StartInteractionEvent")
+        assert handle.shape.GetInteractionState() == getattr(handle.shape, then)
+        handle.widget.InvokeEvent("EndInteractionEvent")
+
+
+def test_a_hidden_section_of_a_case_has_its_box(window, driver, panel, passage_file, tmp_path):
+    driver.click(panel.add_plane)
+    panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
+    assert not sections(window)[0].shown
+    hidden = window.store.session.view.sections
+    driver.open(passage_file)
+    assert panel.list.count() == 0
+    window.store.change(changes.set_view, sections=hidden)
+    box = panel.list.item(0).data(Qt.ItemDataRole.CheckStateRole)
+    assert Qt.CheckState(box) == Qt.CheckState.Unchecked
+    panel.list.item(0).setCheckState(Qt.CheckState.Checked)
+    assert sections(window)[0].shown
+
+
+def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
+    assert stack((0.35, 0.01), (600, 400))
+    assert not stack((0.35, 0.3), (600, 400))
+    assert not stack((0.35, 0.01), (600, 200)), "no room for two titles"
 
 
 def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, passage_file):

@@ -1024,3 +1024,15 @@ def test_a_change_is_drawn_in_a_turn_of_its_own(opened, monkeypatch):
     opened.qtbot.waitUntil(lambda: bool(drawn))
     opened.qtbot.wait(20)
     assert len(drawn) == 1
+
+
+def test_what_was_undone_is_said_and_both_usual_keys_do_it_again(opened):
+    window, said = opened.window, opened.window.statusBar().currentMessage
+    undo, redo = (window.actions_.by_name[name] for name in ("undo", "redo"))
+    window.store.change(changes.set_view, edges=False)
+    undo.trigger()
+    assert said() == "Undone: mesh edges"
+    redo.trigger()
+    assert said() == "Done again: mesh edges"
+    keys = {keys.toString() for keys in redo.shortcuts()}
+    assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys

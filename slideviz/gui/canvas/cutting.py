@@ -9,7 +9,7 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QSplitter
 
 from slideviz.gui.canvas.canvas import View3D
-from slideviz.gui.canvas.flats import Flats, beside
+from slideviz.gui.canvas.flats import FRAME_PX, Flats, beside
 from slideviz.gui.canvas.handles import Handles
 from slideviz.gui.viewing import Viewing
 from slideviz.mesh.model import Mesh
@@ -27,8 +27,6 @@ _SHARE = 9 / 20
 """Part of the window's middle that the flat view gets."""
 _LONG = 1.5
 """A section that is so many times larger below the view than beside it is put there."""
-_FRAME_PX = 110
-"""Height of title, rulers and air around a flat section."""
 
 
 class Cutting(QSplitter):
@@ -232,7 +230,7 @@ def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool,
     if width >= BESIDE_PX and below_scale < _LONG * beside_scale:
         return True, _SHARE
     # What a strip cannot fill is left to the view.
-    needed = (high / wide * width + _FRAME_PX) / height
+    needed = (high / wide * width + FRAME_PX) / height
     return False, float(np.clip(needed, 0.6 * _SHARE, _SHARE))
 
 

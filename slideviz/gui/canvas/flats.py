@@ -13,6 +13,9 @@ from slideviz.view.sections.model import Section
 from slideviz.view.session.changes import UNDEFORMED, seen_beside
 from slideviz.view.session.state import Session
 
+FRAME_PX = 110
+"""Height of title, rulers and air around a flat section."""
+
 
 class Flats(QWidget):
     """A flat view for each view of a 3D mesh, linked; or the curves along a line through a 2D one.
@@ -62,9 +65,10 @@ class Flats(QWidget):
         if theirs is None or self.second is None:
             self.first.show_section(session, section)
             return
-        self._row.setDirection(_direction(session.view.swapped))
         self.first.show_section(session, section, called(session))
         self.second.show_section(theirs[0], section, called(theirs[0]))
+        stacked = self.extent is not None and stack(self.extent, (self.width(), self.height()))
+        self._row.setDirection(_direction(session.view.swapped, stacked))
         self.first.refit()
 
     @property
@@ -127,7 +131,26 @@ def called(session: Session) -> str:
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
 
 
-def _direction(swapped: bool) -> QHBoxLayout.Direction:
+def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
+    """Tell whether two flat sections are larger one above the other than side by side.
+
+    Parameters
+    ----------
+    extent : (float, float)
+        Width and height of one, in the mesh's length unit.
+    room : (int, int)
+        Those of both views together, in pixels.
+    """
+    wide, high = (max(length, 1e-300) for length in extent)
+    width, height = room
+    beside = min(0.5 * width / wide, (height - FRAME_PX) / high)
+    above = min(width / wide, (0.5 * height - FRAME_PX) / high)
+    return above > beside
+
+
+def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
     """Return from where to where the first and the second view stand."""
     ways = QHBoxLayout.Direction
+    if stacked:
+        return ways.BottomToTop if swapped else ways.TopToBottom
     return ways.RightToLeft if swapped else ways.LeftToRight

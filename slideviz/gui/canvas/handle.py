@@ -101,6 +101,12 @@ class PlaneHandle:
 
     def _grab(self, dragging: bool) -> None:
         self.dragging = dragging
+        if (
+            dragging
+            and self.shape.GetInteractionState() == vtkImplicitPlaneRepresentation.MovingOrigin
+        ):
+            # The ball would be dragged within the plane, and nothing would be seen to change.
+            self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
         if not dragging:
             self._soon.stop()
             self.tell()

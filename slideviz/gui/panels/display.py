@@ -43,7 +43,7 @@ SHOWN: dict[str, tuple[str, str]] = {
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
     "range": "The values at the ends of the colour bar.",
-    "fit": "From the lowest to the highest value of what is shown now; of all steps: R.",
+    "fit": "From the lowest to the highest value of what is shown now (R); of all steps: Shift+R.",
 }
 ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."

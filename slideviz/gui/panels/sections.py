@@ -187,8 +187,8 @@ class SectionsPanel(QWidget):
                 if (item.text(), item.toolTip()) != (text, tip):
                     item.setText(text)
                     item.setToolTip(tip)
-                if item.checkState() != state or not item.flags() & Qt.ItemFlag.ItemIsUserCheckable:
-                    item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+                # A new row has no box at all, which reads as one without its tick.
+                if item.data(Qt.ItemDataRole.CheckStateRole) is None or item.checkState() != state:
                     item.setCheckState(state)
             chosen = self.cutting.chosen
             self.list.setCurrentRow(-1 if chosen is None else chosen)

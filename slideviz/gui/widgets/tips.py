@@ -26,7 +26,12 @@ TIPS: dict[str, str] = {
     "run": "Deform the mesh with these settings.",
     "cancel": "Stop what runs; the steps that are done are kept.",
     "fit": "Make the whole mesh fill the view.",
-    "fit_colours": "Let the colours range over the values of all steps, or from 0 to 1 again.",
+    "colours": "From which value to which the colours range.",
+    "fit_colours": "Let the colours range over the values of the step that is shown, and of the "
+    "other one in a comparison.",
+    "fit_all_colours": "Let the colours range over the values of all steps, so that they say the "
+    "same in a film.",
+    "usual_colours": "Let the colours range as they do at first.",
     "look_from": "Look at the mesh from a side.",
     "sideiso": "Look at the mesh from a corner.",
     "compare": "Show the undeformed mesh or another run beside the run that is shown.",
