@@ -10,18 +10,17 @@ import os
 import shutil
 import subprocess
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.errors import SlidevizError
+from slideviz.gui.shots_wait import settle
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
 
-PATIENCE = 300.0
 SIZE = (1280, 800)
 APART, MANY, EXACT = 192, 40, 24
 """Colours of the palette of a picture: far from each other; of large areas; the most frequent."""
@@ -111,31 +110,6 @@ def open_window(place: Path) -> Iterator[MainWindow]:
         window.close()
         dialogs.ask_unsaved = asked
         app.processEvents()
-
-
-def wait(until: Callable[[], bool]) -> None:
-    """Let the window work until a condition holds.
-
-    Raises
-    ------
-    SlidevizError
-        It does not hold within some minutes.
-    """
-    from qtpy.QtWidgets import QApplication
-
-    end = time.monotonic() + PATIENCE
-    while not until():
-        if time.monotonic() > end:
-            raise SlidevizError(f"the window did not get ready within {PATIENCE:.0f} s")
-        QApplication.processEvents()
-        time.sleep(0.01)
-
-
-def settle(window: MainWindow) -> None:
-    """Let the window end what it does, and half a second more for what is drawn later."""
-    wait(lambda: not window.runner.busy)
-    end = time.monotonic() + 0.5
-    wait(lambda: time.monotonic() > end)
 
 
 def photograph(window: MainWindow, path: Path) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.case.model import Case, Motion, Rotate, Translate
 from slideviz.case.samples import sample, write_sample
-from slideviz.gui.shots import settle
+from slideviz.gui.shots_wait import settle
 from slideviz.view.sections.model import Section
 from slideviz.view.session import changes
 
