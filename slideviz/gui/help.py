@@ -83,7 +83,7 @@ class ShortcutsDialog(QDialog):
     def __init__(self, window) -> None:
         super().__init__(window)
         self.setWindowTitle("Keyboard and mouse")
-        self.resize(880, 700)
+        self.resize(1060, 700)
         column = QVBoxLayout(self)
         self.find = QLineEdit()
         self.find.setPlaceholderText("Find an action or a key")

@@ -57,8 +57,8 @@ def test_it_shows_the_step_the_undeformed_mesh_and_other_runs(full, qtbot):
     assert not full.area.empty
     assert sorted(labels(full)) == ["run 1", "run 2", "undeformed"]
     quality = full.store.session.frame.quality
-    assert f"{quality.min:.4g}" in full.numbers.text()
-    assert f"{quality.mean:.4g}" in full.numbers.text()
+    assert f"{quality.min:.4f}" in full.numbers.text()
+    assert f"{quality.mean:.4f}" in full.numbers.text()
     assert f"inverted <b>{quality.inverted}" in full.numbers.text()
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.change(changes.show_frame, 0)
@@ -199,7 +199,7 @@ def test_hidden_it_draws_nothing_and_catches_up(full, qtbot):
     assert not told
     with qtbot.waitSignal(full.canvas.drawn):
         full.show()
-    assert f"{full.store.session.frame.quality.min:.4g}" in full.numbers.text()
+    assert f"{full.store.session.frame.quality.min:.4f}" in full.numbers.text()
 
 
 def test_playing_draws_less_often_than_it_steps(full, qtbot, monkeypatch):

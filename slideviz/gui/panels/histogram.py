@@ -142,9 +142,10 @@ class HistogramPanel(QWidget):
         # Of a node: the values of cells are means of theirs.
         shifts = session.frame.mesh.points - session.mesh.points
         ends = np.linalg.norm(shifts, axis=1).max() if what == "displacement" else plain.min()
+        form = ".4g" if what == "displacement" else ".4f"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
-            f"{low} <b>{ends:.4g}</b>&nbsp; mean <b>{plain.mean():.4g}</b>&nbsp; "
+            f"{low} <b>{ends:{form}}</b>&nbsp; mean <b>{plain.mean():{form}}</b>&nbsp; "
             f"<span{red}>inverted <b>{bad:,}</b></span>"
         )
         threshold = session.view.threshold
