@@ -151,6 +151,8 @@ class Player(QWidget):
         self.step_text.setText("" if session.mesh is None else self._step_words(at, last))
         self.speed_button.setEnabled(last > 0)
         self.result.show_parts(result_parts(session))
+        # Inverted cells are told of in the narrowest window, too.
+        self.result.setMinimumWidth(self.result.least)
         if not last:
             self.stop()
 

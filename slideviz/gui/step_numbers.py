@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QTextDocument
 from qtpy.QtWidgets import QLabel, QSizePolicy
@@ -36,6 +38,11 @@ class Results(QLabel):
         if forms != self._forms:
             self._forms = forms
             self._fit()
+
+    @property
+    def least(self) -> int:
+        """Return the width of the most important number in its shortest form, in pixels."""
+        return math.ceil(self._width_of(self._forms[-1][:1])) + 2 if self._forms else 0
 
     def resizeEvent(self, event) -> None:
         super().resizeEvent(event)
