@@ -14,6 +14,7 @@ from slideviz.gui.tool_bar import ToolBar
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import tip_of, wrapped
 from slideviz.view.session import changes
+from slideviz.view.session.colours import usual_range
 from slideviz.view.session.state import Session
 
 CUTS = {
@@ -235,8 +236,7 @@ class Actions:
         for name in ("fit_colours", "fit_all_colours"):
             self.by_name[name].setEnabled(valued)
         usual = self.by_name["usual_colours"]
-        far = view.colour_by == "displacement"
-        usual.setText("0 to the largest of all runs" if far else "0 to 1")
+        usual.setText(usual_range(session))
         usual.setEnabled(valued and view.colour_range is not None)
 
     def _sync_export(self, session: Session, busy: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -27,18 +28,12 @@ class FlatHandle(Pulled[tuple[Section, Box]]):
 
     Parameters
     ----------
-    view, strip, moved, held
+    view, *others
         As for `slideviz.gui.canvas.pulled.Pulled`.
     """
 
-    def __init__(
-        self,
-        view: View3D,
-        strip: Callable[[], float],
-        moved: Callable[[Section], None],
-        held: Callable[[bool], None] = lambda _held: None,
-    ) -> None:
-        super().__init__(view, strip, moved, held)
+    def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
+        super().__init__(view, *others)
         self._look: Look | None = None
         self._lift = 0.0
         self._grips: Grips | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from qtpy.QtCore import QPoint
@@ -33,18 +34,12 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
 
     Parameters
     ----------
-    view, strip, moved, held
+    view, *others
         As for `slideviz.gui.canvas.pulled.Pulled`.
     """
 
-    def __init__(
-        self,
-        view: View3D,
-        strip: Callable[[], float],
-        moved: Callable[[Section], None],
-        held: Callable[[bool], None] = lambda _held: None,
-    ) -> None:
-        super().__init__(view, strip, moved, held)
+    def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
+        super().__init__(view, *others)
         self._patch: Patch | None = None
         self.place: Place | None = None
         self._mark = PullMark(view)

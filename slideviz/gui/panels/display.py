@@ -27,6 +27,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.view.copies import passages_around
 from slideviz.view.layers.copies import Period
 from slideviz.view.session import changes
+from slideviz.view.session.colours import usual_range
 from slideviz.view.session.state import COLOUR_BY, POINTS, Session
 from slideviz.view.session.store import Store
 
@@ -180,8 +181,8 @@ class DisplayPanel(QWidget):
         self.fit_range.setToolTip(TIPS["fit"] if valued else ROLES_ONLY)
         self.range.show_values(session.colour_range)
         self.reset_range.setEnabled(valued and view.colour_range is not None)
-        usual = "0 to the largest of all runs" if view.colour_by == "displacement" else "0 to 1"
-        self.reset_range.setToolTip(f"Back to {usual}" if valued else ROLES_ONLY)
+        back = f"Back to {usual_range(session)}"
+        self.reset_range.setToolTip(back if valued else ROLES_ONLY)
         low_high = "The lowest and highest value of the cells that are drawn."
         on = view.threshold is not None
         self.threshold.set_tip(low_high if on else "Switch on “Only cells” to choose a range.")

@@ -198,9 +198,7 @@ def _cells(
 ) -> Layout:
     """Draw polygons, with a colour bar."""
     flat, labels = laid_flat(drawn, section, style)
-    if not section.whole:
-        # Nothing is in front of another, but folded cells overlap: show them.
-        flat = flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
+    flat = folded_last(flat, section, paint)
     corners = flat.points[flat.connectivity, :2]
     box, inches = (corners.min(axis=0), corners.max(axis=0)), figure.get_size_inches()
     if around is not None:
@@ -224,13 +222,26 @@ def _cells(
 
 def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layout:
     """Draw the numbers along a line or circle."""
-    layout = plot_layout(figure.get_size_inches())
     curve = curve_of(lines, section, paint.values, paint.inverted)
+    return plot_curves(figure, [CurveRow("", curve)], section, paint)
+
+
+def plot_curves(figure: Any, rows: list[CurveRow], section: Section, paint: Paint) -> Layout:
+    """Draw curves along a section into one plot, the last one with its colours below."""
+    layout = plot_layout(figure.get_size_inches())
     labels = position_label(section).full, f"{paint.label} {UNITS.get(paint.label, '[-]')}"
     colours = Colours(paint.colour_map, paint.limits)
     style = replace(PRINT, size=LETTERS)
-    draw_curves(figure.add_axes(layout.axes), [CurveRow("", curve)], labels, style, colours)
+    draw_curves(figure.add_axes(layout.axes), rows, labels, style, colours)
     return layout
+
+
+def folded_last(flat: Polygons, section: Section, paint: Paint) -> Polygons:
+    """Return what lies on paper in the order in which it is drawn."""
+    if section.whole:
+        return flat
+    # Nothing is in front of another, but folded cells overlap: show them.
+    return flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
 
 
 def laid_flat(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,26 +11,25 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.view.drawing.polygons import Polygons, joined
-from slideviz.view.legend import UNITS
-from slideviz.view.plots.style import PRINT
 from slideviz.view.sections.around import draw_around, window
-from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.view.sections.curve import CurveRow, curve_of
 from slideviz.view.sections.dress import add_bar, dress_axes
-from slideviz.view.sections.layout import plot_layout
 from slideviz.view.sections.layout_pair import PairLayout, lay_out_pair
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
 from slideviz.view.sections.picture import (
     SectionStyle,
     empty_figure,
+    folded_last,
     ids_of,
     laid_flat,
     middle_of,
+    plot_curves,
     require_picture_name,
     write_figure,
 )
 from slideviz.view.sections.shapes import shapes_of
-from slideviz.view.sections.title import LETTERS, TITLE, write_line, write_title
+from slideviz.view.sections.title import TITLE, write_line, write_title
 
 _RATIO = 1.6
 """Of width to height of what a 2D mesh is shown around whole cells."""
@@ -135,10 +134,7 @@ def _cells(
             number = min(one.drawn, key=abs)
             alone, _ = laid_flat({number: one.drawn[number]}, section, style)
             near = middle_of(alone, section)
-        if not section.whole:
-            # Nothing is in front of another, but folded cells overlap: show them.
-            flat = flat.take(np.argsort(one.paint.inverted[flat.cells], kind="stable"))
-        flats.append(flat)
+        flats.append(folded_last(flat, section, one.paint))
     there = [flat for flat in flats if flat is not None]
     corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in there])
     box = corners.min(axis=0), corners.max(axis=0)
@@ -188,11 +184,6 @@ def _curves(
             lines = joined(list(one.drawn.values()))
             curve = curve_of(lines, section, one.paint.values, one.paint.inverted)
             rows.append(CurveRow(one.name, curve))
-    paint = both[0].paint
-    layout = plot_layout(figure.get_size_inches())
-    labels = position_label(section).full, f"{paint.label} {UNITS.get(paint.label, '[-]')}"
-    colours = Colours(paint.colour_map, paint.limits)
-    style = replace(PRINT, size=LETTERS)
-    draw_curves(figure.add_axes(layout.axes), rows, labels, style, colours)
+    layout = plot_curves(figure, rows, section, both[0].paint)
     numbers = " · ".join(f"{one.name}, {one.numbers}" for one in both)
     write_title(figure, layout, head, numbers)

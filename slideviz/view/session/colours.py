@@ -25,6 +25,12 @@ def fit_colours(session: Session, every: bool = True) -> Session:
     return session if limits is None else set_view(session, colour_range=limits)
 
 
+def usual_range(session: Session) -> str:
+    """Return in words from where to where the colours range that nobody has chosen."""
+    far = session.view.colour_by == "displacement"
+    return "0 to the largest of all runs" if far else "0 to 1"
+
+
 def _limits(session: Session, every: bool) -> tuple[float, float] | None:
     what = session.view.colour_by
     if what == "role" or session.mesh is None:
