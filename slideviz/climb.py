@@ -10,6 +10,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
 from slideviz.errors import DeformError, Note
+from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
@@ -147,6 +148,9 @@ class Climb:
             solution = _step(plan, coords, goal, watch, before)
             moved = _moved(plan, coords, solution.displacement, goal)
             points = _cartesian(plan, mesh.points, moved)
+            if mesh.halo is not None:
+                points = mesh.halo.follow(mesh.points, points)
+                moved = _followed(plan, mesh.halo, points, moved)
             if not np.all(np.isfinite(points)):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             if halve:
@@ -250,6 +254,17 @@ def _cartesian(plan: Plan, points: FloatArray, coords: FloatArray) -> FloatArray
         return coords
     rest = np.all(coords == plan.coords, axis=1, keepdims=True)
     return np.where(rest, points, plan.frame.points(coords))
+
+
+def _followed(plan: Plan, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
+    """Return the coordinates with those of copies where their donors put them.
+
+    Periodic images are in place already, to the bit, and stay.
+    """
+    copies = np.setdiff1d(halo.receivers, plan.images)
+    out = moved.copy()
+    out[copies] = plan.frame.coords(points[copies])
+    return out
 
 
 def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:

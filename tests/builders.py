@@ -14,7 +14,8 @@ import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.periodic import Pair
+from slideviz.mesh.periodic import Pair, match
+from slideviz.mesh.su2_write import su2_blocks
 
 SIDE_TYPE = {2: {2: 3}, 3: {3: 5, 4: 9}}
 """VTK identifier of a side by dimension of the mesh and number of nodes."""
@@ -359,3 +360,56 @@ def channel(n: int = 10) -> Mesh:
     rules.insert(3, ("bump", lambda p: bool(np.all(p[:, 1] == 0) and p[:, 0].max() <= 3 * n // 2)))
     rules.insert(4, ("low2", lambda p: bool(np.all(p[:, 1] == 0))))
     return grid((2 * n, n), rules=rules, place=lambda p: p / n)
+
+
+def halo_text(mesh: Mesh, low: str, high: str, transform: np.ndarray) -> str:
+    """SU2 file of a mesh whose cells at ``low`` are repeated beyond ``high``, as SU2 had it.
+
+    ``transform`` (3, 3) is centre, angles in radians and translation from ``high`` to ``low``, by
+    which all of the layer is found beyond ``high`` again. The nodes of ``low`` receive, too.
+    """
+    image = match(mesh, low, high)
+    partner = dict(image.nodes.tolist())
+    layer: list[tuple[int, np.ndarray]] = []
+    copy = dict(partner)
+    for vtk, (_, table) in mesh.cells.by_type.items():
+        for nodes in table[np.isin(table, list(partner)).any(axis=1)]:
+            layer.append((vtk, nodes))
+            for node in nodes.tolist():
+                copy.setdefault(node, len(mesh.points) + len(copy) - len(partner))
+    beyond = sorted(set(copy) - set(partner), key=copy.__getitem__)
+    centre, (*_, angle), shift = transform
+    turn = np.array([[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0]])
+    turn = np.vstack([turn, [0, 0, 1]])[: mesh.dim, : mesh.dim]  # from low to high
+    moved = (mesh.points[beyond] - (centre + shift)[: mesh.dim]) @ turn.T + centre[: mesh.dim]
+    cells = _joined(mesh.cells, [(vtk, [copy[n] for n in nodes.tolist()]) for vtk, nodes in layer])
+    sets = [set(nodes.tolist()) for _, nodes in layer]
+    markers = []
+    for marker in mesh.markers:
+        more = [
+            (vtk, [copy[n] for n in row])
+            for vtk, (_, table) in marker.cells.by_type.items()
+            for row in table.tolist()
+            if marker.name not in (low, high) and any(set(row) <= nodes for nodes in sets)
+        ]
+        markers.append(Marker(marker.name, _joined(marker.cells, more)))
+    full = Mesh(np.concatenate([mesh.points, moved]), cells, tuple(markers), name="halo")
+    text = b"".join(su2_blocks(full)).decode()
+    text = text.replace(f"NMARK= {len(markers)}", f"NMARK= {len(markers) + 2}")
+    donors = [(partner[a], 1) for a in partner] + [(n, 2) for n in beyond]
+    receivers = [(a, 1) for a in partner] + [(copy[n], 2) for n in beyond]
+    for to, rows in ((1, donors), (-1, receivers)):
+        lines = "".join(f"1 {node} {k}\n" for node, k in rows)
+        text += f"MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= {len(rows)}\nSEND_TO= {to}\n{lines}"
+    text += "NPERIODIC= 3\n"
+    back = np.stack([centre, -transform[1], -shift])
+    for index, rows in enumerate((np.zeros((3, 3)), -back * [[-1], [1], [1]], back)):
+        lines = "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+        text += f"PERIODIC_INDEX= {index}\n{lines}"
+    return text
+
+
+def _joined(cells: Cells, more: Sequence[tuple[int, Sequence[int]]]) -> Cells:
+    """The cells and some more after them."""
+    types = [*cells.types.tolist(), *(vtk for vtk, _ in more)]
+    return Cells.from_types(types, [*cells.connectivity, *(n for _, row in more for n in row)])

@@ -31,6 +31,7 @@ def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
         *motion_problems(case, mesh),
         *_zone_problems(case, mesh),
         *_periodic_problems(case, mesh),
+        *_halo_problems(case, mesh),
     )
 
 
@@ -210,6 +211,16 @@ _SLIDES = {
     ("elastic", "ps"): "pseudo sliding acts like direct sliding here: in linear elasticity nodes "
     "slide by the equations themselves",
 }
+
+
+def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
+    """Return which boundaries are asked to move although those they are copies of do not."""
+    return tuple(
+        f"{mesh.name}: {copy} is asked to move, but by the mesh's SEND_RECEIVE markers it is a "
+        f"copy of {origin}, which it follows; let {origin} move, too, or alone"
+        for copy, origin in (mesh.halo.sides if mesh.halo is not None else ())
+        if case.roles.get(copy) == "moving" != case.roles.get(origin)
+    )
 
 
 def idle_settings(case: Case) -> tuple[str, ...]:

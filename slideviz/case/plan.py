@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -16,10 +16,12 @@ from slideviz.baselines.idw import Weights, deform_idw
 from slideviz.baselines.shapes import blocks
 from slideviz.case.check import idle_settings
 from slideviz.case.clash import clash, jump
+from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import displacements, require_valid
+from slideviz.case.motion import AGREE, displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.found import boundary_of
+from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
@@ -72,6 +74,8 @@ class Plan:
     pairs : tuple of Pair
     solve : callable
         The method on one step.
+    halo : Halo or None
+        Copies that follow their donors.
     warnings : tuple of str
     """
 
@@ -92,6 +96,7 @@ class Plan:
     tracks: Tracks
     pairs: tuple[Pair, ...]
     solve: Callable[[Problem, Watch], Solution]
+    halo: Halo | None
     warnings: tuple[str, ...]
 
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -116,9 +121,23 @@ class Plan:
         Nodes on the axis stay on it, and in place where another surface meets it.
         """
         out = self.tracks.project(coords, nodes, free)
+        self._tie(nodes, out)
         out[self.axis[nodes], :2] = 0.0
         out[np.isin(nodes, self.held)] = 0.0
         return out
+
+    def _tie(self, nodes: IntArray, slid: FloatArray) -> None:
+        """Let copies within the domain slide as the nodes do that a halo ties them to, in place."""
+        if self.halo is None:
+            return
+        row = np.full(len(self.coords), -1)
+        row[nodes] = np.arange(len(nodes))
+        copy, origin = row[self.halo.receivers], row[self.halo.donors]
+        both = (copy >= 0) & (origin >= 0)
+        moved = slid[origin[both]]
+        if not self.frame.cylindrical:
+            moved = np.einsum("hij,hj->hi", self.halo.rotations[both], moved)
+        slid[copy[both]] = moved
 
 
 def make_plan(case: Case, mesh: Mesh) -> Plan:
@@ -136,10 +155,15 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     """
     require_valid(case, mesh)
     _require_finite(mesh)
+    asked, (case, notes) = case, _roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
-    pairs = _pairs(case, mesh)
-    frame = make_frame(mesh.points, pairs, periodic_distance=case.periodic != "none")
+    domain = without_halo(mesh)[0]
+    beyond = mesh.halo.outer if mesh.halo is not None else np.empty(0, np.int64)
+    pairs = _pairs(case, domain)
+    frame = make_frame(
+        np.delete(mesh.points, beyond, axis=0), pairs, periodic_distance=case.periodic != "none"
+    )
     classes = classify(
         boundary,
         fans,
@@ -148,11 +172,12 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         (case.sliding, case.periodic),
         case.feature_angle_deg,
     )
+    classes = replace(classes, beyond=len(beyond))
     coords = frame.coords(mesh.points)
     free = case.periodic in ("fixed", "moving")
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    known, target, warnings = _prescribed(case, mesh, frame, classes)
+    known, target, warnings = _prescribed(asked, mesh, frame, classes)
     tracks = find_tracks(
         boundary,
         fans,
@@ -187,8 +212,9 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         fans=fans,
         tracks=tracks,
         pairs=pairs,
-        solve=_method(case, mesh, frame, axis),
-        warnings=(*warnings, *idle_settings(case)),
+        solve=_method(case, domain, frame, axis),
+        halo=mesh.halo,
+        warnings=(*mesh.remarks, *notes, *warnings, *idle_settings(case)),
     )
 
 
@@ -232,6 +258,8 @@ def _prescribed(
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
     """Return the known nodes, their displacement in the frame, and warnings."""
     moved = displacements(case, mesh)
+    if mesh.halo is not None:
+        moved = _of_domain(mesh, mesh.halo, moved)
     problem = clash(case, mesh, moved.nodes, moved.vectors)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
@@ -245,6 +273,46 @@ def _prescribed(
     row = np.searchsorted(classes.moving, moved.nodes)
     target[row] = frame.difference(mesh.points[moved.nodes], moved.vectors)
     return known, target, (*moved.warnings, *((remark,) if remark else ()))
+
+
+def _roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
+    """Return the case with the role of its donors for each side that only follows, and notes."""
+    roles, notes = dict(case.roles), []
+    for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
+        own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
+        roles[copy] = other
+        if own != other:
+            notes.append(
+                f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
+                f"its own role ({own}) has no effect"
+            )
+    return case.change(roles=roles), tuple(notes)
+
+
+def _of_domain(mesh: Mesh, halo: Halo, moved: Displacements) -> Displacements:
+    """Return the displacements with those of copies in the domain, and none beyond its sides.
+
+    Raises
+    ------
+    CaseError
+        A copy is asked to move otherwise than the node that it is a copy of.
+    """
+    asked = np.zeros_like(mesh.points)
+    asked[moved.nodes] = moved.vectors
+    follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
+    gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
+    gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
+    if gap.max(initial=0.0) > AGREE * mesh.extent:
+        k = int(np.argmax(gap))
+        raise CaseError(
+            f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "
+            f"{halo.donors[k]}, whose copy it is by the mesh's halo, by {gap[k]:.3g}; a boundary "
+            "that moves must move alike on both periodic sides"
+        )
+    asked[halo.receivers] = follows
+    with_copies = np.union1d(moved.nodes, halo.receivers[np.isin(halo.donors, moved.nodes)])
+    nodes = np.setdiff1d(with_copies, halo.outer)
+    return replace(moved, nodes=nodes, vectors=asked[nodes])
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:

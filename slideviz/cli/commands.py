@@ -66,6 +66,10 @@ def info(arguments: argparse.Namespace) -> int:
     print("  " + ", ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, (low, high) in extents))
     if report["unused_points"]:
         print(f"  {report['unused_points']} points belong to no cell")
+    if mesh.halo is not None:
+        print(f"  {mesh.halo.describe()}; they follow the cells that they are copies of")
+    for remark in mesh.remarks:
+        print(f"  {remark}")
     print("markers:" if mesh.markers else "no markers")
     if mesh.markers:
         print(table([(m["name"], m["elements"], "elements") for m in report["markers"]]))

@@ -16,7 +16,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
-from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.mesh.quality import Quality
 from slideviz.staircase import Step, folded_at
 
 LISTED = 100
@@ -71,7 +71,7 @@ def run_report(
 
 def inverted_cells(quality: Quality) -> list[int]:
     """Return the ids of the first ``LISTED`` inverted cells."""
-    return [int(i) for i in np.flatnonzero(quality.status == INVERTED)[:LISTED]]
+    return [int(i) for i in quality.inverted_cells(LISTED)]
 
 
 def quality_report(mesh: Mesh, quality: Quality) -> dict[str, Any]:
@@ -93,6 +93,7 @@ def quality_report(mesh: Mesh, quality: Quality) -> dict[str, Any]:
 def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality) -> dict[str, Any]:
     """Return the JSON object of ``info --json``."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    halo = mesh.halo
     return {
         "mesh": mesh.name,
         "dimension": mesh.dim,
@@ -117,6 +118,14 @@ def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality)
             }
             for pair in pairs
         ],
+        "halo": None
+        if halo is None
+        else {
+            "cells": int(halo.cells.sum()),
+            "nodes": len(halo.outer),
+            "sides": [list(pair) for pair in halo.sides],
+        },
+        "remarks": list(mesh.remarks),
         "quality": quality.summary(),
     }
 
@@ -189,10 +198,12 @@ def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
     rows: list[tuple[object, ...]] = [
         ("minimum quality", quality.min, *beside(before.min)),
         ("mean quality", quality.mean, *beside(before.mean)),
-        ("cells", len(quality)),
+        ("cells", quality.cells),
         ("valid", quality.valid),
         ("inverted", quality.inverted),
     ]
+    if quality.halo is not None:
+        rows.insert(2, ("halo cells, not counted", len(quality) - quality.cells))
     if quality.unproven:
         rows.append(("unproven", quality.unproven))
     return table(rows)

@@ -208,7 +208,7 @@ def _inverted_sentence(mesh: Mesh, found: Quality, report: dict) -> str:
     )
     more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
     return (
-        f"{found.inverted} of {len(found)} cells are inverted: {named}{more}; more STEPS, "
+        f"{found.inverted} of {found.cells} cells are inverted: {named}{more}; more STEPS, "
         f"{_advice(report)} may help"
     )
 

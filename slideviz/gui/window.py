@@ -205,9 +205,12 @@ class MainWindow(QMainWindow):
         self.setWindowTitle(f"{changed}{name.name} – slideviz" if name else "slideviz")
         mesh = session.mesh
         if mesh is not None:
+            halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
             self.mesh_text.setText(
-                f"{mesh.dim}D   {len(mesh.cells):,} cells   {len(mesh.points):,} points "
+                f"{mesh.dim}D   {len(mesh.cells):,} cells{halo}   {len(mesh.points):,} points "
             )
+            words = "" if mesh.halo is None else mesh.halo.describe().capitalize()
+            self.mesh_text.setToolTip(words and f"{words}, which follow what they are copies of")
 
     def show_opened(self, opened: jobs.Opened) -> None:
         """Show a mesh that was just opened."""
@@ -222,7 +225,10 @@ class MainWindow(QMainWindow):
         self.store.put(session)
         if session.reduction_guess:
             log.info("%s", session.reduction_guess)
-        note = f". {session.reduction_guess}" if session.reduction_guess else ""
+        remarks = () if session.mesh is None else session.mesh.remarks
+        for remark in remarks:
+            log.warning("%s", remark)
+        note = "".join(f". {text}" for text in (*remarks, session.reduction_guess) if text)
         self.say(f"Opened {(session.case.source or session.path).name}{note}")
 
     # Jobs ------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
+    from slideviz.mesh.halo import Halo
     from slideviz.mesh.su2 import Document
 
 FloatArray = NDArray[np.float64]
@@ -147,6 +148,10 @@ class Mesh:
         Number of this zone in the file (from 1) and of all its zones.
     source : Path or None
         The file it was read from, which is not overwritten without being asked to.
+    halo : Halo or None
+        Copies of cells beyond the periodic sides, which only follow the cells they copy.
+    remarks : tuple of str
+        What was found odd when reading, a sentence each.
     """
 
     points: FloatArray
@@ -157,6 +162,8 @@ class Mesh:
     zone: int = 1
     zones: int = 1
     source: Path | None = None
+    halo: Halo | None = None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
@@ -176,8 +183,9 @@ class Mesh:
 
     @cached_property
     def extent(self) -> float:
-        """Return the largest extent over the Cartesian axes."""
-        return float(np.ptp(self.points, axis=0).max())
+        """Return the largest extent over the Cartesian axes, without the halo."""
+        points = self.points if self.halo is None else np.delete(self.points, self.halo.outer, 0)
+        return float(np.ptp(points, axis=0).max())
 
     @property
     def marker_names(self) -> tuple[str, ...]:

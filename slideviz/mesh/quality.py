@@ -54,6 +54,9 @@ class Quality:
     metric : str
         ``knupp``, or ``rbf-slide``: hexahedra with exponent 1 instead of 2/3 in ``f_skew``, as
         the program of the thesis has it, for comparison with its figures.
+    halo : (m,) bool or None
+        The cells of the halo. They have values like all others, but are copies: numbers of the
+        whole mesh (minimum, mean, counts, histogram, worst cells) leave them out.
     """
 
     values: FloatArray
@@ -62,54 +65,78 @@ class Quality:
     status: NDArray[np.uint8]
     signs: NDArray[np.int8]
     metric: Metric
+    halo: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.values)
 
+    @property
+    def counted(self) -> NDArray[np.bool_] | slice:
+        """Return which cells the numbers of the whole mesh are of: an index of the values."""
+        return slice(None) if self.halo is None else ~self.halo
+
+    @cached_property
+    def cells(self) -> int:
+        """Return the number of cells, without those of the halo."""
+        return len(self.values[self.counted])
+
     @cached_property
     def min(self) -> float:
         """Return the lowest value."""
-        return float(self.values.min())
+        return float(self.values[self.counted].min())
 
     @cached_property
     def mean(self) -> float:
         """Return the arithmetic mean of the values."""
-        return float(self.values.mean())
+        return float(self.values[self.counted].mean())
 
     @cached_property
     def inverted(self) -> int:
         """Return the number of inverted cells."""
-        return int(np.count_nonzero(self.status == INVERTED))
+        return self._with(INVERTED)
 
     @property
     def unproven(self) -> int:
         """Return the number of cells that are neither proved valid nor found inverted."""
-        return int(np.count_nonzero(self.status == UNPROVEN))
+        return self._with(UNPROVEN)
 
     @property
     def valid(self) -> int:
         """Return the number of cells that are proved valid."""
-        return int(np.count_nonzero(self.status == VALID))
+        return self._with(VALID)
+
+    def _with(self, status: int) -> int:
+        return int(np.count_nonzero(self.status[self.counted] == status))
 
     def worst(self, n: int) -> IntArray:
         """Return the ids of the ``n`` cells of lowest value, worst first, ties by id."""
-        return np.argsort(self.values, kind="stable")[: max(n, 0)]
+        ids = np.arange(len(self))[self.counted]
+        return ids[np.argsort(self.values[ids], kind="stable")[: max(n, 0)]]
+
+    def inverted_cells(self, n: int) -> IntArray:
+        """Return the ids of the first ``n`` inverted cells."""
+        ids = np.arange(len(self))[self.counted]
+        return ids[self.status[ids] == INVERTED][:n]
 
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
         """Return the counts (bins,) and the edges (bins + 1,) of equal bins over 0 to 1."""
-        counts, edges = np.histogram(self.values, bins, range=(0.0, 1.0))
+        counts, edges = np.histogram(self.values[self.counted], bins, range=(0.0, 1.0))
         return counts.astype(np.int64), edges
 
-    def summary(self) -> dict[str, float | int]:
+    def summary(self) -> dict[str, object]:
         """Return the numbers for a report, as plain Python values."""
-        return {
+        numbers: dict[str, object] = {
             "min": self.min,
             "mean": self.mean,
             "inverted": self.inverted,
             "unproven": self.unproven,
             "valid": self.valid,
-            "cells": len(self),
+            "cells": self.cells,
         }
+        if self.halo is not None:
+            beyond = int(np.count_nonzero(self.status[self.halo] == INVERTED))
+            numbers["halo"] = {"cells": len(self) - self.cells, "inverted": beyond}
+        return numbers
 
 
 def quality(
@@ -169,6 +196,7 @@ def quality(
         frozen_array(status, np.uint8),
         frozen_array(signs, np.int8),
         metric,
+        None if mesh.halo is None else mesh.halo.cells,
     )
 
 

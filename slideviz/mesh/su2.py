@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 from slideviz.mesh.check import printable
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.mesh.su2_halo import find_halo
 from slideviz.mesh.su2_numbers import parse_cells, parse_points
 from slideviz.mesh.su2_scan import Lines, Progress, scan
 from slideviz.mesh.su2_sections import find_bounds, find_sections
@@ -90,10 +91,10 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
         cells=cells,
         markers=markers,
         zone=_bytes(lines, ((found.bounds.begin, found.bounds.end),))[0],
-        sends=_bytes(lines, found.sends),
-        kept=_bytes(lines, found.kept),
+        sends=_bytes(lines, tuple((part.begin, part.end) for part in found.sends)),
+        kept=_bytes(lines, tuple((part.line, part.stop) for part in found.kept)),
     )
-    return Mesh(
+    mesh = Mesh(
         points=points,
         cells=cells,
         markers=markers,
@@ -103,6 +104,8 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
         zones=found.bounds.zones,
         source=path.resolve(),
     )
+    halo, remarks = find_halo(lines, found, mesh)
+    return replace(mesh, halo=halo, remarks=remarks)
 
 
 def _bytes(lines: Lines, ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:

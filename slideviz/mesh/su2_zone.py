@@ -1,7 +1,7 @@
 """The parts of one zone of an SU2 file, by their lines, counted and checked.
 
-Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers of
-partitioned files are only located, so that writing can keep them.
+Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers are
+only located, so that writing can keep them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from slideviz.mesh.su2_scan import Lines, show
 from slideviz.mesh.su2_sections import KNOWN, Bounds, Section, count_of
 
 SEND_RECEIVE = "SEND_RECEIVE"
-Ranges = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +22,16 @@ class MarkerRows:
 
     name: str
     line: int
+    rows: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SendRows:
+    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, ``SEND_TO`` and its rows (r,)."""
+
+    begin: int
+    end: int
+    domain: bytes
     rows: IntArray
 
 
@@ -40,8 +49,10 @@ class Zone:
         The lines of the elements and of the points.
     markers : tuple of MarkerRows
         The boundaries.
-    sends, kept : tuple of (int, int)
-        First line and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
+    sends : tuple of SendRows
+        The ``SEND_RECEIVE`` markers, which tie the nodes of a halo.
+    kept : tuple of Section
+        The unknown sections.
     """
 
     bounds: Bounds
@@ -49,8 +60,8 @@ class Zone:
     elements: IntArray
     points: IntArray
     markers: tuple[MarkerRows, ...]
-    sends: Ranges
-    kept: Ranges
+    sends: tuple[SendRows, ...]
+    kept: tuple[Section, ...]
 
 
 def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
@@ -117,8 +128,10 @@ class _Walk:
             )
         return found[0]
 
-    def _walk(self) -> tuple[tuple[MarkerRows, ...], Ranges, Ranges]:
-        """Return the boundaries, and the bounds of SEND_RECEIVE and of unknown sections."""
+    def _walk(
+        self,
+    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[Section, ...]]:
+        """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
         markers, sends, kept = [], [], []
         at = 0
         while at < len(self.sections):
@@ -126,10 +139,10 @@ class _Walk:
             at += 1
             if section.key == "MARKER_TAG":
                 name = self._name(section)
-                head, at = self._marker_head(section, at, name == SEND_RECEIVE)
+                head, domain, at = self._marker_head(section, at, name == SEND_RECEIVE)
                 rows = self.rows.counted(head, f"elements of marker {name}")
                 if name == SEND_RECEIVE:
-                    sends.append((section.line, head.stop))
+                    sends.append(SendRows(section.line, head.stop, domain, rows))
                 else:
                     markers.append(MarkerRows(name, section.line, rows))
             elif section.key == "MARKER_ELEMS":
@@ -137,11 +150,11 @@ class _Walk:
                     section.line, "MARKER_ELEMS= has no MARKER_TAG= before it; name the marker"
                 )
             elif section.key not in KNOWN:
-                kept.append((section.line, section.stop))
+                kept.append(section)
         return tuple(markers), tuple(sends), tuple(kept)
 
-    def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, int]:
-        """Return the MARKER_ELEMS section of a marker, and the place after it."""
+    def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, bytes, int]:
+        """Return the MARKER_ELEMS section of a marker, SEND_TO, and the place after them."""
         self.rows.none(tag)
         following = self.sections[at] if at < len(self.sections) else None
         if following is None or following.key != "MARKER_ELEMS":
@@ -150,14 +163,14 @@ class _Walk:
                 f"marker {show(tag.value)} is not followed by MARKER_ELEMS=; add it with the "
                 "number of elements",
             )
-        at += 1
+        at, domain = at + 1, b""
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
             # The elements stand after this line, which belongs to the marker.
             self.rows.none(following)
-            stop = self.sections[at].stop
-            following = Section(following.key, following.value, self.sections[at].line, stop)
-            at += 1
-        return following, at
+            head = self.sections[at]
+            following = Section(following.key, following.value, head.line, head.stop)
+            at, domain = at + 1, head.value
+        return following, domain, at
 
     def _name(self, section: Section) -> str:
         try:

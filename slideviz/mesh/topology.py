@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.rows import row_groups
 
@@ -82,13 +83,14 @@ class Fans:
 
 
 def find_boundary(mesh: Mesh) -> Boundary:
-    """Return the oriented boundary of a mesh.
+    """Return the oriented boundary of a mesh, without that of its halo.
 
     Raises
     ------
     MeshError
         A marker element is no side of any cell.
     """
+    mesh, ids = without_halo(mesh)
     width = 2 if mesh.dim == 2 else 4
     tables, owners = [np.empty((0, width), np.int64)], [np.empty(0, np.int64)]
     for index, marker in enumerate(mesh.markers):
@@ -103,7 +105,7 @@ def find_boundary(mesh: Mesh) -> Boundary:
         frozen_array(facets, np.int64),
         frozen_array(marker_of, np.int64),
         mesh.marker_names,
-        frozen_array(owner, np.int64),
+        frozen_array(ids[owner], np.int64),
         frozen_array(joints, np.int64),
         frozen_array(joint_nodes, np.int64),
     )

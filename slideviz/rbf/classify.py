@@ -40,6 +40,8 @@ class Classes:
         The fans whose normals add up to each cluster's.
     total : int
         Number of all nodes of the mesh.
+    beyond : int
+        Number of those that lie beyond its sides (in a halo), and are counted nowhere.
     """
 
     moving: IntArray
@@ -50,6 +52,7 @@ class Classes:
     row_fan: IntArray
     row_cluster: IntArray
     total: int
+    beyond: int = 0
 
     @property
     def sliding(self) -> IntArray:
@@ -64,7 +67,7 @@ class Classes:
             "sliding_edge": len(self.edge),
             "sliding_surface": len(self.surface),
         }
-        return {**known, "internal": self.total - sum(known.values())}
+        return {**known, "internal": self.total - self.beyond - sum(known.values())}
 
 
 def classify(

@@ -119,9 +119,11 @@ def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = W
     """
     frame, what = frames[at], measure(what)
     values = frame.values(what)
-    count = min(count, len(values))
-    limit = np.partition(values, count - 1)[count - 1]
+    count = min(count, frame.quality.cells)
+    limit = np.partition(values[frame.quality.counted], count - 1)[count - 1]
     near = np.flatnonzero(values <= limit)
+    if frame.quality.halo is not None:
+        near = near[~frame.quality.halo[near]]
     cells = near[np.argsort(values[near], kind="stable")[:count]]
     history = np.stack([each.values(what)[cells] for each in frames])
     types = frame.mesh.cells.types[cells]
@@ -167,7 +169,8 @@ def cell_info(frame: Frame, cell: int) -> CellInfo:
     status = quality.status[cell]
     return CellInfo(
         cell,
-        ELEMENTS[int(mesh.cells.types[cell])].name,
+        ELEMENTS[int(mesh.cells.types[cell])].name
+        + (" of the halo" if quality.halo is not None and quality.halo[cell] else ""),
         {INVERTED: "inverted", UNPROVEN: "unproven"}.get(int(status), "valid"),
         float(quality.values[cell]),
         float(quality.size[cell]),

@@ -129,15 +129,13 @@ def _seconds(axes: Axes, lines: Sequence[Line]) -> None:
 
 def _histogram(every: Sequence[Line]) -> _Draw:
     """Return what draws some of the lines, with the intervals that suit all."""
-    good = [result_of(line).quality.values[~_inverted(line)] for line in every]
+    good = [_values(line)[~_inverted(line)] for line in every]
     values = np.concatenate([*good, [1.0]])
     edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
 
     def draw(axes: Axes, lines: Sequence[Line]) -> None:
         runs = [
-            plots.QualityRun(
-                line.label, result_of(line).quality.values, _inverted(line), line.series
-            )
+            plots.QualityRun(line.label, _values(line), _inverted(line), line.series)
             for line in lines
         ]
         # Logarithmic: few bad cells matter among many good ones.
@@ -147,7 +145,13 @@ def _histogram(every: Sequence[Line]) -> _Draw:
 
 
 def _inverted(line: Line) -> np.ndarray:
-    return np.asarray(result_of(line).quality.status == INVERTED)
+    found = result_of(line).quality
+    return np.asarray(found.status[found.counted] == INVERTED)
+
+
+def _values(line: Line) -> np.ndarray:
+    found = result_of(line).quality
+    return found.values[found.counted]
 
 
 def _by_step(axes: Axes, lines: Sequence[Line]) -> None:

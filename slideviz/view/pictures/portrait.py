@@ -110,7 +110,7 @@ def caption(name: str, found: Quality, colour_by: ColourBy = "size_skew") -> str
     what = "" if colour_by == "size_skew" else "size-skew "
     text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
-        text += f", {found.inverted} of {len(found)} cells inverted"
+        text += f", {found.inverted} of {found.cells} cells inverted"
     return text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.view.drawing.actors import shown_values
 from slideviz.view.plots.series import Distribution
 from slideviz.view.session.state import ColourBy, Frame
@@ -21,13 +21,18 @@ def distribution(
 ) -> Distribution:
     """Return the counts of the cells of a frame in `BINS` equal intervals between limits."""
     edges = np.linspace(*limits, BINS + 1)
-    return Distribution.of(shown_values(frame, what, undeformed), edges)
+    return Distribution.of(_values(frame, what, undeformed), edges)
 
 
 def spread(
     frame: Frame, what: ColourBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
-    values = shown_values(frame, what, undeformed)
+    values = _values(frame, what, undeformed)
     right = values[np.isfinite(values)]
     return (float(right.min()), float(right.max())) if len(right) else None
+
+
+def _values(frame: Frame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
+    """Return the values of the cells of a frame without those of a halo."""
+    return np.asarray(shown_values(frame, what, undeformed)[frame.quality.counted])

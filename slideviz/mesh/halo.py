@@ -1,0 +1,193 @@
+"""Halo layers: copies of cells beyond the periodic sides of a mesh (``SEND_RECEIVE`` in SU2).
+
+Older SU2 meshes repeat the layer of cells at one periodic side beyond the other. A *receiver* is a
+node that is a copy of its *donor*, moved by the period. Receivers on a periodic side belong to the
+domain as images of the other side's nodes; those beyond it (*outer* receivers) only to the halo,
+with every cell and every element of a boundary that has one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+
+FITS = 1e-5
+"""Largest mismatch of a receiver and its donor's image, as a part of the mesh's extent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A rigid motion ``x -> rotation x + shift``: rotation (d, d) and shift (d,)."""
+
+    rotation: FloatArray
+    shift: FloatArray
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the moved points (k, d)."""
+        return points @ self.rotation.T + self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class Halo:
+    """Which nodes of a mesh are copies of which others, and which lie beyond its sides.
+
+    Attributes
+    ----------
+    receivers, donors : (h,) int64
+        Each copy, and the node that it is a copy of, which is none itself.
+    rotations : (h, d, d) float64
+        What turns a displacement of the donor into the receiver's.
+    outer : (o,) int64
+        The receivers that belong to no cell of the domain, sorted.
+    cells : (m,) bool
+        The cells of the halo: those with an outer receiver.
+    sides : tuple of (str, str)
+        Boundaries of the domain that are copies of another one, and that other.
+    """
+
+    receivers: IntArray
+    donors: IntArray
+    rotations: FloatArray
+    outer: IntArray
+    cells: NDArray[np.bool_]
+    sides: tuple[tuple[str, str], ...]
+
+    def follow(self, before: FloatArray, after: FloatArray) -> FloatArray:
+        """Return points (n, d) whose receivers have moved exactly as their donors did.
+
+        Parameters
+        ----------
+        before, after : (n, d)
+            Undeformed points, at which the halo is in place, and deformed ones.
+        """
+        moved = np.einsum("hij,hj->hi", self.rotations, (after - before)[self.donors])
+        out = np.array(after)
+        start = before[self.receivers]
+        # Adding zero would turn -0.0 into 0.0: copies of nodes at rest keep every bit.
+        out[self.receivers] = np.where(moved == 0, start, start + moved)
+        return out
+
+    def of_nodes(self, count: int) -> NDArray[np.bool_]:
+        """Return a mask (count,) of the nodes that lie beyond the sides of the domain."""
+        mask = np.zeros(count, bool)
+        mask[self.outer] = True
+        return mask
+
+    def describe(self) -> str:
+        """Return the size of the halo in words."""
+        return (
+            f"a halo of {np.count_nonzero(self.cells)} cells and {len(self.outer)} nodes beyond "
+            "the periodic sides"
+        )
+
+
+def make_halo(
+    mesh: Mesh, receivers: IntArray, donors: IntArray, turns: Sequence[Turn], which: IntArray
+) -> Halo:
+    """Return the halo of a mesh.
+
+    Parameters
+    ----------
+    receivers, donors : (h,)
+        Each receiver once; donors may be receivers of another side (a mesh with two periods).
+    turns, which
+        The motions from donors to receivers, and the one of each pair, (h,).
+    """
+    rotations = np.stack([turn.rotation for turn in turns])[which]
+    sides = _sides(mesh, receivers, donors)
+    inner = [mesh.marker(copy).nodes for copy, _ in sides]
+    outer = np.setdiff1d(receivers, np.concatenate([*inner, np.empty(0, np.int64)]))
+    beyond = np.zeros(len(mesh.points), bool)
+    beyond[outer] = True
+    donors, rotations = _rooted(len(mesh.points), receivers, donors, rotations)
+    return Halo(
+        frozen_array(receivers, np.int64),
+        frozen_array(donors, np.int64),
+        frozen_array(rotations, np.float64),
+        frozen_array(outer, np.int64),
+        frozen_array(_touching(mesh.cells, beyond), bool),
+        sides,
+    )
+
+
+def _rooted(
+    count: int, receivers: IntArray, donors: IntArray, rotations: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """Return donors that are no receivers, and the rotations of the whole way from them."""
+    row = np.full(count, -1)
+    row[receivers] = np.arange(len(receivers))
+    donors, rotations = donors.copy(), rotations.copy()
+    for _ in range(3):  # as many as there are periods at most
+        copied = np.flatnonzero(row[donors] >= 0)
+        via = row[donors[copied]]
+        rotations[copied] = rotations[copied] @ rotations[via]
+        donors[copied] = donors[via]
+    return donors, rotations
+
+
+def _sides(mesh: Mesh, receivers: IntArray, donors: IntArray) -> tuple[tuple[str, str], ...]:
+    """Return the boundaries whose elements are copies of those of another, and that other.
+
+    The elements of inflow and outflow within the halo are copies of others of the same boundary.
+    """
+    donor = np.arange(len(mesh.points))
+    donor[receivers] = donors
+    copied = np.zeros(len(mesh.points), bool)
+    copied[receivers] = True
+    marker_of: dict[tuple[int, ...], str] = {}
+    for marker in mesh.markers:
+        for _, nodes in marker.cells.by_type.values():
+            marker_of |= {tuple(row): marker.name for row in np.sort(nodes, axis=1).tolist()}
+    found = []
+    for marker in mesh.markers:
+        if not copied[marker.nodes].all():
+            continue
+        for _, nodes in marker.cells.by_type.values():
+            origins = np.sort(donor[nodes], axis=1).tolist()
+            found += [(marker.name, marker_of.get(tuple(row), marker.name)) for row in origins]
+    return tuple(dict.fromkeys(pair for pair in found if pair[0] != pair[1]))
+
+
+def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which cells (m,) have one of the nodes (n,)."""
+    mask = np.zeros(len(cells), bool)
+    for ids, table in cells.by_type.values():
+        mask[ids] = nodes[table].any(axis=1)
+    return mask
+
+
+def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray]:
+    """Return the domain alone, all points kept in their places, and its cells' ids (k,)."""
+    halo = mesh.halo
+    if halo is None:
+        return mesh, np.arange(len(mesh.cells))
+    beyond = halo.of_nodes(len(mesh.points))
+    markers = tuple(
+        Marker(marker.name, _taken(marker.cells, ~_touching(marker.cells, beyond)))
+        for marker in mesh.markers
+    )
+    domain = Mesh(
+        mesh.points, _taken(mesh.cells, ~halo.cells), markers, name=mesh.name, source=mesh.source
+    )
+    return domain, np.flatnonzero(~halo.cells)
+
+
+def _taken(cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
+    """Return the chosen cells, in their order."""
+    size = np.diff(cells.offsets)
+    return Cells.from_types(cells.types[chosen], cells.connectivity[np.repeat(chosen, size)])
+
+
+def fit_turn(before: FloatArray, after: FloatArray) -> Turn:
+    """Return the rigid motion that brings points (k, d) nearest to others (Kabsch 1976)."""
+    here, there = before.mean(axis=0), after.mean(axis=0)
+    u, _, vt = np.linalg.svd((before - here).T @ (after - there))
+    flip = np.ones(before.shape[1])
+    flip[-1] = np.sign(np.linalg.det(vt.T @ u.T)) or 1.0
+    rotation = vt.T @ np.diag(flip) @ u.T
+    return Turn(rotation, there - rotation @ here)
