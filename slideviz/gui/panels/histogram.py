@@ -136,7 +136,8 @@ class HistogramPanel(QWidget):
             return
         self._told = session.frame
         what = shown_measure(session)
-        plain = session.frame.values(what, session.mesh)
+        counted = session.frame.quality.counted
+        plain = session.frame.values(what, session.mesh)[counted]
         bad = session.frame.quality.inverted
         low = "highest" if what == "displacement" else "min"
         # Of a node: the values of cells are means of theirs.
@@ -151,7 +152,7 @@ class HistogramPanel(QWidget):
         threshold = session.view.threshold
         self.range_text.setVisible(threshold is not None)
         if threshold is not None:
-            values = shown_values(session.frame, what, session.mesh)
+            values = shown_values(session.frame, what, session.mesh)[counted]
             count = len(chosen_cells(values, threshold))
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"
