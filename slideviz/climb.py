@@ -13,7 +13,9 @@ from slideviz.errors import DeformError, Note
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
+from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
+from slideviz.rbf.rows import AGREE
 
 HALVINGS = 3
 """How often a step that folds a cell is halved."""
@@ -89,6 +91,9 @@ class Step:
         The numbers of steps tried by STEPS= auto, in the last step of the run.
     control : (c,) int64
         The control nodes of this step; empty where a method has none.
+    periodic_misfit : float or None
+        Largest difference of the displacements of periodic images so far, in the mesh's length
+        unit: rounding, for more is an error. None where images need not move alike.
     """
 
     index: int
@@ -103,6 +108,7 @@ class Step:
     history: tuple[Cycle, ...] = ()
     tried: tuple[Trial, ...] = ()
     control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    periodic_misfit: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +188,7 @@ class Climb:
         watch: Watch,
         warnings: list[str],
     ) -> Step:
+        plan = self.plan
         return Step(
             index,
             total,
@@ -189,11 +196,12 @@ class Climb:
             solution.control_nodes,
             solution.max_error,
             solution.condition,
-            self.plan.classes.counts(),
+            plan.classes.counts(),
             watch.seconds,
             tuple(warnings),
             solution.history,
             control=solution.control,
+            periodic_misfit=largest_misfit(plan.frame, plan.coords, points, plan.images),
         )
 
 
@@ -211,15 +219,21 @@ def _step(
     watch: Watch,
     before: Solution | None,
 ) -> Solution:
-    """Return the displacement of all nodes from ``coords`` to the next step."""
+    """Return the displacement of all nodes from ``coords`` to the next step.
+
+    Of periodic images only the one that stands for them is in the problem, and it is copied to
+    the others.
+    """
+    once = plan.once(plan.known)
+    known, classes = plan.known[once], plan.classes
     normal_nodes, normals = plan.constraints(coords)
     problem = Problem(
         basis=plan.basis,
         features=plan.frame.features(coords),
-        known=plan.known,
-        values=goal - coords[plan.known],
-        edge=plan.classes.edge,
-        surface=plan.classes.surface,
+        known=known,
+        values=goal[once] - coords[known],
+        edge=classes.edge[plan.once(classes.edge)],
+        surface=classes.surface[plan.once(classes.surface)],
         normal_nodes=normal_nodes,
         normals=normals,
         same_as=plan.same_as,
@@ -231,16 +245,14 @@ def _step(
         reduction=plan.reduction,
         before=before,
     )
-    return plan.solve(problem, watch)
+    found = plan.solve(problem, watch)
+    return replace(found, displacement=found.displacement[classes.stands])
 
 
 def _moved(
     plan: Plan, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the new coordinates; images move alike, and known nodes are where they must be."""
-    if plan.periodic_displacement and len(plan.images):
-        first, second = plan.images.T
-        displacement[second] = displacement[first]
+    """Return the new coordinates; known nodes are where they must be."""
     displacement[plan.axis, :2] = 0.0
     # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
     moved = np.where(displacement == 0, coords, coords + displacement)
@@ -276,6 +288,8 @@ def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
     sentence = (
         f"from step {index} on, {len(solution.dropped)} boundary nodes that nearly coincide with "
         f"others (first: node {node} at {where}) are no control nodes; they still get exactly "
-        "their displacement, so this does no harm"
+        f"their displacement, from which the interpolation is off by {solution.dropped_error:.2g} "
+        "at most, and the cells beside them take that up"
     )
-    return [Note(sentence)]
+    harmless = solution.dropped_error <= AGREE * mesh.extent
+    return [Note(sentence) if harmless else sentence]

@@ -18,7 +18,8 @@ from slideviz.case.check import idle_settings
 from slideviz.case.clash import clash, jump
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import AGREE, displacements, require_valid
+from slideviz.case.motion import AGREE as SAME
+from slideviz.case.motion import displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.halo import Halo, without_halo
@@ -27,16 +28,14 @@ from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
-from slideviz.rbf.classify import Classes, classify, directions
+from slideviz.rbf.classify import Classes, classify, directions, fan_roles
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.images import COINCIDENT, find_images, require_free, spread
 from slideviz.rbf.methods import METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
-
-COINCIDENT = 1e-12
-"""Nodes nearer than this part of the mesh's extent are one control node."""
-
+from slideviz.rbf.rows import AGREE
 
 REACH = 1.5
 """How far surfaces are continued at moving boundaries, in largest displacements."""
@@ -60,9 +59,7 @@ class Plan:
     same_as : (n,) int64
         The node that stands for all that coincide with it.
     images : (p, 2) int64
-        Nodes of the periodic markers and their images.
-    periodic_displacement : bool
-        Whether images move alike (PERIODIC_MODE= fixed or moving).
+        Nodes that stand for their periodic images, and these: they move alike.
     reduction : Reduction or None
         Settings of the greedy selection; None: all candidates are control nodes.
     axis : (n,) bool
@@ -87,7 +84,6 @@ class Plan:
     target: FloatArray
     same_as: IntArray
     images: IntArray
-    periodic_displacement: bool
     reduction: Reduction | None
     axis: np.ndarray
     held: IntArray
@@ -99,21 +95,23 @@ class Plan:
     halo: Halo | None
     warnings: tuple[str, ...]
 
+    def once(self, nodes: IntArray) -> np.ndarray:
+        """Tell which nodes stand for themselves and all their periodic images."""
+        return np.asarray(self.classes.stands[nodes] == nodes)
+
     def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return nodes (q,) and unit normals (q, d) of the sliding nodes at these positions.
 
-        On flat boundaries the undeformed normals are kept, so that they stay flat to the bit.
+        Of periodic images only the one that stands for them is there. On flat boundaries the
+        undeformed normals are kept, so that they stay flat to the bit.
         """
         at = coords if self.tracks.curved else self.coords
-        partner = {int(a): int(b) for a, b in self.images if a != b}
-        partner |= {b: a for a, b in partner.items()}
         corners = corners_of(at, self.boundary.facets, self.axis)
         nodes, normals = directions(
-            self.classes,
-            fan_normals(self.boundary, self.fans, at, corners),
-            partner if self.periodic_displacement else None,
+            self.classes, fan_normals(self.boundary, self.fans, at, corners)
         )
-        return hold_on_axis(nodes, normals, self.axis)[:2]
+        once = self.once(nodes)
+        return hold_on_axis(nodes[once], normals[once], self.axis)[:2]
 
     def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
         """Return the displacements (m, d) of nodes brought back on their boundary.
@@ -158,26 +156,16 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     asked, (case, notes) = case, _roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
-    domain = without_halo(mesh)[0]
-    beyond = mesh.halo.outer if mesh.halo is not None else np.empty(0, np.int64)
-    pairs = _pairs(case, domain)
-    frame = make_frame(
-        np.delete(mesh.points, beyond, axis=0), pairs, periodic_distance=case.periodic != "none"
-    )
-    classes = classify(
-        boundary,
-        fans,
-        mesh.points,
-        case.roles,
-        (case.sliding, case.periodic),
-        case.feature_angle_deg,
-    )
-    classes = replace(classes, beyond=len(beyond))
+    pairs, frame, stands = find_period(case, mesh, boundary)
+    beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
     coords = frame.coords(mesh.points)
     free = case.periodic in ("fixed", "moving")
+    classes = find_classes(case, mesh, (boundary, fans), frame, stands)
+    classes = replace(classes, beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    known, target, warnings = _prescribed(asked, mesh, frame, classes)
+    moved = _displaced(asked, mesh)
+    known, target, warnings = _prescribed(case, mesh, frame, (boundary, fans, classes), moved)
     tracks = find_tracks(
         boundary,
         fans,
@@ -186,11 +174,8 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
         reach=REACH * float(np.linalg.norm(target, axis=1).max(initial=0.0)),
     )
-    images = (
-        np.concatenate([pair.nodes for pair in pairs])
-        if pairs and case.periodic != "none"
-        else np.empty((0, 2), np.int64)
-    )
+    second = np.flatnonzero(stands != np.arange(len(stands)))
+    images = np.stack([stands[second], second], axis=1)
     return Plan(
         frame=frame,
         basis=Basis(
@@ -204,7 +189,6 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         target=target,
         same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
-        periodic_displacement=free,
         reduction=_reduction(case, mesh.extent),
         axis=axis,
         held=hold_on_axis(*directions(classes, normals), axis)[2],
@@ -212,7 +196,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         fans=fans,
         tracks=tracks,
         pairs=pairs,
-        solve=_method(case, domain, frame, axis),
+        solve=_method(case, without_halo(mesh)[0], frame, axis),
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes, *warnings, *idle_settings(case)),
     )
@@ -241,6 +225,25 @@ def _require_finite(mesh: Mesh) -> None:
         )
 
 
+def find_period(
+    case: Case, mesh: Mesh, boundary: Boundary
+) -> tuple[tuple[Pair, ...], Frame, IntArray]:
+    """Return the periodic pairs, the frame, and which of its images stands for each node (n,).
+
+    Raises
+    ------
+    MeshError
+        Periodic markers do not match.
+    """
+    pairs = _pairs(case, without_halo(mesh)[0])
+    alike = case.periodic != "none"
+    inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
+    frame = make_frame(inside, pairs, periodic_distance=alike)
+    coords = frame.coords(mesh.points)
+    stands = find_images(pairs if alike else (), frame, coords, boundary.nodes, mesh.extent)
+    return pairs, frame, stands
+
+
 def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
     """Return the periodic pairs; none are looked for when periodicity is not asked for.
 
@@ -253,26 +256,52 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
     return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
 
 
+def find_classes(
+    case: Case, mesh: Mesh, surfaces: tuple[Boundary, Fans], frame: Frame, stands: IntArray
+) -> Classes:
+    """Return the classes of all nodes, given which of its images stands for each (n,)."""
+    boundary, fans = surfaces
+    normals = fan_normals(boundary, fans, mesh.points)
+    return classify(
+        fans,
+        fan_roles(boundary, fans, case.roles),
+        frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
+        stands,
+        (case.sliding, case.periodic),
+        case.feature_angle_deg,
+    )
+
+
 def _prescribed(
-    case: Case, mesh: Mesh, frame: Frame, classes: Classes
+    case: Case,
+    mesh: Mesh,
+    frame: Frame,
+    surfaces: tuple[Boundary, Fans, Classes],
+    moved: Displacements,
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
     """Return the known nodes, their displacement in the frame, and warnings."""
-    moved = displacements(case, mesh)
-    if mesh.halo is not None:
-        moved = _of_domain(mesh, mesh.halo, moved)
     problem = clash(case, mesh, moved.nodes, moved.vectors)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
     remark = jump(case, mesh, moved.nodes, moved.vectors)
+    boundary, fans, classes = surfaces
     known = np.concatenate([classes.moving, classes.fixed])
     if not len(known):
         raise DeformError(
             f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
         )
-    target = np.zeros((len(known), mesh.dim))
-    row = np.searchsorted(classes.moving, moved.nodes)
-    target[row] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    return known, target, (*moved.warnings, *((remark,) if remark else ()))
+    values = np.zeros(mesh.points.shape)
+    values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
+    allowed = AGREE * case.influence_factor * mesh.extent
+    values, source = spread(values, moved.nodes, classes.stands, allowed)
+    follow = np.setdiff1d(classes.moving, moved.nodes)
+    if len(follow):
+        alone = find_classes(case, mesh, (boundary, fans), frame, np.arange(len(values)))
+        coords = frame.coords(mesh.points)
+        corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
+        normals = fan_normals(boundary, fans, coords, corners)
+        require_free(values, source, follow, (alone, normals), allowed)
+    return known, values[known], (*moved.warnings, *((remark,) if remark else ()))
 
 
 def _roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
@@ -289,20 +318,23 @@ def _roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
     return case.change(roles=roles), tuple(notes)
 
 
-def _of_domain(mesh: Mesh, halo: Halo, moved: Displacements) -> Displacements:
-    """Return the displacements with those of copies in the domain, and none beyond its sides.
+def _displaced(case: Case, mesh: Mesh) -> Displacements:
+    """Return what moving nodes are asked for, with copies in the domain, and none beyond its sides.
 
     Raises
     ------
     CaseError
         A copy is asked to move otherwise than the node that it is a copy of.
     """
+    moved, halo = displacements(case, mesh), mesh.halo
+    if halo is None:
+        return moved
     asked = np.zeros_like(mesh.points)
     asked[moved.nodes] = moved.vectors
     follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
     gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
     gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
-    if gap.max(initial=0.0) > AGREE * mesh.extent:
+    if gap.max(initial=0.0) > SAME * mesh.extent:
         k = int(np.argmax(gap))
         raise CaseError(
             f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "

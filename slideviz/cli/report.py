@@ -60,6 +60,10 @@ def run_report(
         "control_nodes": [step.control_nodes for step in steps],
         "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),
+        "periodic_misfit": max(
+            (step.periodic_misfit for step in steps if step.periodic_misfit is not None),
+            default=None,
+        ),
         "seconds": {name: round(value, 6) for name, value in spent.items()},
         "node_counts": dict(last.node_counts),
         "warnings": list(last.warnings),

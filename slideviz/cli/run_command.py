@@ -187,6 +187,8 @@ def _print_run(report: dict, found: tuple[Quality, Quality], files: dict[str, Pa
     print(quality_lines(*found))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
+    if report["periodic_misfit"] is not None:
+        rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))
     parts = {k: v for k, v in spent.items() if k != "total"}
     parts["start and others"] = spent["total"] - sum(parts.values())

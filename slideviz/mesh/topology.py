@@ -100,7 +100,7 @@ def find_boundary(mesh: Mesh) -> Boundary:
     facets, marker_of = np.concatenate(tables), np.concatenate(owners)
     owner = _find_owners(mesh, facets, marker_of)
     facets = _turn_outward(mesh, facets, owner)
-    joints, joint_nodes = _find_joints(facets, mesh.dim)
+    joints, joint_nodes = find_joints(facets, mesh.dim)
     return Boundary(
         frozen_array(facets, np.int64),
         frozen_array(marker_of, np.int64),
@@ -202,7 +202,7 @@ def unit(vectors: FloatArray) -> FloatArray:
     return vectors / np.where(length > 0, length, 1.0)
 
 
-def _find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
+def find_joints(facets: IntArray, dim: int) -> tuple[IntArray, IntArray]:
     """Return pairs of facets that share a node (2D) or an edge (3D), and what they share.
 
     Joints of more than two facets (a thin plate, a non-manifold edge) are left out: nothing is

@@ -3,6 +3,9 @@
 Every boundary node collects the normals of its fans. Their rank decides: 1, it slides on the
 surface (3D) or the curve (2D); 2, it slides along an edge (3D) or is fixed (2D); 3, it is fixed.
 A moving marker wins over a fixed one, and both over all others, at shared nodes.
+
+Periodic images are one node: it has the fans of all of them, is classified once, and what it may
+do holds for each.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import Boundary, Fans, fan_normals, unit
+from slideviz.mesh.topology import Boundary, Fans, unit
 
 MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface
@@ -38,10 +41,10 @@ class Classes:
         The node of each independent normal of a sliding node, sorted.
     row_fan, row_cluster : (p,) int64
         The fans whose normals add up to each cluster's.
-    total : int
-        Number of all nodes of the mesh.
+    stands : (n,) int64
+        For each node of the mesh the one of its periodic images that stands for all of them.
     beyond : int
-        Number of those that lie beyond its sides (in a halo), and are counted nowhere.
+        Number of nodes that lie beyond its sides (in a halo), and are counted nowhere.
     """
 
     moving: IntArray
@@ -51,8 +54,13 @@ class Classes:
     cluster_node: IntArray
     row_fan: IntArray
     row_cluster: IntArray
-    total: int
+    stands: IntArray
     beyond: int = 0
+
+    @property
+    def total(self) -> int:
+        """Return the number of all nodes of the mesh."""
+        return len(self.stands)
 
     @property
     def sliding(self) -> IntArray:
@@ -70,11 +78,17 @@ class Classes:
         return {**known, "internal": self.total - self.beyond - sum(known.values())}
 
 
+def fan_roles(boundary: Boundary, fans: Fans, roles: Mapping[str, str]) -> np.ndarray:
+    """Return the role of each fan's marker, (m,); a marker without a role is fixed."""
+    given = [roles.get(name, "fixed") for name in boundary.names]
+    return np.array(given, object)[fans.fan_marker] if given else np.empty(0, object)
+
+
 def classify(
-    boundary: Boundary,
     fans: Fans,
-    points: FloatArray,
-    roles: Mapping[str, str],
+    fan_role: np.ndarray,
+    normals: FloatArray,
+    stands: IntArray,
     method: tuple[str, str],
     feature_angle_deg: float,
 ) -> Classes:
@@ -82,67 +96,85 @@ def classify(
 
     Parameters
     ----------
-    points : (n, d)
-        Undeformed Cartesian coordinates.
-    roles
-        ``moving``, ``fixed``, ``sliding``, ``periodic`` or ``internal`` by marker name; a marker
-        without a role is fixed.
+    fan_role : (m,)
+        ``moving``, ``fixed``, ``sliding``, ``periodic`` or ``internal``.
+    normals : (m, d)
+        Unit normals of the undeformed fans, with true angles between those of one node and its
+        images (``Frame.turned_back``).
+    stands : (n,)
+        For each node the one of its periodic images that stands for all of them.
     method
         ``(sliding, periodic)``: ``none``, ``ps`` or ``ds``, and ``none``, ``periodic``,
         ``fixed`` or ``moving``.
     """
-    given = [roles.get(name, "fixed") for name in boundary.names]
-    fan_role = np.array(given, object)[fans.fan_marker] if given else np.empty(0, object)
-    effect = _effects(fan_role, fans, *method)
-    total = len(points)
-    moving = _nodes_with(fans, effect == "moving", total)
-    fixed = _nodes_with(fans, effect == "fixed", total) & ~moving
-    active = (effect == "slide") & ~(moving | fixed)[fans.fan_node]
-    normals = fan_normals(boundary, fans, points)
-    merge = np.cos(np.radians(feature_angle_deg * MERGE_FRACTION))
-    rows, extra = _slide_rows(fans, active, fan_role, normals, merge)
+    at = stands[fans.fan_node]
+    effect = _effects(fan_role, at, *method)
+    total = len(stands)
+    moving = _nodes_with(at, effect == "moving", total)
+    fixed = _nodes_with(at, effect == "fixed", total) & ~moving
+    active = (effect == "slide") & ~(moving | fixed)[at]
+    smooth, merge = np.cos(np.radians(feature_angle_deg * np.array([1.0, MERGE_FRACTION])))
+    around = _Around(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
+    rows, extra = _slide_rows(around, active)
     if method[1] == "fixed":
         # Vertices are held: nodes that would be fixed if the periodic markers slid, too.
-        watched = active | ((fan_role == "periodic") & ~(moving | fixed)[fans.fan_node])
-        _, held = _slide_rows(fans, watched, fan_role, normals, merge)
-        touched = _nodes_with(fans, active, total)
+        watched = active | ((fan_role == "periodic") & ~(moving | fixed)[at])
+        _, held = _slide_rows(around, watched)
+        touched = _nodes_with(at, active, total)
         extra = np.concatenate([extra, held[touched[held]]])
     fixed[extra] = True
-    keep = ~fixed[fans.fan_node[rows[:, 0]]]
-    return _collect(moving, fixed, rows[keep], fans, boundary.dim)
+    keep = ~fixed[at[rows[:, 0]]]
+    return _collect((moving[stands], fixed[stands]), rows[keep], at, stands, normals.shape[1])
 
 
-def _effects(fan_role: np.ndarray, fans: Fans, sliding: str, periodic: str) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """All fans: the node each counts for, its own node, role and normal, and two cosines.
+
+    Attributes
+    ----------
+    smooth, merge : float
+        Fans of one role are one surface when their normals differ by less than these angles:
+        the first for those of two periodic images, where the surface goes on beyond the
+        periodic boundary, the second for those of one node.
+    """
+
+    node: IntArray
+    own: IntArray
+    role: np.ndarray
+    normals: FloatArray
+    smooth: float
+    merge: float
+
+
+def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) -> np.ndarray:
     """Return what each fan does to its node: moving, fixed, slide or free."""
     effect = fan_role.copy()
     slide = "fixed" if sliding == "none" else "slide"
     effect[fan_role == "sliding"] = slide
     effect[fan_role == "periodic"] = slide if periodic in ("none", "periodic") else "free"
     # The border of an internal marker is where it meets a marker of another role.
-    count = int(fans.fan_node.max(initial=-1)) + 1
-    other = np.zeros(count, bool)
-    other[fans.fan_node[fan_role != "internal"]] = True
+    other = np.zeros(int(at.max(initial=-1)) + 1, bool)
+    other[at[fan_role != "internal"]] = True
     internal = fan_role == "internal"
-    effect[internal] = np.where(other[fans.fan_node[internal]], slide, "free")
+    effect[internal] = np.where(other[at[internal]], slide, "free")
     return effect
 
 
-def _nodes_with(fans: Fans, chosen: np.ndarray, total: int) -> np.ndarray:
+def _nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:
     """Return a mask (total,) of the nodes of the chosen fans."""
     mask = np.zeros(total, bool)
-    mask[fans.fan_node[chosen]] = True
+    mask[at[chosen]] = True
     return mask
 
 
-def _slide_rows(
-    fans: Fans, active: np.ndarray, fan_role: np.ndarray, normals: FloatArray, merge: float
-) -> tuple[IntArray, IntArray]:
+def _slide_rows(around: _Around, active: np.ndarray) -> tuple[IntArray, IntArray]:
     """Return rows (fan, cluster within its node) of active fans, and the nodes of full rank."""
     chosen = np.flatnonzero(active)
     if not len(chosen):
         return np.empty((0, 2), np.int64), np.empty(0, np.int64)
-    chosen = chosen[np.argsort(fans.fan_node[chosen], kind="stable")]
-    node = fans.fan_node[chosen]
+    chosen = _one_sided(around, chosen)
+    node = around.node[chosen]
     cluster = np.zeros(len(chosen), np.int64)
     full = []
     starts = np.flatnonzero(np.r_[True, node[1:] != node[:-1]])
@@ -150,21 +182,45 @@ def _slide_rows(
         if stop - start == 1:
             continue
         local = chosen[start:stop]
-        labels = _cluster(normals[local], fan_role[local], merge)
-        rank = _rank(normals[local], labels)
+        labels = _cluster(around, local)
+        rank = _rank(around.normals[local], labels)
         # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
         cluster[start:stop] = labels if rank > 1 else 0
-        if rank >= normals.shape[1]:
+        if rank >= around.normals.shape[1]:
             full.append(node[start])
     return np.stack([chosen, cluster], axis=1), np.array(full, np.int64)
 
 
-def _cluster(normals: FloatArray, roles: np.ndarray, merge: float) -> IntArray:
+def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
+    """Return the fans ordered by node, without those that are another's other side.
+
+    A periodic boundary and its image are one surface, seen from both sides: of its two opposite
+    normals that at the node which stands for both is kept.
+    """
+    image = around.own[chosen] != around.node[chosen]
+    chosen = chosen[np.lexsort([chosen, image, around.node[chosen]])]
+    node, own = around.node[chosen], around.own[chosen]
+    first = np.searchsorted(node, node)
+    rows = np.flatnonzero(own != node)
+    drop = np.zeros(len(chosen), bool)
+    # The first fan of the node, then its second and so on, beside all fans of its images.
+    while len(rows):
+        mine = first[rows] < rows
+        rows, other = rows[mine], first[rows[mine]]
+        along = np.einsum("rd,rd->r", around.normals[chosen[rows]], around.normals[chosen[other]])
+        drop[rows] |= (along < -around.merge) & (own[rows] != own[other])
+        first[rows] += 1
+    return chosen[~drop]
+
+
+def _cluster(around: _Around, local: IntArray) -> IntArray:
     """Return labels (m,) that join fans of one role whose normals differ by a small angle."""
+    normals, roles, own = around.normals[local], around.role[local], around.own[local]
     labels = np.arange(len(normals))
     for i in range(1, len(normals)):
         for j in range(i):
-            if roles[i] == roles[j] and normals[i] @ normals[j] > merge:
+            limit = around.merge if own[i] == own[j] else around.smooth
+            if roles[i] == roles[j] and normals[i] @ normals[j] > limit:
                 labels[i] = labels[j]
                 break
     return np.unique(labels, return_inverse=True)[1]
@@ -181,10 +237,20 @@ def _rank(normals: FloatArray, labels: IntArray) -> int:
 
 
 def _collect(
-    moving: np.ndarray, fixed: np.ndarray, rows: IntArray, fans: Fans, dim: int
+    known: tuple[np.ndarray, np.ndarray],
+    rows: IntArray,
+    at: IntArray,
+    stands: IntArray,
+    dim: int,
 ) -> Classes:
-    """Return the classes, with clusters numbered over all sliding nodes."""
-    node = fans.fan_node[rows[:, 0]]
+    """Return the classes, with clusters numbered over all sliding nodes, images included."""
+    order = np.argsort(at[rows[:, 0]], kind="stable")
+    rows = rows[order]
+    # Every image has the rows of the node that stands for it.
+    start, stop = (np.searchsorted(at[rows[:, 0]], stands, side) for side in ("left", "right"))
+    node = np.repeat(np.arange(len(stands)), stop - start)
+    row = np.arange(len(node)) - np.repeat(np.cumsum(stop - start) - stop, stop - start)
+    rows = rows[row]
     order = np.lexsort((rows[:, 1], node))
     rows, node = rows[order], node[order]
     new = np.ones(len(rows), bool)
@@ -193,76 +259,40 @@ def _collect(
     slid, per_node = np.unique(cluster_node, return_counts=True)
     on_surface = (per_node == 1) if dim == 3 else np.zeros(len(slid), bool)
     return Classes(
-        np.flatnonzero(moving),
-        np.flatnonzero(fixed),
+        np.flatnonzero(known[0]),
+        np.flatnonzero(known[1]),
         slid[~on_surface],
         slid[on_surface],
         cluster_node,
         rows[:, 0],
         np.cumsum(new) - 1,
-        len(moving),
+        stands,
     )
 
 
-def directions(
-    classes: Classes, normals: FloatArray, images: Mapping[int, int] | None = None
-) -> tuple[IntArray, FloatArray]:
+def directions(classes: Classes, normals: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the constraints of the sliding nodes: nodes (q,) and unit directions (q, d).
 
-    The directions of one node are orthonormal and span the clusters' normals.
+    The directions of one node are orthonormal and span the clusters' normals. Periodic images
+    have the same ones, of the fans of all of them, because surfaces go on beyond the periodic
+    boundary.
 
     Parameters
     ----------
     normals : (m, d)
         Of all fans, in the working frame.
-    images
-        Periodic partner of each node; partners get the mean of both normals, because the
-        surface goes on beyond the periodic boundary.
     """
     total = np.zeros((len(classes.cluster_node), normals.shape[1]))
     np.add.at(total, classes.row_cluster, normals[classes.row_fan])
     total = unit(total)
     node = classes.cluster_node
-    slid, starts = np.unique(node, return_index=True)
-    stops = np.append(starts, len(node))[1:]
-    size = stops - starts
-    if images:
-        total = _averaged(total, (slid, starts, size), images)
+    _, starts, size = np.unique(node, return_index=True, return_counts=True)
     first = starts[size == 2]
     share = np.einsum("pd,pd->p", total[first + 1], total[first])
     total[first + 1] = unit(total[first + 1] - share[:, None] * total[first])
     keep = np.ones(len(node), bool)
-    for start, stop in zip(starts[size > 2], stops[size > 2], strict=True):
+    for start, count in zip(starts[size > 2], size[size > 2], strict=True):
         # More than two normals of rank 2: the two leading right singular vectors.
-        total[start : start + 2] = np.linalg.svd(total[start:stop])[2][:2]
-        keep[start + 2 : stop] = False
+        total[start : start + 2] = np.linalg.svd(total[start : start + count])[2][:2]
+        keep[start + 2 : start + count] = False
     return node[keep], total[keep]
-
-
-def _averaged(
-    total: FloatArray, spans: tuple[IntArray, IntArray, IntArray], images: Mapping[int, int]
-) -> FloatArray:
-    """Return cluster normals averaged with those of the periodic partner where they are alike.
-
-    Parameters
-    ----------
-    spans
-        Each node, its first row in ``total``, and the number of its rows.
-    """
-    slid, starts, size = spans
-    pairs = np.array([(a, b) for a, b in images.items()], np.int64).reshape(-1, 2)
-    pairs = pairs[np.isin(pairs, slid).all(axis=1)]
-    own, other = np.searchsorted(slid, pairs).T
-    row = starts[own].repeat(size[own])
-    row += np.arange(len(row)) - (np.cumsum(size[own]) - size[own]).repeat(size[own])
-    partner = other.repeat(size[own])
-    most, like = np.full(len(row), 0.5), np.full(len(row), -1)
-    for k in range(int(size.max(initial=0))):
-        at = np.minimum(starts[partner] + k, len(total) - 1)
-        along = np.einsum("rd,rd->r", total[row], total[at])
-        closer = (k < size[partner]) & (along > most)
-        most[closer], like[closer] = along[closer], at[closer]
-    alike = like >= 0
-    out = total.copy()
-    out[row[alike]] += total[like[alike]]
-    return unit(out)

@@ -91,6 +91,21 @@ class Frame:
         step[np.all(vectors == 0, axis=1)] = 0.0
         return step
 
+    def turned_back(self, coords: FloatArray, vectors: FloatArray) -> FloatArray:
+        """Return Cartesian vectors (n, d) of nodes turned about the axis to one angle.
+
+        Those of periodic images become alike; lengths, and angles at one node, are kept.
+        """
+        if self.axis is None:
+            return np.array(vectors, float)
+        local = in_axis_frame(vectors, self.axis)
+        angle = coords[:, 1] / self.radius + self.theta0
+        cos, sin = np.cos(angle), np.sin(angle)
+        radial = cos * local[:, 0] + sin * local[:, 1]
+        local[:, 1] = cos * local[:, 1] - sin * local[:, 0]
+        local[:, 0] = radial
+        return local[:, : self.dim]
+
     def features(self, coords: FloatArray) -> FloatArray:
         """Return the numbers that distances are computed from: (k, n), rows contiguous."""
         if self.cylindrical and self.period:

@@ -144,6 +144,7 @@ def _finish(
         with watch.phase("correct") as tick:
             correct(problem, displacement, nodes, errors, tick)
     displacement[nodes] = values
+    left_out = np.isin(problem.same_as[nodes], fit.dropped)
     return Solution(
         displacement,
         len(fit.found.nodes),
@@ -153,4 +154,5 @@ def _finish(
         fit.history,
         control=fit.found.nodes,
         lag=lag,
+        dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
     )

@@ -85,7 +85,8 @@ class Problem:
     features : (k, n) float64
         Of all nodes, at their current positions.
     known : (a,) int64
-        Nodes whose displacement is given, by ``values`` (a, d).
+        Nodes whose displacement is given, by ``values`` (a, d). Of periodic images, here and
+        below, the one that stands for them.
     edge, surface : (c,), (e,) int64
         Sliding nodes, in the order in which pseudo sliding projects them.
     normal_nodes, normals : (q,) int64, (q, d) float64
@@ -166,6 +167,8 @@ class Solution:
     lag : (n, d) float64 or None
         How much less than the boundary nodes the interpolants of all steps so far have moved
         there; None without data reduction.
+    dropped_error : float
+        Largest misfit of this step at the nodes that the pivot guard left out.
     """
 
     displacement: FloatArray
@@ -177,6 +180,7 @@ class Solution:
     warnings: tuple[str, ...] = ()
     control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     lag: FloatArray | None = None
+    dropped_error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,8 @@
 The exact closest point on the node's own piece, not the thesis's nearest-midpoint iteration
 (section 2.4.3), which approximates it and can cycle for ever. Pieces are taken at the
 undeformed boundary, in the working frame, so an arc about the axis stays an arc, and a slid
-node never leaves its curve or surface however many steps are made.
+node never leaves its curve or surface however many steps are made. With periodic displacement
+they go on beyond the periodic boundaries: on what begins at the other one.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, unit
+from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, find_joints, unit
 from slideviz.rbf.apron import edge_apron, surface_apron
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
@@ -88,7 +89,8 @@ def find_tracks(
     sides = place(boundary.facets)
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
-    labels = _surface_labels(boundary, corner_vectors(sides), roles, angle_deg)
+    across = _across(boundary, classes.stands, roles) if shift is not None else None
+    labels = _surface_labels(boundary, corner_vectors(sides), roles, angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
     fan_facet[fans.fan] = fans.facet
@@ -111,10 +113,32 @@ def find_tracks(
     return Tracks(tuple(tracks), of_node, bool(curved))
 
 
+def _across(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:
+    """Return pairs (j, 2) of facets that share a joint when periodic images are one node."""
+    role = np.array([roles.get(name, "fixed") for name in boundary.names])[boundary.marker]
+    glued = np.zeros(len(stands), bool)
+    glued[stands[stands != np.arange(len(stands))]] = True
+    facets = np.flatnonzero((role != "periodic") & glued[stands[boundary.facets]].any(axis=1))
+    pairs, nodes = find_joints(stands[boundary.facets[facets]], boundary.dim)
+    pairs = np.sort(facets[pairs[glued[nodes].all(axis=1)]], axis=1)
+    beside = np.sort(boundary.joints, axis=1) @ [len(role), 1]
+    return pairs[~np.isin(pairs @ [len(role), 1], beside)]
+
+
 def _surface_labels(
-    boundary: Boundary, vectors: FloatArray, roles: Mapping[str, str], angle_deg: float
+    boundary: Boundary,
+    vectors: FloatArray,
+    roles: Mapping[str, str],
+    angle_deg: float,
+    across: IntArray | None,
 ) -> IntArray:
-    """Return labels (f,) of facets joined smoothly, also across markers of one role."""
+    """Return labels (f,) of facets joined smoothly, also across markers of one role.
+
+    Parameters
+    ----------
+    across : (j, 2)
+        Facets that meet across a periodic boundary, None where surfaces end there.
+    """
     normal = unit(vectors)
     a, b = boundary.joints.T
     along = np.einsum("jd,jd->j", normal[a], normal[b])
@@ -125,7 +149,13 @@ def _surface_labels(
         along > np.cos(np.radians(angle_deg)),
         (role[a] == role[b]) & (along > np.cos(np.radians(angle_deg * MERGE_FRACTION))),
     )
-    return components(len(boundary.facets), a[smooth], b[smooth])
+    a, b = a[smooth], b[smooth]
+    if across is not None:
+        one, two = across.T
+        along = np.einsum("jd,jd->j", normal[one], normal[two])
+        smooth = (role[one] == role[two]) & (along > np.cos(np.radians(angle_deg)))
+        a, b = np.concatenate([a, one[smooth]]), np.concatenate([b, two[smooth]])
+    return components(len(boundary.facets), a, b)
 
 
 def _by_surfaces(
@@ -176,10 +206,14 @@ def _edge_chains(
     """Return for each chain of feature edges its sliding nodes (m,) and its segments (s, 2).
 
     A segment belongs to a sliding node when the two facets that meet in it are in different
-    clusters of that node's constraints. Chains end at nodes that do not slide along edges.
+    clusters of that node's constraints. Chains end at nodes that do not slide along edges, and
+    go on where the image of their last node goes on.
     """
     cluster = np.full(len(fans.fan_node), -1, np.int64)
-    cluster[classes.row_fan] = classes.row_cluster
+    stands = classes.stands
+    mine = stands[classes.cluster_node] == classes.cluster_node
+    mine = mine[classes.row_cluster]
+    cluster[classes.row_fan[mine]] = classes.row_cluster[mine]
     key = np.sort(fans.facet * (fans.node.max(initial=0) + 1) + fans.node)
     order = np.argsort(fans.facet * (fans.node.max(initial=0) + 1) + fans.node)
     is_edge = np.zeros(fans.node.max(initial=0) + 1, bool)
@@ -196,10 +230,10 @@ def _edge_chains(
     # Link segments at edge nodes only: number each end by its node, or by itself elsewhere.
     count = len(is_edge)
     own = count + np.arange(ends.size).reshape(ends.shape)
-    tied = np.where(is_edge[ends], ends, own)
+    tied = np.where(is_edge[ends], stands[ends], own)
     label = components(count + ends.size, tied[:, 0], tied[:, 1])
     chains = []
-    node_label = label[classes.edge]
+    node_label = label[stands[classes.edge]]
     for value in np.unique(node_label):
         segments = ends[label[tied[:, 0]] == value]
         if len(segments):

@@ -152,7 +152,11 @@ def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoRetur
     """Raise the error for two coinciding nodes that are asked to move differently."""
     node = int(nodes[row])
     group = nodes[problem.same_as[nodes] == problem.same_as[node]]
-    other = next((int(n) for n in group if n != node), node)
+    refuse(node, next((int(n) for n in group if n != node), node), gap)
+
+
+def refuse(node: int, other: int, gap: float) -> NoReturn:
+    """Raise the error for two nodes that coincide but are asked to move differently."""
     raise DeformError(
         f"nodes {node} and {other} coincide (in the same place, or one period apart) but are "
         f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "

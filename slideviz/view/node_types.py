@@ -8,11 +8,10 @@ from typing import Literal
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.errors import SlidevizError
+from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.topology import Fans, find_fans
-from slideviz.rbf.classify import classify
 from slideviz.view.drawing.look import ROLE_COLOURS
 from slideviz.view.session.state import Session
 
@@ -98,20 +97,27 @@ class NodeTypes:
 
     def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
         roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)
-        key = (mesh, roles, case.sliding, case.periodic, case.feature_angle_deg)
+        period = case.periodic, case.periodic_type, case.axis, case.origin
+        key = (mesh, roles, case.sliding, period, case.feature_angle_deg)
         if self._types is None or self._types[0] != key:
             self._types = key, self._classified(mesh, case)
         return self._types[1]
 
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
+        from slideviz.case.plan import find_classes, find_period
+
         if not mesh.markers:
             return NOTHING
         boundary, angle = boundary_of(mesh), case.feature_angle_deg
         if self._fans is None or self._fans[:2] != (mesh, angle):
             self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
-        method = (case.sliding, case.periodic)
         try:
-            classes = classify(boundary, self._fans[2], mesh.points, case.roles, method, angle)
+            try:
+                _, frame, stands = find_period(case, mesh, boundary)
+            except MeshError:  # until its markers match, the case is as without periodicity
+                alone = case.change(periodic="none", periodic_type="translational")
+                _, frame, stands = find_period(alone, mesh, boundary)
+            classes = find_classes(case, mesh, (boundary, self._fans[2]), frame, stands)
         except SlidevizError:
             return NOTHING  # what is wrong with the case is said beside the Run button
         place = {kind: index for index, kind in enumerate(NODE_WORDS)}

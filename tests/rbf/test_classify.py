@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.topology import fan_normals, find_boundary, find_fans
-from slideviz.rbf.classify import classify, directions
+from slideviz.rbf.classify import classify, directions, fan_roles
 from tests import builders
 from tests.oracles import geometry
 
@@ -19,11 +19,16 @@ MODES = [
 ]
 
 
-def found(mesh, roles, method=("ps", "none"), angle=40.0):
+def found(mesh, roles, method=("ps", "none"), angle=40.0, images=()):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points, angle)
-    classes = classify(boundary, fans, mesh.points, roles, method, angle)
-    return classes, directions(classes, fan_normals(boundary, fans, mesh.points))
+    normals = fan_normals(boundary, fans, mesh.points)
+    stands = np.arange(len(mesh.points))
+    for first, second in images:
+        stands[second] = first
+    role = fan_roles(boundary, fans, roles)
+    classes = classify(fans, role, normals, stands, method, angle)
+    return classes, directions(classes, normals)
 
 
 def box_roles(dim, across=1):
@@ -269,12 +274,8 @@ def test_periodic_partners_have_one_normal():
         "y_m": "periodic",
         "y_p": "periodic",
     }
-    boundary = find_boundary(mesh)
-    fans = find_fans(boundary, mesh.points)
-    classes = classify(boundary, fans, mesh.points, roles, ("ds", "moving"), 40.0)
     pairs = match(mesh, "y_m", "y_p").nodes
-    images = dict(pairs.tolist()) | dict(pairs[:, ::-1].tolist())
-    nodes, normals = directions(classes, fan_normals(boundary, fans, mesh.points), images)
+    _, (nodes, normals) = found(mesh, roles, ("ds", "moving"), images=pairs)
     one, two = node_at(mesh, 0.5, 0, 1), node_at(mesh, 0.5, 1, 1)
     a, b = normals[nodes == one], normals[nodes == two]
     np.testing.assert_allclose(a, b, atol=1e-13)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.mesh.topology import find_boundary, find_fans
-from slideviz.rbf.classify import classify
+from slideviz.mesh.topology import fan_normals, find_boundary, find_fans
+from slideviz.rbf.classify import classify, fan_roles
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import Tracks, find_tracks
 from tests import builders
@@ -64,7 +64,8 @@ def test_degenerate_simplices_do_no_harm():
 def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points)
-    classes = classify(boundary, fans, mesh.points, roles, method, 40.0)
+    normals, stands = fan_normals(boundary, fans, mesh.points), np.arange(len(mesh.points))
+    classes = classify(fans, fan_roles(boundary, fans, roles), normals, stands, method, 40.0)
     return classes, find_tracks(
         boundary, fans, classes, lambda nodes: mesh.points[nodes], (roles, 40.0, shift)
     )

@@ -65,15 +65,15 @@ def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
 
 
 def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
-    from slideviz.view import node_types as module
+    from slideviz.case import plan as module
 
-    asked, real = [], module.classify
+    asked, real = [], module.find_classes
 
     def counted(*values):
         asked.append(1)
         return real(*values)
 
-    monkeypatch.setattr(module, "classify", counted)
+    monkeypatch.setattr(module, "find_classes", counted)
     types, session = NodeTypes(), session_of(passage, points="types")
     first = types.of(session)
     assert types.of(changes.set_view(session, edges=False)) is first

@@ -39,6 +39,11 @@ def _error(run: Run) -> float | None:
     return step.max_error if step is not None else None
 
 
+def _misfit(run: Run) -> float | None:
+    found = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
+    return max((value for value in found if value is not None), default=None)
+
+
 @dataclass(frozen=True)
 class Column:
     """A column: its title, what it says of a run, and how that is written for people."""
@@ -68,6 +73,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("inverted cells", lambda run: _of_last(run, "inverted"), ",d"),
     Column("control nodes", control_nodes, ",d"),
     Column("largest error at control", _error, ".3g"),
+    Column("periodic misfit", _misfit, ".3g"),
     Column("seconds", lambda run: run.seconds, ".3f"),
     Column("end", end_words),
 )

@@ -1,0 +1,171 @@
+"""Periodic images: one node each, classified, projected and evaluated once.
+
+Whatever a node one period away would find for itself differs by rounding at least, and by more
+where only one of them sees a corner, a normal or the end of a curve. So one of them stands for
+all, its displacement in the frame is copied to the others, and every step measures on the mesh
+that it made whether they moved alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.periodic import Pair
+from slideviz.mesh.topology import components
+from slideviz.rbf.classify import Classes, directions
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.rows import refuse
+
+COINCIDENT = 1e-12
+"""Nodes nearer than this part of the mesh's extent are in one place."""
+
+ROUNDING = 1e-12
+"""Part of the mesh's extent by which images may move differently: ten thousand times the
+rounding of a coordinate, and a millionth of the first cells of a fine boundary layer."""
+
+FAR = 1e-14
+"""The same as a part of the largest coordinate: some tens of roundings, for meshes far from 0."""
+
+
+def find_images(
+    pairs: Sequence[Pair], frame: Frame, coords: FloatArray, nodes: IntArray, extent: float
+) -> IntArray:
+    """Return for each node the one of its periodic images that stands for all, (n,).
+
+    It is the first along the period, on a periodic boundary where there is one. Images are those
+    of the pairs, and boundary nodes that coincide with others after one period without being on
+    a periodic boundary, as in layers of cells beyond it.
+
+    Parameters
+    ----------
+    coords : (n, d)
+        Undeformed, in the frame.
+    nodes : (b,)
+        All nodes of the boundary.
+    """
+    count = len(coords)
+    if not pairs:
+        return np.arange(count)
+    links = np.concatenate([pair.nodes for pair in pairs])
+    paired = np.zeros(count, bool)
+    paired[links] = True
+    near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
+    gap, at = cKDTree(coords[nodes]).query(coords[nodes] + frame.shift())
+    twins = np.stack([nodes, nodes[at]], axis=1)[gap <= near]
+    links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])
+    label = components(count, *links.T)
+    order = np.lexsort((coords @ frame.shift(), ~paired, label))
+    return order[np.searchsorted(label[order], label)]
+
+
+def spread(
+    values: FloatArray, given: IntArray, stands: IntArray, allowed: float
+) -> tuple[FloatArray, IntArray]:
+    """Return the displacements (n, d) with those of given nodes at all their images.
+
+    Second, the given node (n,) that each has its displacement from; -1 for none.
+
+    Parameters
+    ----------
+    values : (n, d)
+        Displacements in the frame; those of ``given`` (k,) count.
+    allowed : float
+        By how much the given displacements of images may differ.
+
+    Raises
+    ------
+    DeformError
+        They differ by more.
+    """
+    first = np.full(len(values), -1, np.int64)
+    first[stands[given[::-1]]] = given[::-1]
+    source = first[stands]
+    gap = np.abs(values[given] - values[source[given]]).max(axis=1, initial=0.0)
+    if gap.max(initial=0.0) > allowed:
+        row = int(np.argmax(gap))
+        refuse(int(given[row]), int(source[given[row]]), float(gap[row]))
+    out = values.copy()
+    out[source >= 0] = values[source[source >= 0]]
+    return out, source
+
+
+def require_free(
+    values: FloatArray,
+    source: IntArray,
+    nodes: IntArray,
+    alone: tuple[Classes, FloatArray],
+    allowed: float,
+) -> None:
+    """Raise DeformError when nodes may not move as the images that they follow.
+
+    Parameters
+    ----------
+    values, source : (n, d), (n,)
+        As ``spread`` returns them.
+    nodes : (m,)
+        Those that move only because an image does.
+    alone
+        The classes as if there were no images, and the normals of all fans in the frame.
+    """
+    off = np.zeros(len(values))
+    held = np.isin(alone[0].fixed, nodes)
+    off[alone[0].fixed[held]] = np.abs(values[alone[0].fixed[held]]).max(axis=1, initial=0.0)
+    rows, normals = directions(*alone)
+    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", values[rows], normals)))
+    worst = int(nodes[np.argmax(off[nodes])])
+    if off[worst] > allowed:
+        refuse(worst, int(source[worst]), float(off[worst]))
+
+
+def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray) -> FloatArray:
+    """Return how far images have moved differently, (k,), in the mesh's length unit.
+
+    Parameters
+    ----------
+    coords : (n, d)
+        Undeformed, in the frame.
+    points : (n, d)
+        Cartesian, as they are now.
+    images : (k, 2)
+        Nodes and their images.
+    """
+    one, two = (frame.coords(points[column]) for column in images.T)
+    gap = (two - one) - (coords[images[:, 1]] - coords[images[:, 0]])
+    if frame.cylindrical:
+        # Angles as lengths of arcs, whichever turn they are counted in.
+        turn = 2 * np.pi * frame.radius
+        gap[:, 1] = (gap[:, 1] - turn * np.round(gap[:, 1] / turn)) * one[:, 0] / frame.radius
+    return np.asarray(np.linalg.norm(gap, axis=1))
+
+
+def largest_misfit(
+    frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray
+) -> float | None:
+    """Return the largest of ``misfits``; None where there are no images.
+
+    Raises
+    ------
+    DeformError
+        It is more than rounding.
+    """
+    if not len(images):
+        return None
+    found = misfits(frame, coords, points, images)
+    worst = int(np.argmax(found))
+    origin = 0.0 if frame.origin is None else float(np.abs(frame.origin).max())
+    extent = float(np.ptp(points, axis=0).max())
+    allowed = ROUNDING * extent + FAR * (float(np.abs(points).max()) + origin)
+    if not found[worst] <= allowed:
+        one, two = images[worst]
+        where = ", ".join(f"{value:.6g}" for value in points[two])
+        raise DeformError(
+            f"node {two}, now at {where}, and its periodic image, node {one}, have moved "
+            f"differently, by {found[worst]:.3g}; rounding makes {allowed:.1g} at most; let the "
+            "boundaries at both periodic sides move alike, or choose PERIODIC_MODE= none"
+        )
+    return float(found[worst])
