@@ -322,6 +322,20 @@ def permuted(mesh: Mesh, order: np.ndarray) -> Mesh:
     return Mesh(mesh.points[order], cells, markers, name=mesh.name)
 
 
+def shuffled(mesh: Mesh, seed: int) -> tuple[np.ndarray, Mesh]:
+    """The order of the old nodes, and the same mesh with nodes and cells in another order."""
+    rng = np.random.default_rng(seed)
+
+    def mixed(cells: Cells) -> Cells:
+        order = rng.permutation(len(cells))
+        rows = np.split(cells.connectivity, cells.offsets[1:-1])
+        return Cells.from_types(cells.types[order], np.concatenate([rows[i] for i in order]))
+
+    markers = tuple(Marker(m.name, mixed(m.cells)) for m in mesh.markers)
+    order = rng.permutation(len(mesh.points))
+    return order, permuted(Mesh(mesh.points, mixed(mesh.cells), markers, name=mesh.name), order)
+
+
 def pair(kind, dim, vector=(0, 0, 0), angle=0.0, axis=(0.0, 0.0, 1.0), origin=(0.0, 0.0, 0.0)):
     """A periodic pair without nodes."""
     shift = np.array(vector, float)[:dim]

@@ -348,15 +348,21 @@ def _displaced(case: Case, mesh: Mesh) -> Displacements:
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
-    """Return for each node the lowest node that coincides with it, (n,)."""
+    """Return for each node the first node by position that coincides with it, (n,).
+
+    By position, because it stands for all of them in the selection of control nodes, which
+    must not depend on the numbers of nodes.
+    """
     tree = cKDTree(mesh.points[boundary_nodes])
     twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
     links = np.concatenate([twins.reshape(-1, 2), images])
-    count = len(mesh.points)
-    label = components(count, *links.T)
-    lowest = np.full(label.max() + 1, count, np.int64)
-    np.minimum.at(lowest, label, np.arange(count))
-    return lowest[label]
+    out = np.arange(len(mesh.points))
+    nodes = np.unique(links)
+    nodes = nodes[np.lexsort(mesh.points[nodes].T[::-1])]
+    label = components(len(out), *links.T)[nodes]
+    _, first, group = np.unique(label, return_index=True, return_inverse=True)
+    out[nodes] = nodes[first[group]]
+    return out
 
 
 def _reduction(case: Case, extent: float) -> Reduction | None:

@@ -214,15 +214,17 @@ def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
 
 
 def _cluster(around: _Around, local: IntArray) -> IntArray:
-    """Return labels (m,) that join fans of one role whose normals differ by a small angle."""
+    """Return labels (m,) that join fans of one role whose normals differ by a small angle.
+
+    Also over others between them, so that the order of the fans does not matter.
+    """
     normals, roles, own = around.normals[local], around.role[local], around.own[local]
     labels = np.arange(len(normals))
     for i in range(1, len(normals)):
         for j in range(i):
             limit = around.merge if own[i] == own[j] else around.smooth
             if roles[i] == roles[j] and normals[i] @ normals[j] > limit:
-                labels[i] = labels[j]
-                break
+                labels[labels == labels[i]] = labels[j]
     return np.unique(labels, return_inverse=True)[1]
 
 

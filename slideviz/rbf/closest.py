@@ -14,6 +14,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 
 LEAF = 4
+TIE = 1e-12
+"""Squares of distances that differ by less than this part are equal but for rounding."""
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
@@ -102,9 +104,18 @@ def _on_triangle(x, a, b, c, out, trial):  # type: ignore[no-untyped-def]
     return best
 
 
+@njit(inline="always", **_OPTIONS)
+def _before(a, b):  # type: ignore[no-untyped-def]
+    """Tell whether point a comes before b along a direction of no symmetry."""
+    return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
+
+
 @njit(parallel=True, **_OPTIONS)
 def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
-    """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3)."""
+    """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
+
+    Of several equally near ones the position decides, not the order of the triangles.
+    """
     nodes = bounds.shape[0]
     inner = nodes // 2
     for i in prange(len(x)):
@@ -117,15 +128,16 @@ def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
         while top > 0:
             top -= 1
             k, a, b = stack[top], first[top], last[top]
-            if _box_gap(bounds, k, x[i]) >= best:
+            if best == 0.0 or _box_gap(bounds, k, x[i]) > best * (1.0 + TIE):
                 continue
             if k >= inner:
                 for j in range(a, b):
                     t = corners[order[j]]
                     gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
-                    if gap < best:
-                        best = gap
+                    tied = abs(gap - best) <= TIE * best
+                    if gap < best * (1.0 - TIE) or (tied and _before(point, out[i])):
                         out[i] = point
+                    best = min(best, gap)
                 continue
             half = a + (b - a + 1) // 2
             left, right = 2 * k + 1, 2 * k + 2

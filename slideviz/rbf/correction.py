@@ -15,6 +15,10 @@ NEGLIGIBLE = 1e-14
 
 CHUNK = 50_000
 
+TIE = 1e-4
+"""Boundary nodes farther than the nearest one by less than this part of its distance count too:
+far above rounding, far below any difference of distances that a mesh could mean."""
+
 
 def correct(
     problem: Problem,
@@ -27,7 +31,9 @@ def correct(
 
     Each node takes over the error of its nearest boundary node, weighted with Wendland's C2
     function of the distance over ``gamma`` times the largest error. The search is bounded by
-    that radius, which is what makes it cheap, and goes on beyond periodic boundaries.
+    that radius, which is what makes it cheap, and goes on beyond periodic boundaries. Where
+    several are equally near, as on symmetric meshes, it is the mean of their errors: one of them
+    would be chosen by its number.
 
     Parameters
     ----------
@@ -41,10 +47,13 @@ def correct(
         return
     radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest
     points = problem.cartesian(problem.coords)
-    sources, owner = points[nodes], np.arange(len(nodes))
+    # Nodes that coincide, or are images of each other, count once.
+    once = np.unique(problem.same_as[nodes], return_index=True)[1]
+    sources, lacking = points[nodes[once]], errors[once]
     if np.any(problem.shift):
-        images = [problem.cartesian(problem.coords[nodes] + s * problem.shift) for s in (-1, 1)]
-        sources, owner = np.concatenate([sources, *images]), np.tile(owner, 3)
+        at = problem.coords[nodes[once]]
+        images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
+        sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
     tree = cKDTree(sources)
     free = np.ones(len(points), bool)
     free[nodes] = False
@@ -52,10 +61,33 @@ def correct(
     for start in range(0, len(targets), CHUNK):
         part = targets[start : start + CHUNK]
         workers = -1 if len(part) == CHUNK else 1
-        near = tree.query(points[part], distance_upper_bound=radius, workers=workers)
+        near = tree.query(points[part], k=2, distance_upper_bound=radius, workers=workers)
         distance, index = (np.asarray(found) for found in near)
-        hit = np.isfinite(distance)
-        q = distance[hit] / radius
+        hit = np.isfinite(distance[:, 0])
+        part, distance, index = part[hit], distance[hit], index[hit, 0]
+        q = distance[:, 0] / radius
         share = (1.0 - q) ** 4 * (4.0 * q + 1.0)
-        displacement[part[hit]] += share[:, None] * errors[owner[index[hit]]]
+        taken = lacking[index]
+        tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])
+        if len(tied):
+            taken[tied] = _means(tree, lacking, points[part[tied]], distance[tied, 0])
+        displacement[part] += share[:, None] * taken
         tick(min(1.0, (start + CHUNK) / len(targets)))
+
+
+def _means(
+    tree: cKDTree, lacking: FloatArray, points: FloatArray, distance: FloatArray
+) -> FloatArray:
+    """Return the mean (m, d) of the errors of the sources that are nearest to points (m, d).
+
+    The weight of each falls to zero at ``TIE`` beyond the nearest, so that rounding, which moves
+    the nodes of a symmetric mesh a little, changes the mean little.
+    """
+    found = tree.query_ball_point(points, (1.0 + TIE) * distance)
+    row = np.repeat(np.arange(len(points)), [len(each) for each in found])
+    source = np.concatenate([np.array(each, np.int64) for each in found])
+    beyond = np.linalg.norm(points[row] - tree.data[source], axis=1) - distance[row]
+    weight = np.clip(1.0 - beyond / np.maximum(TIE * distance[row], 1e-300), 0.0, 1.0)
+    total = np.zeros((len(points), lacking.shape[1] + 1))
+    np.add.at(total, row, weight[:, None] * np.c_[lacking[source], np.ones(len(source))])
+    return total[:, :-1] / total[:, -1:]

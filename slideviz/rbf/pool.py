@@ -26,7 +26,8 @@ below what matters for the choice."""
 def favour(coords: FloatArray) -> FloatArray:
     """Return a factor for the error of each candidate, (c,), that decides between equal ones.
 
-    From 1 to 1 + TIE, along a direction that no symmetry of a mesh is likely to have.
+    From 1 to 1 + TIE, along a direction that no symmetry of a mesh is likely to have: no sum of
+    whole multiples of its components is zero, so no two points of a grid are alike.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def favour(coords: FloatArray) -> FloatArray:
     """
     if not len(coords):
         return np.empty(0)
-    along = coords @ np.array([1.0, 0.6180339887, 0.2360679775])[: coords.shape[1]]
+    along = coords @ np.array([1.0, 0.6180339887, 0.4142135624])[: coords.shape[1]]
     low, high = along.min(), along.max()
     return 1.0 + TIE * (along - low) / max(high - low, 1e-300)
 

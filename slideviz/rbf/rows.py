@@ -131,21 +131,25 @@ def _orthonormalise(
 
 
 def merge(problem: Problem, nodes: IntArray, values: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return nodes (m,) and values (m, d) with coinciding nodes taken once.
+    """Return nodes (m,) and values (m, d), those of coinciding nodes as their mean.
 
     Raises
     ------
     DeformError
         Coinciding nodes are asked to move differently.
     """
-    controls, group = np.unique(problem.same_as[nodes], return_inverse=True)
+    controls, group, count = np.unique(
+        problem.same_as[nodes], return_inverse=True, return_counts=True
+    )
     data = np.zeros((len(controls), values.shape[1]))
     data[group] = values
     gap = np.abs(data[group] - values).max(axis=1, initial=0.0)
     if gap.max(initial=0.0) > AGREE * problem.basis.radius:
         row = int(np.argmax(gap))
         disagree(problem, nodes, row, float(gap[row]))
-    return controls, data
+    data[:] = 0.0
+    np.add.at(data, group, values)
+    return controls, data / count[:, None]
 
 
 def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoReturn:
