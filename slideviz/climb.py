@@ -144,6 +144,7 @@ class Climb:
         coords, done, index, folded = plan.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *plan.warnings]
         told: list[str] = []
+        worst = 0.0
         seconds = dict(self.seconds)
         before: Solution | None = None
         while ahead:
@@ -169,11 +170,12 @@ class Climb:
             coords, done, index = moved, part, index + 1
             before = solution
             ahead.pop(0)
-            if not told:
+            if solution.short and solution.max_error > worst:
+                told, worst = [_short_warning(plan, solution, index)], solution.max_error
+            elif not told:
                 told = _dropped_warning(solution, index, mesh)
-                warnings += told
             warnings += [f"step {index}: {text}" for text in solution.warnings]
-            yield self._made(index, total, points, solution, watch, warnings)
+            yield self._made(index, total, points, solution, watch, [*warnings, *told])
             seconds = {}
 
     def _report(self, index: int, total: int) -> Callable[[str, float], None]:
@@ -277,6 +279,17 @@ def _followed(plan: Plan, halo: Halo, points: FloatArray, moved: FloatArray) -> 
     out = moved.copy()
     out[copies] = plan.frame.coords(points[copies])
     return out
+
+
+def _short_warning(plan: Plan, solution: Solution, index: int) -> str:
+    """Return the sentence about a selection that ended above its tolerance."""
+    assert plan.reduction is not None
+    return (
+        f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
+        f"an error of {solution.max_error:.3g}, above its tolerance of "
+        f"{plan.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
+        "their displacement, but what is near them follows by the correction alone"
+    )
 
 
 def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:

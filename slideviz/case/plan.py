@@ -37,6 +37,9 @@ from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 from slideviz.rbf.rows import AGREE
 
+LOOSE = 0.1
+"""A tolerance above this part of the largest displacement leaves much to the correction."""
+
 REACH = 1.5
 """How far surfaces are continued at moving boundaries, in largest displacements."""
 
@@ -166,13 +169,15 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
     moved = _displaced(asked, mesh)
     known, target, warnings = _prescribed(case, mesh, frame, (boundary, fans, classes), moved)
+    largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
+    reduction = _reduction(case, mesh.extent)
     tracks = find_tracks(
         boundary,
         fans,
         classes,
         lambda nodes: corners_of(coords, nodes, axis),
         (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
-        reach=REACH * float(np.linalg.norm(target, axis=1).max(initial=0.0)),
+        reach=REACH * largest,
     )
     second = np.flatnonzero(stands != np.arange(len(stands)))
     images = np.stack([stands[second], second], axis=1)
@@ -189,7 +194,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         target=target,
         same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
-        reduction=_reduction(case, mesh.extent),
+        reduction=reduction,
         axis=axis,
         held=hold_on_axis(*directions(classes, normals), axis)[2],
         boundary=boundary,
@@ -198,7 +203,13 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         pairs=pairs,
         solve=_method(case, without_halo(mesh)[0], frame, axis),
         halo=mesh.halo,
-        warnings=(*mesh.remarks, *notes, *warnings, *idle_settings(case)),
+        warnings=(
+            *mesh.remarks,
+            *notes,
+            *warnings,
+            *_loose(case, reduction, largest, mesh.extent),
+            *idle_settings(case),
+        ),
     )
 
 
@@ -382,3 +393,23 @@ def _reduction(case: Case, extent: float) -> Reduction | None:
         max_nodes=given.max_nodes,
         gamma=given.gamma,
     )
+
+
+def _loose(case: Case, reduction: Reduction | None, largest: float, extent: float) -> list[str]:
+    """Return a warning about a tolerance that is not far below the largest displacement."""
+    if reduction is None or not largest > 0.0 or reduction.tolerance <= LOOSE * largest:
+        return []
+    assert case.reduction is not None
+    whole, part = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
+    remedy = f"use DATA_RED_RELATIVE= {part}"
+    if not case.reduction.relative:
+        remedy = f"use DATA_RED_TOLERANCE= {whole}, or DATA_RED_RELATIVE= {part},"
+    is_, so = "not below", "no control node is needed to meet it, and only the cells"
+    if reduction.tolerance < largest:
+        is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"
+    sentence = (
+        f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
+        f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
+        f"invert them; {remedy} (a hundredth of the displacement) or less"
+    )
+    return [sentence]

@@ -16,6 +16,12 @@ Candidates are sorted by position, and every number depends on one candidate and
 the control nodes alone: neither numbering nor threads change the selection. Where errors are
 equal but for rounding, as on symmetric meshes, the position decides (``pool.favour``), so that
 another processor chooses the same nodes.
+
+Every selection ends: a cycle without a new row is the last, and levels, which may choose the
+same rows again, are given up when the error no longer falls from one to the next, or when they
+have chosen as many rows as there are (``patience``). Then one last level takes all it needs. If
+an error stays above the tolerance, ``short`` says why, and what was found at the lowest error
+is kept where that is clearly better.
 """
 
 from __future__ import annotations
@@ -30,6 +36,7 @@ from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.patience import Patience
 from slideviz.rbf.pool import favour, pool
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
 from slideviz.rbf.rows import Rows, blocks
@@ -37,6 +44,9 @@ from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise
 
 STALE = 0.3
 """A block ends when the pool's largest error is below this part of the largest of all."""
+
+WORSE = 2.0
+"""A selection that fails goes back to its lowest error where the last is this much larger."""
 
 
 class GreedyFit:
@@ -49,6 +59,8 @@ class GreedyFit:
         levels (Eq. 2.38).
     dropped : (m,) int64
         Nodes left out by the pivot guard although their error is above the tolerance.
+    short : str
+        Why the last selection ended above the tolerance, and a remedy; empty where it did not.
     history : tuple of Cycle
     """
 
@@ -56,7 +68,7 @@ class GreedyFit:
         assert problem.reduction is not None
         self._problem, self._watch, self._settings = problem, watch, problem.reduction
         d = problem.values.shape[1]
-        self.history = history
+        self.history, self.short = history, ""
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         kernel = KERNELS[problem.basis.kernel]
         self._tailed, self._singular = kernel.polynomial, False
@@ -115,11 +127,14 @@ class GreedyFit:
             self._take(again, target)
             residual = target - self._values(self._now)
             errors = self._errors(residual)
+        patience, given_up = Patience(errors.max(initial=0.0), len(self._rows.nodes)), False
+        best = errors, self.found
         while True:
             self._record(errors)
             if errors.max(initial=0.0) <= settings.tolerance or self._full() or self._singular:
                 break
-            if self._level_done(errors, goal):
+            if not given_up and self._level_done(errors, goal):
+                given_up = patience.ends(float(errors.max()), len(self._chosen))
                 self._new_level()
                 self._level += 1
                 target, goal = self._targets(), self._level_goal(errors)
@@ -128,8 +143,32 @@ class GreedyFit:
                 break
             residual = target - self._values(self._now)
             errors = self._errors(residual)
+            if errors.max() < best[0].max():
+                best = errors, self.found
             self._watch.report("select", self._fraction(errors))
         self._note_dropped(errors)
+        self.short = self._shortfall(errors)
+        if self.short and not self._full() and errors.max() > WORSE * best[0].max():
+            self.found = best[1]
+            self._new_level()
+            self._record(best[0])
+
+    def _shortfall(self, errors: FloatArray) -> str:
+        """Return why the selection ended above its tolerance, and a remedy; empty if it did not."""
+        if errors.max(initial=0.0) <= self._settings.tolerance:
+            return ""
+        if self._full():
+            return (
+                f"MAX_CONTROL_NODES= {self._settings.max_nodes} are chosen; allow more, or a "
+                "larger tolerance"
+            )
+        basis = self._problem.basis
+        other = "" if basis.kernel == PLAIN else f"RBF_KERNEL= {PLAIN}, "
+        return (
+            "the nodes that are left add nothing but rounding to those chosen (RBF_KERNEL= "
+            f"{basis.kernel} with a support radius of {basis.radius:.3g}); use a smaller "
+            f"INFLUENCE_FACTOR, {other}or a larger tolerance"
+        )
 
     def _level_goal(self, errors: FloatArray) -> float:
         return float(errors.max(initial=0.0)) * self._settings.level_ratio

@@ -27,6 +27,7 @@ class Fit(Protocol):
 
     found: Interpolant
     dropped: IntArray
+    short: str
     history: tuple[Cycle, ...]
 
     def add(self, rows: Rows) -> None:
@@ -155,4 +156,5 @@ def _finish(
         control=fit.found.nodes,
         lag=lag,
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
+        short=fit.short,
     )

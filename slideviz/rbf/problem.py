@@ -169,6 +169,8 @@ class Solution:
         there; None without data reduction.
     dropped_error : float
         Largest misfit of this step at the nodes that the pivot guard left out.
+    short : str
+        Why the selection ended above its tolerance, and a remedy; empty where it did not.
     """
 
     displacement: FloatArray
@@ -181,6 +183,7 @@ class Solution:
     control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     lag: FloatArray | None = None
     dropped_error: float = 0.0
+    short: str = ""
 
 
 @dataclass(frozen=True, eq=False)
