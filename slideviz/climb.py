@@ -248,7 +248,9 @@ def _step(
         before=before,
     )
     found = plan.solve(problem, watch)
-    return replace(found, displacement=found.displacement[classes.stands])
+    first, second = plan.images.T
+    found.displacement[second] = found.displacement[first]
+    return found
 
 
 def _moved(

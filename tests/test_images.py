@@ -11,13 +11,18 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Case, Reduction, Translate
+from slideviz import climb
+from slideviz.case.model import Case, Reduction, Rotate, Translate
 from slideviz.case.plan import make_plan
 from slideviz.cli import run as command
-from slideviz.errors import DeformError
+from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
 from slideviz.rbf.images import misfits
+from slideviz.rbf.problem import Solution
+from slideviz.view.node_types import NODE_WORDS, NodeTypes
+from slideviz.view.session import changes
+from slideviz.view.session.state import Frame
 from tests import builders
 
 SHARED = Path(__file__).parents[1] / ".." / "shared"
@@ -307,13 +312,48 @@ def test_the_report_has_the_misfit(tmp_path, periodic, capsys):
         assert "periodic misfit" in out
 
 
+def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
+    mesh = builders.square(6)
+    zeros = np.zeros((len(mesh.points), 2))
+    for error, note in ((1e-12, True), (1e-3, False)):
+        solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
+        (warning,) = climb._dropped_warning(solution, 1, mesh)
+        assert isinstance(warning, Note) == note
+        assert f"off by {error:.2g} at most" in warning
+        assert "no harm" not in warning
+
+
+def test_the_view_has_the_same_types_as_a_run():
+    mesh, roles = split_wall("fixed", "sliding")
+    case = Case(
+        roles=roles | {"x_p": "moving"},
+        motions=(Translate("x_p", (0.1, 0.0)),),
+        periodic="moving",
+        sliding="ps",
+    )
+    plain = replace(mesh, name="m")
+    session = changes.open_mesh(Frame(plain, sv.quality(plain)), None, (), case)
+    types = NodeTypes()
+    found = types.of(changes.set_view(session, points="types"))
+    fixed = found.nodes[found.kinds == list(NODE_WORDS).index("fixed")]
+    np.testing.assert_array_equal(fixed, make_plan(case, mesh).classes.fixed)
+    # Markers that do not match are told beside the Run button; the types are there all the same.
+    points = mesh.points.copy()
+    points[mesh.marker("y_p").nodes[2], 0] += 0.03
+    wrong = plain.with_points(points)
+    session = changes.open_mesh(Frame(wrong, sv.quality(wrong)), None, (), case)
+    found = types.of(changes.set_view(session, points="types"))
+    assert np.sum(found.kinds == list(NODE_WORDS).index("fixed")) == len(fixed) - 1
+
+
 # Real meshes
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the real meshes are not here")
-@pytest.mark.parametrize("amount", [1e-5, 6e-4])
-@pytest.mark.parametrize("periodic", ["fixed", "moving"])
-@pytest.mark.parametrize("method", ["ps", "ds"])
+@pytest.mark.parametrize(
+    ("method", "periodic", "amount"),
+    [("ps", "fixed", 6e-4), ("ps", "moving", 1e-5), ("ds", "fixed", 1e-5), ("ds", "moving", 6e-4)],
+)
 def test_a_pin_array_between_symmetry_planes(tmp_path, method, periodic, amount):
     packed = SHARED / "meshes" / "su2" / "incomp_chtPinArray_3d_coarse.su2.xz"
     (tmp_path / "pins.su2").write_bytes(lzma.decompress(packed.read_bytes()))
@@ -331,6 +371,32 @@ def test_a_pin_array_between_symmetry_planes(tmp_path, method, periodic, amount)
     found = sv.quality(step.mesh, mesh)
     assert found.inverted == 0
     assert found.min > 0.7
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the real meshes are not here")
+@pytest.mark.parametrize("method", ["ps", "ds"])
+def test_a_turbine_with_layers_of_cells_beyond_its_periodic_sides(method):
+    """Inflow and outflow reach into the layers: their ends there were held."""
+    packed = SHARED / "meshes" / "su2" / "nicf_LS89_mesh_vki_turbine_halo.su2"
+    mesh = sv.read(packed)
+    case = Case(
+        roles={
+            "airfoil": "moving",
+            "inflow": "sliding",
+            "outflow": "sliding",
+            "periodic_1": "periodic",
+            "periodic_2": "periodic",
+        },
+        motions=(Rotate("airfoil", 4.0),),
+        periodic="moving",
+        sliding=method,
+        reduction=Reduction(tolerance=1e-6 * mesh.extent),
+    )
+    step = run(case, mesh)
+    found = sv.quality(step.mesh, mesh)
+    assert found.inverted == 0
+    assert found.min == pytest.approx(0.23665, abs=1e-4)
+    assert step.periodic_misfit < ROUNDING
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the inputs are not here")

@@ -188,7 +188,9 @@ def off_boundary(plan, points, mesh):
     assert not coords[plan.axis, 0].any()
     sliding = classes.sliding[~plan.axis[classes.sliding]]
     assert np.isfinite(gap[sliding]).all()
-    assert gap[sliding].max(initial=0.0) < 1e-9 * mesh.extent
+    # Images move alike, so one of them may be off by what the two boundaries differ.
+    differ = 2.0 * max((pair.mismatch for pair in plan.pairs), default=0.0)
+    assert gap[sliding].max(initial=0.0) < 1e-9 * mesh.extent + differ * bool(len(plan.images))
 
 
 def images_stay(plan, points, mesh):

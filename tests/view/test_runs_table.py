@@ -58,6 +58,7 @@ def test_the_table_has_settings_and_results_of_every_run(runs):
     assert found[1]["control nodes chosen"] == "reduced to 0.01"
     for row, run in zip(found, runs, strict=True):
         assert float(row["minimum quality"]) == run.last.quality.min, "every digit is there"
+        assert float(row["periodic misfit"]) < 1e-14
         assert float(row["mean quality"]) == run.last.quality.mean
         assert int(row["inverted cells"]) == run.last.quality.inverted
         assert int(row["control nodes"]) == run.last.step.control_nodes
