@@ -5,16 +5,20 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.words import shown, without_comment
 from slideviz.errors import CaseError
+from slideviz.mesh.opened import require_length
 
 Problem = tuple[int, str]
 _END_OF_LINE = re.compile(r"\r\n|\n|\r")
 _KEY_LINE = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*=(.*)\Z", re.DOTALL)
 _LISTED = 30
+LARGEST = {"case file": 16_000_000, "displacement file": 2_000_000_000}
+"""Bytes that a kind of file may have: a displacement file has a line for each node at most."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +39,19 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     Raises
     ------
     CaseError
-        It cannot be read, is empty or is not text. ``what`` names the kind of file.
+        It cannot be read, is empty, too large, or not text. ``what`` is one of ``LARGEST``.
     """
     try:
+        with suppress(FileNotFoundError):  # told below
+            require_length(path, CaseError, what, LARGEST[what])
         data = path.read_bytes()
     except FileNotFoundError as problem:
         raise CaseError(f"{path}: there is no such {what}; check name and folder") from problem
     except IsADirectoryError as problem:
         raise CaseError(f"{path}: is a folder; needed is a {what}") from problem
-    except OSError as problem:
-        raise CaseError(f"{path}: cannot be read: {problem.strerror}") from problem
+    except (OSError, ValueError) as problem:  # ValueError: no name of a file
+        reason = getattr(problem, "strerror", None) or problem
+        raise CaseError(f"{path}: cannot be read: {reason}") from problem
     if not data.strip():
         raise CaseError(f"{path}: the file is empty; needed is a {what}")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -21,6 +21,8 @@ from typing import Any
 from qtpy.QtCore import QObject, QTimer, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
+from slideviz.mesh.undone import is_alive
+
 REST_S = 5.0
 """An error that was told is told again when it has not come for so long."""
 COUNTING_MS = 300
@@ -209,14 +211,3 @@ def old_crashes(folder: Path) -> list[Path]:
             when = datetime.fromtimestamp(path.stat().st_mtime)
             found.append(path.replace(folder / f"crash-{when:%Y%m%d-%H%M%S}-{path.stem[6:]}.txt"))
     return found
-
-
-def is_alive(pid: str) -> bool:
-    """Tell whether a process of that number runs; what is no number is none."""
-    try:
-        os.kill(int(pid), 0)
-    except (ValueError, OverflowError, ProcessLookupError):
-        return False
-    except OSError:
-        return True
-    return True

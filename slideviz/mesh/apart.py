@@ -7,6 +7,7 @@ memory, it can be stopped at any moment, and the window stays alive meanwhile.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
 import resource
@@ -15,6 +16,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from slideviz.errors import MeshError
@@ -22,6 +24,7 @@ from slideviz.mesh.check import path_error
 from slideviz.mesh.foreign import read_foreign
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.su2_scan import Progress
+from slideviz.mesh.undone import ended
 
 _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
@@ -31,6 +34,7 @@ _MEMORY_PER_BYTE = 200
 _TICK_SECONDS = 0.05
 _BYTES_PER_SECOND = 5e6
 _CHUNK_BYTES = 1 << 20
+_SET_DEATH_SIGNAL = 1
 
 
 def read_apart(path: Path, progress: Progress) -> Mesh:
@@ -45,7 +49,7 @@ def read_apart(path: Path, progress: Progress) -> Mesh:
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
     # Without -P a file numpy.py in the folder of the mesh would be run.
     command = [sys.executable, "-P", "-c", f"from {__name__} import main; main()"]
-    command += [*map(str, _limits(path.stat().st_size)), str(path)]
+    command += [*map(str, (os.getpid(), *_limits(path.stat().st_size))), str(path)]
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(part for part in sys.path if part),
@@ -53,21 +57,17 @@ def read_apart(path: Path, progress: Progress) -> Mesh:
         "OPENBLAS_NUM_THREADS": "1",
     }
     answer = bytearray()
-    with _started(path, command, environment) as reader:
+    with _started(path, command, environment) as reader, ended(reader):
         assert reader.stdout is not None
-        try:
-            while True:
-                spent = time.monotonic() - begun
-                progress(0.9 * spent / (spent + expected))
-                if not select.select([reader.stdout], [], [], _TICK_SECONDS)[0]:
-                    continue
-                chunk = os.read(reader.stdout.fileno(), _CHUNK_BYTES)
-                if not chunk:
-                    break
-                answer += chunk
-        except BaseException:
-            reader.kill()
-            raise
+        while True:
+            spent = time.monotonic() - begun
+            progress(0.9 * spent / (spent + expected))
+            if not select.select([reader.stdout], [], [], _TICK_SECONDS)[0]:
+                continue
+            chunk = os.read(reader.stdout.fileno(), _CHUNK_BYTES)
+            if not chunk:
+                break
+            answer += chunk
         code = reader.wait()
     mesh = _unpacked(path, bytes(answer), code)
     progress(1.0)
@@ -129,12 +129,14 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
 def main() -> None:
     """Read a file and send it through the standard output.
 
-    The arguments are seconds, bytes of memory, and the path.
+    The arguments are the number of the process that waits for it, seconds, bytes of memory, and
+    the path.
     """
+    _die_with(int(sys.argv[1]))
     # Whatever prints must not get into the answer.
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        seconds, memory, path = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+        seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         try:
@@ -147,6 +149,14 @@ def main() -> None:
             markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
             cells = (mesh.cells.types, mesh.cells.connectivity)
             pickle.dump((mesh.points, cells, markers, mesh.name), channel)
+
+
+def _die_with(parent: int) -> None:
+    """Let the system end this process when the one that waits for it is killed."""
+    with suppress(OSError, AttributeError):  # other systems than Linux have no such call
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:  # it was killed before
+        sys.exit(1)
 
 
 def _too_large(path: Path) -> MeshError:

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from slideviz.errors import MeshError, SlidevizError
+from slideviz.mesh.inputs import require_no_input
+from slideviz.mesh.undone import draft
 
 _REMEDIES = {
     errno.ENOENT: "the folder does not exist; create it first",
@@ -32,7 +33,9 @@ _REMEDIES = {
 
 
 @contextmanager
-def atomic_write(path: str | Path, error: type[SlidevizError] = MeshError) -> Iterator[BinaryIO]:
+def atomic_write(
+    path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
+) -> Iterator[BinaryIO]:
     """Return a binary file to write; it takes the place of ``path`` when the block ends well.
 
     When the block raises, whatever was at ``path`` stays as it was and the temporary file is
@@ -44,41 +47,41 @@ def atomic_write(path: str | Path, error: type[SlidevizError] = MeshError) -> It
         The file to write.
     error : type of SlidevizError
         The class of error to raise: ``MeshError`` unless another is given.
+    replaces : Path, optional
+        The input that may be written over; see `slideviz.mesh.inputs`.
 
     Raises
     ------
     SlidevizError
-        It cannot be written: missing folder, no permission, full disk. The message has the
-        path, the reason and the remedy.
+        It cannot be written: missing folder, no permission, full disk; or it is an input. The
+        message has the path, the reason and the remedy.
     """
     target = Path(path)
+    require_no_input(target, error, replaces)
     temporary: Path | None = None
     try:
         real = Path(os.path.realpath(target))
         mode = _mode_of(real)
-        temporary = real.parent / f".slideviz-{secrets.token_hex(8)}.tmp"
-        with temporary.open("xb") as file:
-            yield file
-            file.flush()
-            # Some file systems report a full disk only now; and without it a power cut after
-            # the renaming could leave an empty file.
-            os.fsync(file.fileno())
-        if mode is not None:
-            temporary.chmod(mode)
-        temporary.replace(real)
-        temporary = None
+        with draft(real.parent) as temporary:
+            with temporary.open("xb") as file:
+                yield file
+                file.flush()
+                # Some file systems report a full disk only now; and without it a power cut
+                # after the renaming could leave an empty file.
+                os.fsync(file.fileno())
+            if mode is not None:
+                temporary.chmod(mode)
+            temporary.replace(real)
     except OSError as problem:
         # The block may have failed to read some other file, which is not ours to explain.
         if problem.filename is not None and not _is_ours(problem.filename, target, temporary):
             raise
         raise error(f"{target}: cannot be written: {reason_of(problem)}") from problem
-    finally:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
 
 
-def require_writable(path: str | Path, error: type[SlidevizError] = MeshError) -> None:
+def require_writable(
+    path: str | Path, error: type[SlidevizError] = MeshError, replaces: Path | None = None
+) -> None:
     """Check that a file could be written now, before the work that leads to it; nothing is left.
 
     Raises
@@ -86,12 +89,12 @@ def require_writable(path: str | Path, error: type[SlidevizError] = MeshError) -
     SlidevizError
         It cannot be written, as for `atomic_write`.
     """
+    require_no_input(Path(path), error, replaces)
     real = Path(os.path.realpath(path))
-    draft = real.parent / f".slideviz-{secrets.token_hex(8)}.tmp"
     try:
         _mode_of(real)
-        draft.touch(exist_ok=False)
-        draft.unlink()
+        with draft(real.parent) as temporary:
+            temporary.touch(exist_ok=False)
     except OSError as problem:
         raise error(f"{path}: cannot be written: {reason_of(problem)}") from problem
 

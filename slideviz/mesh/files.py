@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.check import path_error
 from slideviz.mesh.model import Mesh
+from slideviz.mesh.opened import require_ordinary
 from slideviz.mesh.su2 import read_su2
 from slideviz.mesh.su2_scan import Progress
 from slideviz.mesh.su2_write import su2_blocks
@@ -65,11 +65,7 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
 def _is_su2(path: Path) -> bool:
     """Tell whether it is an SU2 file, by ending or, where that says nothing, by content."""
     try:
-        mode = path.stat().st_mode
-        if stat.S_ISDIR(mode):
-            raise path_error(path, "this is a folder; choose a mesh file in it")
-        if not stat.S_ISREG(mode):
-            raise path_error(path, "this is a device or pipe; choose an ordinary file")
+        require_ordinary(path, MeshError)
         if path.suffix.lower() not in _UNSURE:
             return path.suffix.lower() == ".su2"
         with path.open("rb") as file:
@@ -103,6 +99,8 @@ def _unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
     """Return the error for a file that the system does not give."""
     if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
         return path_error(path, "there is no such file; check the name and the folder")
+    if isinstance(problem, IsADirectoryError):
+        return path_error(path, "this is a folder; choose a mesh file in it")
     if isinstance(problem, PermissionError):
         remedy = "no permission; change its permissions or copy it to another folder"
     else:
@@ -145,17 +143,18 @@ def write(
             "this is the file that the mesh was read from; choose another name, or ask "
             "for overwriting",
         )
+    replaces = path if overwrite else None
     values = _checked(mesh, cell_data or {})
     if path.suffix.lower() != ".su2":
         from slideviz.mesh.foreign_write import write_foreign
 
-        write_foreign(path, mesh, values)
+        write_foreign(path, mesh, values, replaces)
         return
     if values:
         raise path_error(
             path, f"an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu file"
         )
-    with atomic_write(path) as file:
+    with atomic_write(path, replaces=replaces) as file:
         for block in su2_blocks(mesh):
             file.write(block)
             if going_on is not None:

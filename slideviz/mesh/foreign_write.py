@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.foreign import MESHIO_TYPES
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quiet_meshio import formats_of, load, quiet
+from slideviz.mesh.undone import draft
 from slideviz.mesh.vtu import vtu_blocks
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ _EXACT = 1e-12
 """Coordinates may differ by this fraction of the extent: the last digits of a text format."""
 
 
-def write_foreign(path: Path, mesh: Mesh, cell_data: Mapping[str, NDArray]) -> None:
+def write_foreign(
+    path: Path, mesh: Mesh, cell_data: Mapping[str, NDArray], replaces: Path | None = None
+) -> None:
     """Write a mesh in the format that the ending names.
 
     Names of boundaries are kept in VTU, Gmsh, MED and Abaqus files; other formats get numbers at
@@ -53,20 +55,20 @@ def write_foreign(path: Path, mesh: Mesh, cell_data: Mapping[str, NDArray]) -> N
     """
     check_mesh(mesh)
     if path.suffix.lower() == ".vtu":
-        with atomic_write(path) as file:
+        with atomic_write(path, replaces=replaces) as file:
             for block in vtu_blocks(mesh, cell_data):
                 file.write(block)
         return
     name = formats_of(path)[0]
     data = _to_meshio(mesh, cell_data, name)
-    with atomic_write(path) as file:
+    with atomic_write(path, replaces=replaces) as file:
         # meshio wants a name, and some formats write several files.
         try:
-            with tempfile.TemporaryDirectory(prefix=".slideviz-", dir=path.parent) as folder:
-                draft = Path(folder) / path.name
-                _write(path, draft, data, name)
-                _compare(path, draft, data, name)
-                with draft.open("rb") as source:
+            with draft(path.parent, is_folder=True) as folder:
+                trial = folder / path.name
+                _write(path, trial, data, name)
+                _compare(path, trial, data, name)
+                with trial.open("rb") as source:
                     shutil.copyfileobj(source, file)
         except OSError as problem:
             raise path_error(
@@ -76,24 +78,24 @@ def write_foreign(path: Path, mesh: Mesh, cell_data: Mapping[str, NDArray]) -> N
             ) from problem
 
 
-def _write(path: Path, draft: Path, data: meshio.Mesh, name: str) -> None:
+def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     import meshio
 
     # Without this XDMF puts the numbers in a second file.
     options = {"data_format": "XML"} if name == "xdmf" else {}
     with quiet(path, f"written as {name}"):
-        meshio.write(draft, data, file_format=_WRITTEN_AS.get(name, name), **options)
-    if len(list(draft.parent.iterdir())) != 1:
+        meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
+    if len(list(trial.parent.iterdir())) != 1:
         raise path_error(
             path,
             f"cannot be written: the format {name} needs several files; use another, such as .vtu",
         )
 
 
-def _compare(path: Path, draft: Path, data: meshio.Mesh, name: str) -> None:
+def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
     """Raise when the file does not hold all that should be in it."""
     try:
-        found = load(draft, [name])
+        found = load(trial, [name])
     except MeshError as problem:
         raise path_error(
             path,

@@ -620,7 +620,7 @@ def test_disk_full_for_the_draft(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("slideviz.mesh.foreign_write.tempfile.TemporaryDirectory", full)
+    monkeypatch.setattr("slideviz.mesh.foreign_write.draft", full)
     with pytest.raises(
         MeshError, match=r"out.vtk: cannot be written: No space left on device; fre"
     ):

@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import SlidevizError
-from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.atomic import atomic_write, require_writable
+from slideviz.mesh.inputs import require_no_input
+from slideviz.mesh.undone import draft, ended
 from slideviz.view.pictures.offscreen import png_bytes
 
 if TYPE_CHECKING:
@@ -120,7 +122,7 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
             except OSError:
                 _raise_ffmpeg(file, process, log)
 
-        try:
+        with ended(process):
             yield add
             try:
                 pipe.close()
@@ -128,9 +130,6 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
                 _raise_ffmpeg(file, process, log)
             if process.wait():
                 _raise_ffmpeg(file, process, log)
-        finally:
-            process.kill()
-            process.wait()
 
 
 def _start_ffmpeg(
@@ -235,12 +234,14 @@ def _pngs(file: Path, take: Take) -> Iterator[Add]:
     try:
         with _told(file):
             folder.mkdir(exist_ok=True)
-            drawer = tempfile.TemporaryDirectory(prefix=".slideviz-", dir=folder)
-        with drawer:
+        require_writable(paths[0], SlidevizError)
+        for path in paths:
+            require_no_input(path, SlidevizError)
+        with draft(folder, is_folder=True) as drawer:
             drawn: list[Path] = []
 
             def add(image: Pixels, _: float) -> None:
-                drawn.append(Path(drawer.name, str(len(drawn))))
+                drawn.append(drawer / str(len(drawn)))
                 with _told(file):
                     drawn[-1].write_bytes(png_bytes(image))
 
