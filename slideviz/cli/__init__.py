@@ -1,6 +1,7 @@
 """The command line: the only room that prints or chooses an exit code.
 
-0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted; 130 cancelled.
+0 done; 1 the mesh or case is wrong; 2 wrong usage; 3 done, but cells are inverted; 130 cancelled;
+143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
+from slideviz.cli.terminal import terminal
 from slideviz.errors import Cancelled, SlidevizError
 
 DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
@@ -18,6 +20,11 @@ DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
+    with terminal():
+        return _run(argv)
+
+
+def _run(argv: Sequence[str]) -> int:
     # It reports fonts for formulas that it replaces, a line for each, where its cache is new.
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
@@ -39,7 +46,6 @@ def run(argv: Sequence[str]) -> int:
         return _fail("out of memory; use a coarser mesh or close other programs", WRONG_INPUT)
     except BrokenPipeError:
         # The reader of our output is gone (`slideviz info MESH | head`): nothing to tell it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except OSError as problem:
         return _fail(str(problem), WRONG_INPUT)

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from slideviz.cli.terminal import control
+
 if TYPE_CHECKING:
     from slideviz.staircase import Progress
 
@@ -40,7 +42,7 @@ def compiling_told(quiet: bool) -> Iterator[None]:
                 self.told = True
                 words = "compiling loops that are used for the first time: some seconds, once"
                 wipe = _WIPE if sys.stderr.isatty() else ""
-                print(f"{wipe}slideviz: {words}", file=sys.stderr, flush=True)
+                control(f"{wipe}slideviz: {words}\n")
 
         def on_end(self, _: object) -> None:
             pass
@@ -77,7 +79,7 @@ class Bar:
         trace: TracebackType | None,
     ) -> None:
         if self.enabled:
-            print(_WIPE, end="", file=sys.stderr, flush=True)
+            control(_WIPE)
 
     def __call__(self, progress: Progress) -> None:
         """Draw the bar, at most ten times a second."""
@@ -104,4 +106,4 @@ class Bar:
     def _draw(self, done: float, text: str) -> None:
         filled = round(24 * done)
         bar = f"[{'#' * filled}{'.' * (24 - filled)}] {text}"
-        print(f"{_WIPE}{bar}", end="", file=sys.stderr, flush=True)
+        control(f"{_WIPE}{bar}")
