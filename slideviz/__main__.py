@@ -63,9 +63,9 @@ def _wait(read: int) -> None:
         number = os.read(read, 1)[0]
     try:
         # Nothing is to be undone as long as this is not loaded.
-        undone = sys.modules.get("slideviz.mesh.undone")
-        if hasattr(undone, "undo"):
-            undone.undo()
+        undo = getattr(sys.modules.get("slideviz.mesh.undone"), "undo", None)
+        if undo is not None:
+            undo()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
         words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; nothing half-written is left\n"
         # Past Python's streams, which another thread may hold.

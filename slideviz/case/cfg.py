@@ -66,7 +66,7 @@ def write_case(path: Path, case: Case, remarks: Iterable[str] = ()) -> None:
         problems = [(0, "a case file cannot hold some of its values; check roles and motions")]
     if problems:
         raise CaseError("\n".join(f"{path}: cannot be written: {text}" for _, text in problems))
-    with atomic_write(path, CaseError) as file:
+    with atomic_write(path, CaseError, case.source) as file:
         file.write(text.encode("utf-8"))
 
 

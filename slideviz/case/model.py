@@ -162,6 +162,14 @@ class Case:
         """Return the names that have this role, in order."""
         return tuple(name for name, given in self.roles.items() if given == role)
 
+    def inputs(self) -> dict[Path, str]:
+        """Return the files that are read for it, and what they are in words."""
+        found = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
+        if self.source is not None:
+            found[self.source] = "the case file"
+        files = (motion.path for motion in self.motions if isinstance(motion, FromFile))
+        return found | dict.fromkeys(files, "a displacement file")
+
     @classmethod
     def read(cls, path: str | Path) -> Case:
         """Return the case that a ``.cfg`` file describes.

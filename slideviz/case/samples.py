@@ -136,6 +136,7 @@ def write_sample(
     CaseError, MeshError
         As of ``sample``; or a file exists or cannot be written.
     """
+    from slideviz.case.cfg import write_case
     from slideviz.mesh.files import write
 
     made, folder = sample(name, size, variant), Path(folder)
@@ -149,11 +150,12 @@ def write_sample(
     except OSError as problem:
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
-    write(mesh, made.mesh)
+    write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
-        with atomic_write(table, CaseError) as file:
+        with atomic_write(table, CaseError, table if overwrite else None) as file:
             file.write(_displacement_text(made.displacement).encode())
-    _in_folder(made.case, folder, name).write(case)
+    placed = _in_folder(made.case, folder, name)
+    write_case(case, placed.change(source=case if overwrite else None))
     return paths
 
 

@@ -29,10 +29,16 @@ def _run(argv: Sequence[str]) -> int:
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
+        from slideviz.cli.places import inputs_of
         from slideviz.cli.progress import compiling_told
+        from slideviz.mesh.inputs import spared
 
         arguments = parse(argv)
-        with compiling_told(getattr(arguments, "quiet", False)):
+        arguments.inputs = inputs_of(arguments)
+        with (
+            spared(lambda: arguments.inputs),
+            compiling_told(getattr(arguments, "quiet", False)),
+        ):
             code = int(arguments.command(arguments))
         sys.stdout.flush()  # here, where a reader that is gone can still be handled
         return code

@@ -45,12 +45,12 @@ def info(arguments: argparse.Namespace) -> int:
     """Tell what is in a mesh file."""
     from slideviz import quality, read
     from slideviz.cli import DONE
-    from slideviz.cli.places import require_files
+    from slideviz.cli.places import Output, require_places
     from slideviz.cli.report import info_report, save_json, table
     from slideviz.mesh.check import unused_nodes
     from slideviz.mesh.periodic import find_pairs
 
-    require_files(arguments.json)
+    require_places(arguments, Output(arguments.json, "--json"))
     mesh = read(arguments.mesh, zone=arguments.zone)
     found = quality(mesh)
     report = info_report(mesh, find_pairs(mesh), len(unused_nodes(mesh)), found)
@@ -84,7 +84,7 @@ def quality(arguments: argparse.Namespace) -> int:
     from slideviz import Case, read, write
     from slideviz import quality as rate
     from slideviz.cli import DONE, INVERTED
-    from slideviz.cli.places import require_files, require_mesh_file
+    from slideviz.cli.places import Output, note_case, require_places
     from slideviz.cli.reference import reference_of, words_of
     from slideviz.cli.report import (
         histogram_lines,
@@ -95,11 +95,16 @@ def quality(arguments: argparse.Namespace) -> int:
     )
 
     is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
-    if arguments.output and not is_table:
-        require_mesh_file(arguments.output)
-    require_files(arguments.json, arguments.output)
+    case = Case.read(arguments.case) if arguments.case else None
+    if case is not None:
+        note_case(arguments, case)
+    require_places(
+        arguments,
+        Output(arguments.output, "-o", is_mesh=not is_table),
+        Output(arguments.json, "--json"),
+    )
     mesh = read(arguments.mesh, zone=arguments.zone)
-    base = reference_of(arguments, mesh, Case.read(arguments.case) if arguments.case else None)
+    base = reference_of(arguments, mesh, case)
     found = rate(mesh, reference=base[1] if base else None, metric=arguments.metric)
     report = quality_report(mesh, found) | {"reference": str(base[0]) if base else None}
     if is_table:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from slideviz.view.compare.combinations import Combination, Row
 
 STEPS = (1, 5, 20)
+TABLE, HISTORY = "compare.csv", "convergence.csv"
 KEPT_BYTES = 1_500_000_000
 """Deformed meshes are kept for the pictures up to this size together."""
 
@@ -70,7 +71,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli import DONE
-    from slideviz.cli.places import make_folder, require_files
+    from slideviz.cli.places import Output, make_folder, require_places
     from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
     from slideviz.view.compare.combinations import METHODS, MODES, warm
@@ -84,7 +85,8 @@ def compare(arguments: argparse.Namespace) -> int:
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
     mesh = read(case.mesh_file, zone=case.zone)
     make_folder(folder)
-    require_files(folder / "compare.csv")
+    tables = [folder / TABLE, folder / HISTORY]
+    require_places(arguments, *(Output(table, "compare", named=False) for table in tables))
     cannot = refused(case, mesh, wanted)
 
     def say(text: str) -> None:
@@ -159,7 +161,7 @@ def _computed(
     from slideviz.view.compare.combinations import bounded, compare
     from slideviz.view.compare.table import csv_text, history_text, save_text, terminal_line
 
-    table, histories = folder / "compare.csv", folder / "convergence.csv"
+    table, histories = folder / TABLE, folder / HISTORY
     files = [table]
     rows: list[Row] = []
     case, mesh, wanted, cannot = asked

@@ -24,8 +24,10 @@ SMOOTH = 4
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film."""
     from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.places import Output, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.run_command import read_case
+    from slideviz.view.pictures.encode import kind_of
     from slideviz.view.pictures.film import film as draw
     from slideviz.view.pictures.film_pair import film_pair, pair_size
     from slideviz.view.pictures.reel import Reel, check_film
@@ -35,7 +37,10 @@ def film(arguments: argparse.Namespace) -> int:
     check_film(file, reel, overwrite=arguments.force)  # before the work, not after it
     if arguments.beside:
         pair_size(reel.pixels(file))
-    runs = _runs(arguments, read_case(arguments))
+    case = read_case(arguments)
+    if kind_of(file) != ".png":  # of pictures it is not known yet how many there will be
+        require_places(arguments, Output(file, "-o"))
+    runs = _runs(arguments, case)
     look = {"colour_by": arguments.color.replace("-", "_"), "zoom": arguments.zoom}
     look["overwrite"] = arguments.force
     if len(runs) == 2:

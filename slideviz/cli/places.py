@@ -1,39 +1,153 @@
-"""Where results are to go: looked at before the work, so that it is not done in vain."""
+"""Which files a command reads and writes: compared before the work, so that none is done in vain.
+
+No file that is read is written over, and no two results go to one file.
+"""
 
 from __future__ import annotations
 
+import argparse
+import os
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+
+_READ = {
+    "mesh": "the input mesh",
+    "case": "the case file",
+    "reference": "the reference mesh",
+}
+"""What the files are that a command line names to be read, by the name of their argument."""
 
 
-def require_files(*files: Path | None) -> None:
-    """Raise where a file cannot be written; None and ``-``, the terminal, always can.
+@dataclass(frozen=True)
+class Output:
+    """A file that a command writes, or a folder of files.
 
-    Raises
-    ------
-    CaseError
-        The folder is missing, there is no permission, or a folder has that name.
+    Attributes
+    ----------
+    path : Path or None
+        None, or ``-`` (the terminal), where nothing is written.
+    option : str
+        What names it: an option, or a key of the case.
+    named : bool
+        Whether it stands on the command line; if not, it is told that an older file is replaced.
+    files : str
+        Of a folder: the regular expression of the names of the files in it.
+    is_mesh : bool
+        Whether its ending must be that of a mesh.
+    replaces : Path or None
+        The input that it may be.
+    remedy : str
+        What helps where it is an input.
     """
-    from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import require_writable
 
-    for file in files:
-        if file is not None and str(file) != "-":
-            require_writable(file, CaseError)
+    path: Path | None
+    option: str
+    named: bool = True
+    files: str = ""
+    is_mesh: bool = False
+    replaces: Path | None = None
+    remedy: str = ""
 
 
-def require_mesh_file(file: Path) -> None:
-    """Raise where a mesh cannot be written: as `require_files`, or its ending is unknown.
+def inputs_of(arguments: argparse.Namespace) -> dict[Path, str]:
+    """Return the files that the command line names to be read, and what they are in words."""
+    found = {what: getattr(arguments, name, None) for name, what in _READ.items()}
+    return {path: what for what, path in found.items() if path is not None}
+
+
+def note_case(arguments: argparse.Namespace, case: Case) -> None:
+    """Add the files that a case names to be read to those of the command line."""
+    for path, what in case.inputs().items():
+        arguments.inputs.setdefault(path, what)
+
+
+def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
+    """Raise where a result must not be written, or cannot; tell which older files are replaced.
 
     Raises
     ------
     SlidevizError
-        It cannot.
+        It is a file that is read, or two results go to one file, or the folder is missing, there
+        is no permission, a folder has that name, or no mesh format has that ending.
     """
+    from slideviz.errors import CaseError
+    from slideviz.mesh.atomic import require_writable
+    from slideviz.mesh.inputs import require_no_input
+
+    there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
+    for one in there:
+        assert one.path is not None
+        # An input, before all else: that is the worst.
+        for path in _paths(one):
+            require_no_input(path, CaseError, one.replaces, one.remedy)
+    for one, other in combinations(there, 2):
+        if _meet(one, other) or _meet(other, one):
+            file = one.path if other.files else other.path
+            raise CaseError(
+                f"{one.option} and {other.option} both name {file}; give each a file of its own"
+            )
+    for one in there:
+        assert one.path is not None
+        if one.is_mesh:
+            _require_mesh_ending(one.path)
+        if one.files:
+            make_folder(one.path)
+        else:
+            require_writable(one.path, CaseError, one.replaces)
+    if not getattr(arguments, "quiet", False):
+        _tell_replaced([one for one in there if not one.named])
+
+
+def _tell_replaced(unnamed: list[Output]) -> None:
+    """Say before the work which older files it will replace, in one line."""
+    told = []
+    for one in unnamed:
+        old = [path for path in _paths(one) if path.exists()]
+        if old:
+            more = f" and {len(old) - 1} more" if len(old) > 1 else ""
+            told.append(f"{old[0]}{more} ({one.option})")
+    if told:
+        words = f"there already, and replaced by this run: {', '.join(told)}"
+        print(f"slideviz: note: {words}", file=sys.stderr, flush=True)
+
+
+def _paths(one: Output) -> Iterator[Path]:
+    """Yield the file, or those of the folder that are there."""
+    assert one.path is not None
+    if not one.files:
+        yield one.path
+    elif one.path.is_dir():
+        yield from sorted(path for path in one.path.iterdir() if re.fullmatch(one.files, path.name))
+
+
+def _meet(one: Output, other: Output) -> bool:
+    """Tell whether two results would go to one file; the other is a file."""
+    from slideviz.mesh.inputs import same_file
+
+    assert one.path is not None
+    assert other.path is not None
+    if other.files:
+        return False
+    if not one.files or same_file(one.path, other.path):
+        return same_file(one.path, other.path)
+    folder, name = os.path.split(os.path.realpath(other.path))
+    inside = os.path.realpath(one.path) == folder and re.fullmatch(one.files, name)
+    return bool(inside) or any(same_file(path, other.path) for path in _paths(one))
+
+
+def _require_mesh_ending(file: Path) -> None:
     if file.suffix.lower() not in (".su2", ".vtu"):
         from slideviz.mesh.quiet_meshio import formats_of
 
         formats_of(file)
-    require_files(file)
 
 
 def make_folder(folder: Path) -> None:

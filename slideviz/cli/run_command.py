@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 from dataclasses import replace
@@ -34,10 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
-    if not arguments.force:
-        _refuse_input(output, case.mesh_file)
     qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
-    _require_places(arguments, output, qualities)
+    _require_places(arguments, case, output, qualities)
     seconds = {"read": -time.perf_counter()}
     mesh = read(case.mesh_file, zone=case.zone)
     if arguments.picture:
@@ -81,30 +80,55 @@ def run(arguments: argparse.Namespace) -> int:
     return DONE
 
 
-def _require_places(arguments: argparse.Namespace, output: Path, qualities: Path | None) -> None:
+def _require_places(
+    arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
+) -> None:
     """Raise where a result could not be written, before the work and not after it."""
-    from slideviz.cli.places import make_folder, require_files, require_mesh_file
+    from slideviz.cli.places import Output, require_places
 
-    require_mesh_file(output)
+    assert case.mesh_file is not None
+    mesh = Output(
+        output,
+        "-o" if arguments.output else "MESH_OUT_FILENAME" if case.mesh_out else "without -o",
+        named=bool(arguments.output),
+        is_mesh=True,
+        replaces=case.mesh_file if arguments.force else None,
+        remedy="choose another name with -o or MESH_OUT_FILENAME"
+        + ("" if arguments.force else ", or say --force to write over it"),
+    )
     if arguments.picture:
         from slideviz.view.pictures.offscreen import check_png, check_size
         from slideviz.view.pictures.picture import SIZE
 
         check_png(arguments.picture)
         check_size(arguments.picture_size or SIZE)
-    require_files(qualities, arguments.json, arguments.picture, arguments.history)
-    if arguments.steps_dir:
-        make_folder(arguments.steps_dir)
+    require_places(
+        arguments,
+        mesh,
+        Output(qualities, "GENERATE_QUALITY", named=False),
+        Output(arguments.json, "--json"),
+        Output(arguments.picture, "--picture"),
+        Output(arguments.history, "--history"),
+        Output(
+            arguments.steps_dir,
+            "--steps-dir",
+            named=False,
+            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.su2",
+        ),
+    )
 
 
 def read_case(arguments: argparse.Namespace) -> Case:
     """Return the case of the file with the changes of ``--set`` and ``--zone``."""
     from slideviz import Case
+    from slideviz.cli.places import note_case
 
     case = changed(Case.read(arguments.case), arguments.set)
     if getattr(arguments, "step_count", None) is not None:
         case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
-    return case if arguments.zone is None else case.change(zone=arguments.zone)
+    case = case if arguments.zone is None else case.change(zone=arguments.zone)
+    note_case(arguments, case)
+    return case
 
 
 def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
@@ -135,16 +159,6 @@ def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
 def _default_output(mesh_file: Path) -> Path:
     """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
     return Path(f"{mesh_file.stem}_def{mesh_file.suffix}")
-
-
-def _refuse_input(output: Path, mesh_file: Path) -> None:
-    from slideviz.errors import CaseError
-
-    if output.exists() and mesh_file.exists() and output.samefile(mesh_file):
-        raise CaseError(
-            f"{output} is the input mesh; choose another name with -o or MESH_OUT_FILENAME, "
-            "or say --force to write over it"
-        )
 
 
 def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:

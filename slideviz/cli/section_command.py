@@ -18,7 +18,7 @@ def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
     from slideviz import Case, quality, read
     from slideviz.cli import DONE, INVERTED
-    from slideviz.cli.places import require_files
+    from slideviz.cli.places import Output, note_case, require_places
     from slideviz.cli.reference import NONE, reference_of, words_of
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
@@ -31,8 +31,10 @@ def section(arguments: argparse.Namespace) -> int:
 
     _check_usage(arguments)
     require_picture_name(arguments.output)
-    require_files(arguments.output, arguments.json)
     case = Case.read(arguments.case) if arguments.case else None
+    if case is not None:
+        note_case(arguments, case)
+    require_places(arguments, Output(arguments.output, "-o"), Output(arguments.json, "--json"))
     mesh = read(arguments.mesh, zone=arguments.zone)
     known = reference_of(arguments, mesh, case)
     base = known[1] if known else None

@@ -20,7 +20,7 @@ _SIMPLER = str.maketrans({"█": "#", "▏": "|", "…": "...", "’": "'", "“
 
 
 class Terminal:
-    """A stream that shows control characters as ``\\x1b``, and what cannot be encoded likewise.
+    r"""A stream that shows control characters as ``\x1b``, and what cannot be encoded likewise.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _encodable(text: str, encoding: str) -> str:
 def terminal() -> Iterator[None]:
     """Let all that is printed go through here."""
     out, err = Terminal(sys.stdout, needed=True), Terminal(sys.stderr, needed=False)
-    with redirect_stdout(out), redirect_stderr(err):  # type: ignore[type-var]
+    with redirect_stdout(out), redirect_stderr(err):
         yield
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import ExitStack
 from pathlib import Path
 
 from qtpy.QtCore import QSettings, QTimer
@@ -27,6 +28,7 @@ from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewing import Viewing
 from slideviz.gui.warm import WarmUp
+from slideviz.mesh.inputs import spared
 from slideviz.view import jobs
 from slideviz.view.session import changes
 from slideviz.view.session.store import Store
@@ -70,6 +72,8 @@ class MainWindow(QMainWindow):
         self.help = Help(self)
         self._closed = False
         self.left_behind = False
+        self._kept = ExitStack()
+        self._kept.enter_context(spared(self._inputs))
         self._make_centre(multi_samples)
         self.docks_ = Docks(self)
         self._make_status()
@@ -111,6 +115,10 @@ class MainWindow(QMainWindow):
         self.player = Player(self.store)
         column.addWidget(self.player)
         self.setCentralWidget(centre)
+
+    def _inputs(self):
+        """Return the files that are not to be written over, and what they are."""
+        return self.store.session.inputs()
 
     @property
     def view(self):
@@ -338,4 +346,5 @@ class MainWindow(QMainWindow):
             self.docks_.panels["log"].detach()
             self.cutting.close_views()
             self.viewing.close_views()
+            self._kept.close()
         super().closeEvent(event)

@@ -19,7 +19,7 @@ _known: list[Callable[[], Inputs]] = []
 
 
 @contextmanager
-def kept(inputs: Callable[[], Inputs]) -> Iterator[None]:
+def spared(inputs: Callable[[], Inputs]) -> Iterator[None]:
     """Return a context in which these files are written over only where that was asked for."""
     _known.append(inputs)
     try:

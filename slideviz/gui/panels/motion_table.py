@@ -131,6 +131,6 @@ def ask_table(parent: QWidget, rows: Rows, path: Path, default: Path) -> Path | 
     while dialog.exec() == QDialog.DialogCode.Accepted:
         found = dialogs.ask_save(parent, "Save the table", path if there else default, FILTERS)
         if found is not None:
-            write_table(found, dialog.text)
+            write_table(found, dialog.text, path)
             return found
     return None

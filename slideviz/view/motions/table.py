@@ -83,15 +83,17 @@ class Rows:
         return "\n".join([*head, *rows]) + "\n"
 
 
-def write_table(path: Path, text: str) -> None:
+def write_table(path: Path, text: str, replaces: Path | None = None) -> None:
     """Write a table as a displacement file, whole or not at all.
+
+    ``replaces`` is the input that it may be written over: the file that the table was read from.
 
     Raises
     ------
     CaseError
         It cannot be written.
     """
-    with atomic_write(path, CaseError) as file:
+    with atomic_write(path, CaseError, replaces) as file:
         file.write(f"{text.rstrip()}\n".encode())
 
 

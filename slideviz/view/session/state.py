@@ -88,6 +88,11 @@ class Session:
     removed: tuple[Run, ...] = ()
     newest: int = 0
 
+    def inputs(self) -> dict[Path, str]:
+        """Return the files that it was read from, and what they are in words."""
+        found = self.case.inputs()
+        return found if self.path is None else found | {self.path: "the mesh that is open"}
+
     def run(self, number: int | None) -> Run | None:
         """Return the run of that number, if it is still there."""
         return next((run for run in self.runs if run.number == number), None)
