@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from slideviz.rbf.caching import njit
 
 POISSON = 0.3
 """Poisson's ratio, SU2's default."""

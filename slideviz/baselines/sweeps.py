@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
+
+from slideviz.rbf.caching import njit
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, half_chord
 
 TINY = 1e-24

@@ -10,10 +10,10 @@ discretizations", SIAM J. Sci. Comput. 41, 2019.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from slideviz.case.sample_sizing import Sizing
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.caching import njit
 
 NEAREST = 0.78
 """Least distance of two points over the edge length wanted there."""

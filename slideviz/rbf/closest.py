@@ -8,9 +8,10 @@ repeated, and two dimensions are three with z = 0.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import one_at_a_time
 
 LEAF = 4

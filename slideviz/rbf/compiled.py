@@ -17,8 +17,9 @@ from math import factorial
 from typing import Any
 
 import numpy as np
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import get_num_threads, prange, set_num_threads
 
+from slideviz.rbf.caching import njit
 from slideviz.rbf.kernels import SHAPE
 
 LOCK = threading.Lock()

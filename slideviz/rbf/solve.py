@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, LinAlgWarning, lstsq, qr, solve, solve_triangular
 from scipy.sparse.linalg import LinearOperator, onenormest
@@ -22,6 +21,7 @@ from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.caching import njit
 from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12

@@ -1,0 +1,91 @@
+"""``njit`` whose cache on disk mends itself: what is damaged there is compiled again.
+
+Numba trusts its cache: an index that was cut off (by a full disk, a killed process) ends the
+program, and so does machine code that is not what it was. Here both are sealed with a checksum,
+and a cache that can be neither read nor written costs the time to compile, and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+
+class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
+    """Index and machine code of one function, each behind its checksum."""
+
+    def _load_index(self) -> dict:
+        try:
+            sealed = Path(self._index_path).read_bytes()
+            version, stamp, overloads = pickle.loads(_opened(sealed))
+        except (OSError, ValueError):  # there is none yet, or it is damaged
+            return {}
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict) -> None:
+        content = self._dump((self._version, self._source_stamp, overloads))
+        with self._open_for_write(self._index_path) as file:
+            file.write(_sealed(content))
+
+    def _load_data(self, name: str) -> Any:
+        try:
+            return pickle.loads(_opened(Path(self._data_path(name)).read_bytes()))
+        except ValueError as problem:
+            raise OSError(str(problem)) from problem  # Numba compiles it and writes it again
+
+    def _save_data(self, name: str, data: Any) -> None:
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(_sealed(self._dump(data)))
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """The cache of one function."""
+
+    def __init__(self, function: Callable) -> None:
+        super().__init__(function)
+        self._cache_file = _SealedFile(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save what was compiled, where that can be done."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+def njit(**options: Any) -> Callable[[Callable], Any]:
+    """Return Numba's decorator ``njit`` with these options and the cache of this module."""
+
+    def compiled(function: Callable) -> Any:
+        dispatcher = numba.njit(**options)(function)
+        dispatcher._cache = _Cache(function)
+        return dispatcher
+
+    return compiled
+
+
+def _sealed(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest() + content
+
+
+def _opened(sealed: bytes) -> bytes:
+    """Return what was sealed.
+
+    Raises
+    ------
+    ValueError
+        It is not what it was.
+    """
+    content = sealed[32:]
+    if hashlib.sha256(content).digest() != sealed[:32]:
+        raise ValueError("the file is damaged")
+    return content
