@@ -10,6 +10,7 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
+from tests import builders
 
 REDUCTIONS = [None, Reduction(tolerance=1e-4)]
 
@@ -190,3 +191,26 @@ def test_a_blade_may_leave_its_place_on_the_hub(tmp_path, sliding):
     nodes = np.setdiff1d(mesh.marker("HUB").nodes, mesh.marker("BLADE").nodes)
     before, after = (np.hypot(*m.points[nodes, :2].T) for m in (mesh, last.mesh))
     assert np.abs(after - before).max() < 1e-12
+
+
+def test_direct_sliding_keeps_to_a_straight_edge_of_a_curved_surface():
+    """Only the rim of an internal boundary slides, so nothing that slides is curved here."""
+
+    def place(p):
+        x = p / np.array([6.0, 4.0, 4.0])
+        bump = 0.1 * np.sin(2 * np.pi * x[:, 0]) * (1 + 0.5 * np.cos(2 * np.pi * x[:, 2]))
+        x[:, 1] += bump * (1 - x[:, 1])
+        return x
+
+    mesh = builders.grid((6, 4, 4), place=place)
+    case = Case(
+        roles={"x_m": "sliding", "x_p": "sliding", "y_m": "internal", "y_p": "moving"},
+        motions=(Translate("y_p", (3e-5, 2e-5, 1e-5)),),
+        sliding="ds",
+        steps=3,
+    )
+    *_, last = sv.deform(case, mesh)
+    rim = np.intersect1d(mesh.marker("x_m").nodes, mesh.marker("y_m").nodes)
+    moved = last.mesh.points[rim] - mesh.points[rim]
+    assert np.abs(moved[:, 2]).max() > 1e-8
+    np.testing.assert_allclose(moved[:, :2], 0.0, atol=1e-15)

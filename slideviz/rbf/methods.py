@@ -21,6 +21,9 @@ from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Solution, Watch
 from slideviz.rbf.rows import AGREE, Rows, full_rows, merge, sliding_rows
 
+ROUNDING = 1e-14
+"""Part of the largest coordinate by which projecting a point of a flat boundary may move it."""
+
 
 class Fit(Protocol):
     """An interpolant that grows with the constraints it is given."""
@@ -77,9 +80,12 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
         free = within(problem, sliding, free)
     with watch.phase("project"):
         slid = problem.project(sliding, free)
-    gap = np.abs(slid - free).max(initial=0.0)
-    if not problem.curved and gap <= AGREE * problem.basis.radius:
-        return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, free]))
+    gap = np.abs(slid - free).max(axis=1, initial=0.0)
+    if not problem.curved and gap.max(initial=0.0) <= AGREE * problem.basis.radius:
+        # A straight edge of a curved surface: its nodes leave it a little along the normals.
+        off = gap[:, None] > ROUNDING * np.abs(problem.coords).max()
+        slid = np.where(off, slid, free)
+        return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, slid]))
     values = np.concatenate([problem.values, slid])
     second = _fit(problem, watch, fit.history)
     second.add(full_rows(problem, nodes, values))
