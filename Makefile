@@ -6,8 +6,11 @@ PYTEST := $(BIN)/python -m pytest
 # Each core takes tests from the others when it has none left (ARGS=-n0: one after the other).
 PARALLEL := -n auto --maxprocesses 4 --dist worksteal
 
+RUNS := 5000
+SEED := 0
+
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format bench shots study clean
+.PHONY: help setup demo test test-all lint format bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -37,6 +40,9 @@ format: setup ## let ruff put right what it can
 
 bench: setup ## measure the speed (needs a quiet machine)
 	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)
+
+laws: setup ## hold random runs against the laws of deformation (RUNS=5000 SEED=0)
+	$(BIN)/python -m tools.laws --runs $(RUNS) --seed $(SEED) $(ARGS)
 
 shots: setup ## draw the pictures in screenshots/ again
 	$(BIN)/slideviz shots

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from slideviz.case.model import Case, Motion, Radial, Reduction, Role, Rotate, Scale, Translate
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from tools.laws.meshes import Made, Period, Rng, nearest_neighbour, random_mesh
+from tools.laws.draw import Rng
+from tools.laws.made import Made, Period
+from tools.laws.meshes import nearest_neighbour, random_mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +68,11 @@ def _period(rng: Rng, made: Made, moving: tuple[str, ...]) -> Period | None:
     period = possible[int(rng.integers(len(possible)))]
     if len(period.sides) > 1 and rng.random() < 0.2:
         # One half repeats, the other is a wall.
-        return Period(period.sides[:1], *(getattr(period, k) for k in _REST))
+        return replace(period, sides=period.sides[:1])
     return period
 
 
-_REST = ("vector", "angle_deg", "axis", "origin")
-
-
-def _roles(
-    rng: Rng, made: Made, moving: tuple[str, ...], period: Period | None
-) -> dict[str, Role]:
+def _roles(rng: Rng, made: Made, moving: tuple[str, ...], period: Period | None) -> dict[str, Role]:
     """Return the role of each marker; some are left out, which makes them fixed."""
     style = rng.choice(["slide", "mixed"])
     chances = [0.8, 0.1, 0.1] if style == "slide" else [0.4, 0.4, 0.2]
@@ -103,7 +100,6 @@ def _method(rng: Rng, period: Period | None) -> dict[str, Any]:
     modes = ["none", "periodic", "fixed", "moving"][: 3 if sliding == "none" else 4]
     kind = "rotational" if period.angle_deg else "translational"
     out["periodic"] = str(rng.choice(modes))
-    # A full turn apart from a shift, only a mesh with an axis of its own needs the word.
     out["periodic_type"] = kind if period.angle_deg or rng.random() < 0.5 else "auto"
     if period.angle_deg:
         out |= {"axis": period.axis, "origin": period.origin}
@@ -178,7 +174,7 @@ def _motion(
         angle = float(np.degrees(min(part, 1.0)) * rng.choice([-1, 1]))
         return Rotate("", angle, point, axis)
     if kind == "scale":
-        return Scale("", tuple((1 + min(part, 0.5) * rng.uniform(-1, 1, rng.choice([1, dim])))))
+        return Scale("", tuple(1 + min(part, 0.5) * rng.uniform(-1, 1, rng.choice([1, dim]))))
     if kind == "radial":
         return Radial("", 1.0 + float(rng.uniform(-0.5, 0.5) * min(part, 0.5)), 0.0, axis, point)
     vector: FloatArray = rng.normal(size=dim)
@@ -189,8 +185,6 @@ def _motion(
 
 def _for(motion: Motion, marker: str, alone: bool) -> Motion:
     """Return the motion for a marker; about its own centroid where that is the same."""
-    from dataclasses import replace
-
     if alone and isinstance(motion, Rotate):
         return replace(motion, marker=marker, point="centroid")
     return replace(motion, marker=marker)

@@ -9,7 +9,7 @@ import numpy as np
 from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import axis_basis
-from tools.laws.meshes import Period
+from tools.laws.made import Period
 
 
 def carried(period: Period, points: FloatArray) -> FloatArray:
@@ -64,6 +64,10 @@ def _moved(motion: Motion, x: FloatArray) -> FloatArray:
     return x + out * (push / np.where(length > 0, length, 1.0) - (length > 0))
 
 
+CHUNK = 256
+"""Simplices that all points are held against at once."""
+
+
 class Frame:
     """The coordinates in which surfaces are taken: Cartesian, or (r, rho theta[, z])."""
 
@@ -95,6 +99,21 @@ class Frame:
         columns = [np.hypot(local[:, 0], local[:, 1]), self._rho * angle, local[:, 2]]
         return np.stack(columns[: self._dim], axis=1)
 
+    def on_axis(self, coords: FloatArray) -> np.ndarray:
+        """Tell which coordinates (n, d) are on the axis, where the angle means nothing."""
+        none = np.zeros(len(coords), bool)
+        return none if self._about is None else coords[:, 0] < 1e-9 * self._rho
+
+    def opened(self, sides: FloatArray) -> FloatArray:
+        """Return segments (s, 2, 2) with ends on the axis at the angle of their other end."""
+        if self._about is None or self._dim == 3:
+            return sides
+        out = sides.copy()
+        for end in (0, 1):
+            there = self.on_axis(sides[:, end])
+            out[there, end, 1] = sides[there, 1 - end, 1]
+        return out
+
 
 def simplices(mesh: Mesh, markers: Sequence[Marker], coords: FloatArray) -> FloatArray:
     """Return the segments or triangles (s, d, d) of markers.
@@ -112,34 +131,37 @@ def simplices(mesh: Mesh, markers: Sequence[Marker], coords: FloatArray) -> Floa
 def distance(x: FloatArray, sides: FloatArray) -> FloatArray:
     """Return how far points (m, d) are from the nearest simplex (s, d, d), (m,)."""
     best = np.full(len(x), np.inf)
-    for side in sides:
-        ends = [(0, 1)] if len(side) == 2 else [(0, 1), (1, 2), (2, 0)]
-        for a, b in ends:
-            best = np.minimum(best, _from_segment(x, side[a], side[b]))
-        if len(side) == 3:
-            best = np.minimum(best, _above(x, side))
+    for start in range(0, len(sides), CHUNK):
+        part = sides[start : start + CHUNK]
+        corners = part.shape[1]
+        for k in range(corners if corners == 3 else 1):
+            gap = _from_segments(x, part[:, k], part[:, (k + 1) % corners])
+            best = np.minimum(best, gap.min(axis=1))
+        if corners == 3:
+            best = np.minimum(best, _above(x, part).min(axis=1))
     return best
 
 
-def _from_segment(x: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+def _from_segments(x: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the distances (m, s) of points from segments."""
     t = b - a
-    square = float(t @ t)
-    part = np.clip((x - a) @ t / square, 0.0, 1.0) if square > 0 else np.zeros(len(x))
-    return np.linalg.norm(x - a - part[:, None] * t, axis=1)
+    square = np.maximum((t * t).sum(axis=1), 1e-300)
+    arm = x[:, None] - a
+    part = np.clip((arm * t).sum(axis=2) / square, 0.0, 1.0)
+    return np.linalg.norm(arm - part[:, :, None] * t, axis=2)
 
 
-def _above(x: FloatArray, side: FloatArray) -> FloatArray:
-    """Return the height over a triangle, infinite beside it."""
-    a, b, c = side
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal)
-    if length == 0:
-        return np.full(len(x), np.inf)
-    normal = normal / length
-    inside = np.ones(len(x), bool)
-    for p, q in ((a, b), (b, c), (c, a)):
-        inside &= (x - p) @ np.cross(normal, q - p) >= 0
-    return np.where(inside, np.abs((x - a) @ normal), np.inf)
+def _above(x: FloatArray, sides: FloatArray) -> FloatArray:
+    """Return the heights (m, s) of points over triangles, infinite beside them."""
+    foot, normal = sides[:, 0], np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normal / np.where(length > 0, length, 1.0)
+    inside = np.broadcast_to(length[:, 0] > 0, (len(x), len(sides))).copy()
+    for k in range(3):
+        a, b = sides[:, k], sides[:, (k + 1) % 3]
+        inside &= ((x[:, None] - a) * np.cross(normal, b - a)).sum(axis=2) >= 0
+    height = np.abs(((x[:, None] - foot) * normal).sum(axis=2))
+    return np.where(inside, height, np.inf)
 
 
 def planes(sides: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,7 +30,7 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
     if case.sliding == "none":
         return
     frame = Frame(mesh, run.period)
-    before, after = _at_axis(frame, run, mesh.points), frame.coords(points)
+    before, after = frame.coords(mesh.points), frame.coords(points)
     roles = ["sliding", "internal"]
     free = case.periodic in ("fixed", "moving")
     roles += [] if free else ["periodic"]
@@ -39,12 +39,13 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
     not_internal = nodes_with(case, mesh, "moving", "fixed", "sliding", "periodic")
     for marker in slide:
         nodes = np.setdiff1d(marker.nodes, known)
+        nodes = nodes[~frame.on_axis(before[nodes])]
         if case.roles[marker.name] == "internal":
             nodes = np.intersect1d(nodes, not_internal)
         if not len(nodes):
             continue
         near = [marker, *(m for m in slide if m is not marker and _smooth(run, marker, m, before))]
-        sides = simplices(mesh, near, before)
+        sides = frame.opened(simplices(mesh, near, before))
         flat = _flat(sides, rounding)
         if free:
             sides = np.concatenate([sides, sides - _shift(run, frame), sides + _shift(run, frame)])
@@ -64,11 +65,6 @@ def _shift(run: Run, frame: Frame) -> FloatArray:
     if run.period is None:
         return np.zeros(run.mesh.dim)
     return frame.turn if run.period.angle_deg else run.period.vector
-
-
-def _at_axis(frame: Frame, run: Run, points: FloatArray) -> FloatArray:
-    """Return the coordinates; a node on the axis in 2D takes the angle of a neighbour."""
-    return frame.coords(points)
 
 
 def _smooth(run: Run, one: Marker, other: Marker, coords: FloatArray) -> bool:

@@ -1,0 +1,167 @@
+"""The laws: what holds for every deformation, whatever the mesh, the method and the numbers.
+
+Each is a function of a run and its steps that yields a sentence for what breaks it. Tolerances
+are in parts of the mesh: ``ROUND`` of its largest coordinate for what is exact but for rounding,
+``SAME`` of its extent for what two orders of one sum may differ by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from slideviz.case.model import Translate
+from slideviz.climb import Step
+from tools.laws.attempt import told, tried
+from tools.laws.cases import Run
+from tools.laws.meshes import images
+from tools.laws.oracle import carried, goals, nodes_with
+from tools.laws.renumber import renumbered
+from tools.laws.surfaces import off_surface
+
+ROUND = 500 * np.finfo(float).eps
+SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}
+"""Linear elasticity is solved by iteration, to 1e-8 (``multigrid.TOLERANCE``) of the displacement;
+where it was not solved so far, the run says it and nothing is asked."""
+
+GROWTH = 5.0
+"""Times the largest prescribed displacement."""
+
+
+def _magnitude(run: Run) -> float:
+    """Return the size of the numbers that positions are computed from."""
+    far = [run.mesh.extent, float(np.abs(run.mesh.points).max())]
+    if run.period is not None and run.period.angle_deg:
+        far.append(float(np.abs(run.period.origin).max()))
+    return max(far)
+
+
+def moving_are_exact(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield which moving nodes do not end where the motions put them."""
+    where = goals(run.case, run.mesh)
+    nodes = np.array(list(where))
+    gap = np.abs(steps[-1].mesh.points[nodes] - np.array(list(where.values()))).max(axis=1)
+    if gap.max() > ROUND * _magnitude(run):
+        yield f"node {nodes[gap.argmax()]} is off by {gap.max() / run.mesh.extent:.2g}"
+
+
+def fixed_keep_every_bit(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield what moved of fixed markers, and of sliding ones without a sliding method."""
+    roles = ["fixed"]
+    if run.case.sliding == "none":
+        roles.append("sliding")
+        if run.case.periodic in ("none", "periodic"):
+            roles.append("periodic")
+    still = np.setdiff1d(
+        nodes_with(run.case, run.mesh, *roles), nodes_with(run.case, run.mesh, "moving")
+    )
+    for step in steps:
+        same = (step.mesh.points[still] == run.mesh.points[still]).all(axis=1)
+        if step.mesh.points[still].tobytes() != run.mesh.points[still].tobytes():
+            yield f"step {step.index}: {np.count_nonzero(~same)} moved, first {still[~same][:1]}"
+            return
+
+
+def images_stay_images(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield which images are none any more; with any periodic distance they must stay so."""
+    if run.period is None or run.case.periodic == "none":
+        return
+    a, b = images(run.made, run.period).T
+    first = np.abs(carried(run.period, run.mesh.points[a]) - run.mesh.points[b]).max()
+    for step in steps:
+        x = step.mesh.points
+        gap = np.abs(carried(run.period, x[a]) - x[b]).max(axis=1)
+        if gap.max() > first + ROUND * _magnitude(run):
+            row = gap.argmax()
+            part = gap[row] / run.mesh.extent
+            yield f"step {step.index}: nodes {a[row]} and {b[row]} are off by {part:.2g}"
+            return
+
+
+def sliding_stay_on_surface(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield which sliding nodes left their undeformed surface."""
+    yield from off_surface(run, steps[-1].mesh.points, ROUND * _magnitude(run))
+
+
+def numbering_does_not_matter(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield what another order of nodes, cells and marker elements changes."""
+    mesh, order = renumbered(run.mesh, np.random.default_rng([run.seed, 5]))
+    again, problem = tried(run.case, mesh)
+    if again is None:
+        yield f"renumbered it ends with {told(problem)}"
+        return
+    if len(again) != len(steps):
+        yield f"{len(steps)} steps, renumbered {len(again)}"
+        return
+    if any("were solved to" in text for text in steps[-1].warnings):
+        return
+    gap = np.abs(again[-1].mesh.points - steps[-1].mesh.points[order]).max() / run.mesh.extent
+    if gap > SAME[run.case.method]:
+        yield f"differs by {gap:.2g} (condition {steps[-1].condition:.1g})"
+
+
+def growth_is_bounded(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield which node goes much farther than the nodes that are moved."""
+    where = goals(run.case, run.mesh)
+    nodes = np.array(list(where))
+    asked = np.linalg.norm(np.array(list(where.values())) - run.mesh.points[nodes], axis=1).max()
+    made = np.linalg.norm(steps[-1].mesh.points - run.mesh.points, axis=1)
+    if made.max() > GROWTH * asked + ROUND * _magnitude(run):
+        yield f"node {made.argmax()} moves {made.max() / max(asked, 1e-300):.3g} times as far"
+
+
+def same_run_same_bits(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield whether the same case gives other bits the second time."""
+    again, problem = tried(run.case, run.mesh)
+    if again is None:
+        yield f"the second time it ends with {told(problem)}"
+    elif again[-1].mesh.points.tobytes() != steps[-1].mesh.points.tobytes():
+        yield "the second time the bits differ"
+
+
+def rest_changes_no_bit(run: Run, _steps: list[Step]) -> Iterator[str]:
+    """Yield whether a motion of zero changes a bit."""
+    zero = (0.0,) * run.mesh.dim
+    still = tuple(Translate(name, zero) for name in run.case.markers_with("moving"))
+    count = min(2, max(1, run.case.steps))
+    at_rest, problem = tried(run.case.change(motions=still, steps=count), run.mesh)
+    if at_rest is None:
+        yield f"at rest it ends with {told(problem)}"
+    elif any(step.mesh.points.tobytes() != run.mesh.points.tobytes() for step in at_rest):
+        yield "a motion of zero moves nodes"
+
+
+def numbers_make_sense(run: Run, steps: list[Step]) -> Iterator[str]:
+    """Yield what a step says of itself that is not finite, or does not add up."""
+    for step in steps:
+        numbers = {"max_error": step.max_error, "points": float(step.mesh.points.sum())}
+        numbers |= {f"error of cycle {c.cycle}": c.error for c in step.history}
+        numbers |= {f"seconds of {name}": spent for name, spent in step.seconds.items()}
+        if run.case.method == "rbf" and not step.warnings:
+            numbers["condition"] = step.condition
+        for name, value in numbers.items():
+            if not np.isfinite(value) or (name != "points" and value < 0):
+                yield f"step {step.index}: {name} is {value}"
+        if sum(step.node_counts.values()) != len(run.mesh.points):
+            yield f"step {step.index}: node counts {dict(step.node_counts)} do not add up"
+        if not 0 <= step.control_nodes <= len(run.mesh.points):
+            yield f"step {step.index}: {step.control_nodes} control nodes"
+    if [step.index for step in steps] != list(range(1, steps[-1].total + 1)):
+        yield f"steps are numbered {[step.index for step in steps]} of {steps[-1].total}"
+    if run.case.steps and len(steps) != run.case.steps:
+        yield f"{run.case.steps} steps are asked for, {len(steps)} made"
+
+
+LAWS: dict[str, Callable[[Run, list[Step]], Iterator[str]]] = {
+    "moving": moving_are_exact,
+    "fixed": fixed_keep_every_bit,
+    "images": images_stay_images,
+    "sliding": sliding_stay_on_surface,
+    "growth": growth_is_bounded,
+    "numbers": numbers_make_sense,
+    "renumbered": numbering_does_not_matter,
+    "bits": same_run_same_bits,
+    "rest": rest_changes_no_bit,
+}
+"""Law by name; those that deform again come last."""
