@@ -13,6 +13,7 @@ from pathlib import Path
 from slideviz.mesh.files import write
 from tools.laws.cases import random_run
 from tools.laws.check import Outcome, check
+from tools.laws.simplify import simplified
 
 
 def main(argv: Sequence[str]) -> int:
@@ -23,14 +24,17 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--only", metavar="SEEDS", help="these seeds, with commas")
     parser.add_argument(
-        "--save", type=Path, metavar="DIR", help="run nothing; write the mesh and case there"
+        "--save", type=Path, metavar="DIR", help="write the meshes and cases there, no more"
+    )
+    parser.add_argument(
+        "--simplify", action="store_true", help="with --save: cases as plain as break a law too"
     )
     arguments = parser.parse_args(argv)
     seeds = range(arguments.seed, arguments.seed + arguments.runs)
     wanted = [int(word) for word in arguments.only.split(",")] if arguments.only else list(seeds)
     if arguments.save:
         for seed in wanted:
-            _say(str(save(seed, arguments.save)))
+            _say(str(save(seed, arguments.save, arguments.simplify)))
         return 0
     begin, ended, laws = time.perf_counter(), Counter[str](), Counter[str]()
     slowest = (0.0, 0)
@@ -62,9 +66,9 @@ def of_seed(seed: int) -> Outcome:
     return check(random_run(seed))
 
 
-def save(seed: int, folder: Path) -> Path:
-    """Write mesh and case of a seed; returns the case file."""
-    run = random_run(seed)
+def save(seed: int, folder: Path, simplify: bool = False) -> Path:
+    """Write mesh and case of a seed, or one as plain as possible; returns the case file."""
+    run = simplified(random_run(seed)) if simplify else random_run(seed)
     folder.mkdir(parents=True, exist_ok=True)
     mesh, case = folder / f"{seed}.su2", folder / f"{seed}.cfg"
     write(mesh, run.mesh)
