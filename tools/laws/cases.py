@@ -174,7 +174,9 @@ def _motion(
         angle = float(np.degrees(min(part, 1.0)) * rng.choice([-1, 1]))
         return Rotate("", angle, point, axis)
     if kind == "scale":
-        return Scale("", tuple(1 + min(part, 0.5) * rng.uniform(-1, 1, rng.choice([1, dim]))))
+        return Scale(
+            "", tuple((1 + min(part, 0.5) * rng.uniform(-1, 1, rng.choice([1, dim]))).tolist())
+        )
     if kind == "radial":
         return Radial("", 1.0 + float(rng.uniform(-0.5, 0.5) * min(part, 0.5)), 0.0, axis, point)
     vector: FloatArray = rng.normal(size=dim)

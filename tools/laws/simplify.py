@@ -24,14 +24,16 @@ PLAIN = (
 
 
 def simplified(run: Run) -> Run:
-    """Return a run that breaks a law which this one breaks too, changed as far as possible."""
-    laws = {law for law, _ in check(run).broken}
+    """Return a run that ends like this one and breaks a law of it, changed as far as possible."""
+    first = check(run)
+    laws = {law for law, _ in first.broken}
     again = bool(laws)
     while again:
         again = False
         for case in _plainer(run.case):
             tried = replace(run, case=case)
-            if laws & {law for law, _ in check(tried).broken}:
+            now = check(tried)
+            if now.ended == first.ended and laws & {law for law, _ in now.broken}:
                 run, again = tried, True
                 break
     return run
