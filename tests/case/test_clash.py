@@ -5,10 +5,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.clash import clash, jump
-from slideviz.case.model import Rotate, Translate
+from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.samples import sample
 from slideviz.errors import CaseError
+from tests.builders import airfoil, cube, make_mesh, passage, sphere_in_box
 
 
 @pytest.fixture
@@ -16,6 +17,21 @@ def square():
     found = sample("square")
     roles = dict.fromkeys(("LEFT", "RIGHT", "LOWER", "UPPER"), "sliding") | {"BLOCK": "moving"}
     return found.mesh, found.case.change(roles=roles, periodic="none", sliding="ps", steps=1)
+
+
+def two_blocks():
+    """A wide box with two square holes, at x from 2 to 3 and from 5 to 6: ``one``, ``other``."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(12), np.arange(6), indexing="ij"))
+    points = np.stack([x, y], axis=1).astype(float)
+    first = np.flatnonzero((x < 11) & (y < 5) & ~((y == 2) & np.isin(x, (2, 5))))
+    cells = first[:, None] + [0, 6, 7, 1]
+
+    def around(left):
+        low, high = np.array([left, 2]), np.array([left + 1, 3])
+        return lambda p: bool(np.all((p >= low) & (p <= high)))
+
+    rules = [("one", around(2)), ("other", around(5)), ("outer", lambda p: True)]
+    return make_mesh(points, [(9, cells)], rules)
 
 
 def moved(case, mesh, *motions):
@@ -53,13 +69,97 @@ def test_a_periodic_boundary_that_moves_along_may_be_passed(square):
     assert "through UPPER" in clash(*moved(case, mesh, up))
 
 
-def test_a_jump_over_the_wall_is_a_warning(square):
+@pytest.mark.parametrize(
+    ("vector", "wall"), [((1.5, 0.0), "RIGHT"), ((-2.0, 0.3), "LEFT"), ((0.0, 40.0), "UPPER")]
+)
+def test_a_body_that_ends_out_of_the_mesh_is_refused(square, vector, wall):
     mesh, case = square
-    case, *_ = arguments = moved(case, mesh, Translate("BLOCK", (1.5, 0.0)))
+    case, *_ = arguments = moved(case, mesh, Translate("BLOCK", vector))
+    text = clash(*arguments)
+    assert text.startswith(f"the motion takes BLOCK out of the mesh, through {wall} near (")
+    assert "move BLOCK less" in text
+    with pytest.raises(CaseError, match="takes BLOCK out of the mesh"):
+        next(sv.deform(case, mesh))
+
+
+def test_nor_may_one_come_out_by_a_turn(square):
+    mesh, case = square
+    turn = moved(case, mesh, Rotate("BLOCK", 180.0, (2.0, 0.5)))
+    assert "takes BLOCK out of the mesh" in clash(*turn)
+    assert clash(*moved(case, mesh, Rotate("BLOCK", 180.0, (0.45, 0.5)))) is None
+
+
+def test_a_jump_over_a_wall_inside_is_a_warning():
+    mesh = two_blocks()
+    roles = dict.fromkeys(mesh.marker_names, "fixed") | {"one": "moving"}
+    case = Case(roles=roles)
+    case, *_ = arguments = moved(case, mesh, Translate("one", (6.0, 0.4)))
     assert clash(*arguments) is None
-    assert "goes through RIGHT" in jump(*arguments)
+    assert "goes through other" in jump(*arguments)
     *_, last = sv.deform(case, mesh)
-    assert any("goes through RIGHT" in text for text in last.warnings)
+    assert any("goes through other" in text for text in last.warnings)
+    lost = moved(case, mesh, Translate("one", (60.0, 0.0)))
+    assert "takes one out of the mesh" in clash(*lost)
+
+
+def test_a_domain_that_moves_as_a_whole_and_an_outer_wall_are_fine(square):
+    mesh, case = square
+    names = mesh.marker_names
+    every = case.change(roles=dict.fromkeys(names, "moving"))
+    shift = [Translate(name, (7.0, -3.0)) for name in names]
+    assert clash(*moved(every, mesh, *shift)) is None
+    wall = case.change(roles={**case.roles, "BLOCK": "fixed", "RIGHT": "moving"})
+    assert clash(*moved(wall, mesh, Translate("RIGHT", (1.5, 0.0)))) is None
+    assert clash(*moved(wall, mesh, Translate("RIGHT", (-0.3, 0.0)))) is None
+    beyond = clash(*moved(wall, mesh, Translate("RIGHT", (-1.5, 0.0))))
+    assert "takes RIGHT out of the mesh, through" in beyond
+
+
+def test_an_airfoil_may_turn_around_in_its_far_field():
+    mesh = airfoil()
+    case = Case(roles={"airfoil": "moving", "far": "fixed"})
+    for motions in ((Rotate("airfoil", 180.0),), (Translate("airfoil", (1.5, 0.5)),)):
+        assert clash(*moved(case, mesh, *motions)) is None
+    out = clash(*moved(case, mesh, Translate("airfoil", (-9.0, 0.0))))
+    assert "takes airfoil out of the mesh, through far" in out
+
+
+@pytest.mark.parametrize("pitches", [0.7, 1.0, 3.3, -2.0])
+def test_a_blade_may_go_on_in_the_neighbouring_passages(square, pitches):
+    mesh, case = square
+    roles = {**case.roles, "LOWER": "periodic", "UPPER": "periodic"}
+    free = case.change(roles=roles, periodic="moving")
+    assert clash(*moved(free, mesh, Translate("BLOCK", (0.0, pitches)))) is None
+    assert "out of the mesh" in clash(*moved(free, mesh, Translate("BLOCK", (2.0, pitches))))
+
+
+@pytest.mark.parametrize("angle_deg", [20.0, 30.0, -75.0, 180.0])
+def test_and_around_the_axis(angle_deg):
+    found = sample("polar", 10)
+    mesh, case = found.mesh, found.case.change(periodic="moving", sliding="ps")
+    round_ = Rotate("BLOCK", angle_deg, (0.0, 0.0))
+    assert clash(*moved(case, mesh, round_)) is None
+    out = moved(case, mesh, round_, Translate("BLOCK", (9.0, 0.0)))
+    assert "out of the mesh" in clash(*out)
+
+
+def test_what_leaves_a_mesh_with_internal_boundaries_is_told_where_they_are_not():
+    found = sample("hexahedron", 6)
+    mesh = found.mesh
+    roles = {**found.case.roles, "FRONT": "internal", "BACK": "internal"}
+    case = found.case.change(roles=roles, periodic="moving", sliding="ps")
+    assert clash(*moved(case, mesh, Translate("BLOCK", (0.0, 0.0, 5.0)))) is None
+    out = clash(*moved(case, mesh, Translate("BLOCK", (5.0, 0.0, 0.0))))
+    assert "takes BLOCK out of the mesh, through RIGHT" in out
+
+
+@pytest.mark.parametrize("mesh", [cube(4), sphere_in_box(), passage()], ids=lambda mesh: mesh.name)
+def test_nothing_moved_nothing_out(mesh):
+    roles = dict.fromkeys(mesh.marker_names, "fixed")
+    for name in mesh.marker_names:
+        case = Case(roles={**roles, name: "moving"})
+        still = moved(case, mesh, Translate(name, (0.0, 0.0, 0.0)))
+        assert clash(*still) is None
 
 
 def test_a_turn_that_cuts_is_told(square):
