@@ -80,7 +80,7 @@ class RunPanel(QWidget):
     def sync(self, session: Session) -> None:
         """Show whether a run can start, and if not what it needs."""
         # Some checks look at the mesh: not again while only the view changes.
-        key = (session.mesh, session.case, session.clash)
+        key = (session.mesh, session.case, session.clash, session.invalid)
         if key != getattr(self, "_key", None):
             self._key = key
             self._missing = is_missing(session)

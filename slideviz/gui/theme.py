@@ -67,7 +67,8 @@ QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {tip}; color: {
 QListWidget#motions::item {{ padding: 3px 2px; }}
 QLabel[hint="true"] {{ color: {soft}; }}
 QLabel[bad="true"] {{ color: {bad}; }}
-QLineEdit[bad="true"] {{ border: 1.5px solid {bad}; border-radius: 2px; padding: 2px; }}
+QLineEdit[bad="true"],
+QSpinBox[bad="true"] {{ border: 1.5px solid {bad}; border-radius: 2px; padding: 2px; }}
 QPushButton#run {{ background: {accent}; color: white; font-weight: 600; border: none;
     border-radius: 4px; padding: 7px 18px; }}
 QPushButton#run:hover {{ background: {accent_hover}; }}

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
-from slideviz.view.session.state import Session
-
-Place = Literal["open", "boundaries", "motion", "method"]
+from slideviz.view.session.state import Place, Session
 
 
 @dataclass(frozen=True)
@@ -23,7 +20,9 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
     """Return what must be put right before a run, most urgent first; empty when ready."""
     if session.mesh is None:
         return (Missing("Open a mesh first.", "open"),)
-    case, found = session.case, []
+    case = session.case
+    # What is typed comes first: the rest looks at the case, which still has the number before it.
+    found = [Missing(text, place) for place, text in session.invalid]
     moving = case.markers_with("moving")
     if not moving:
         found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))

@@ -381,7 +381,7 @@ def test_what_is_typed_is_checked_at_once(opened):
     field = opened.window.motions.editor.vector.fields[0]
     opened.click(field)
     field.selectAll()
-    QTest.keyClicks(field, "1.5x")
+    QTest.keyClicks(field, "1.5e")
     assert field.property("bad")
     assert "not a number" in field.toolTip()
     assert opened.session.case.motions[0].vector == (1.5, 0.0), "the last valid value counts"

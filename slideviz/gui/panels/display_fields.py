@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QSpinBox, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QWidget
 
-from slideviz.gui.widgets.fields import NumberField, number_text
+from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
 
 MOST_COPIES = 9
 """Neighbours on each side that can be chosen where a row has no end."""
 
 
-class Copies(QSpinBox):
+class Copies(NumberBox):
     """How many neighbouring passages are drawn, in words; the last value is all of a wheel."""
+
+    letters = "al"  # of "all"
 
     def __init__(self) -> None:
         super().__init__()
@@ -46,10 +48,6 @@ class Copies(QSpinBox):
         good = any(sign.isdigit() for sign in text) or text.strip() == "all"
         state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
         return state, text, at
-
-    def wheelEvent(self, event) -> None:  # noqa: N802
-        """Leave the wheel to the panel, which scrolls."""
-        event.ignore()
 
 
 class Span(QWidget):

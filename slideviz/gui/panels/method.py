@@ -10,6 +10,7 @@ from qtpy.QtWidgets import QWidget
 from slideviz.case.model import Reduction
 from slideviz.gui.panels.method_form import TIPS, MethodForm
 from slideviz.gui.panels.method_more import NO_REDUCTION, enable, not_used
+from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.view.motions.period_words import found_text
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
@@ -28,6 +29,7 @@ class MethodPanel(MethodForm):
         self._connect()
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
+        self.watch = FieldWatch(self, store, "method")
 
     def _show_more(self) -> None:
         """Scroll to the settings that have opened below the others."""

@@ -12,14 +12,19 @@ from qtpy.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QScrollArea,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from slideviz.gui.panels.method_more import MoreSettings, set_tip
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, VectorField, a_direction, positive
+from slideviz.gui.widgets.fields import (
+    NumberBox,
+    NumberField,
+    VectorField,
+    a_direction,
+    positive,
+)
 from slideviz.gui.widgets.tips import wrapped
 
 MAX_STEPS = 9999
@@ -124,7 +129,7 @@ class MethodForm(QWidget):
         self.found = QLabel()
         self.found.setWordWrap(True)
         self.found.setProperty("hint", True)
-        self.steps = StepsBox()
+        self.steps = NumberBox()
         self.steps.setRange(0, MAX_STEPS)
         self.steps.setSpecialValueText("automatic")
         self.steps.setMinimumHeight(self.sliding.sizeHint().height())
@@ -175,10 +180,3 @@ class WholeScroll(QScrollArea):
             for y in (place.bottom(), place.top()):
                 self.ensureVisible(place.left(), y, 0, 6)
         return moved
-
-
-class StepsBox(QSpinBox):
-    """The number of steps; the wheel scrolls the panel instead of changing it."""
-
-    def wheelEvent(self, event) -> None:
-        event.ignore()

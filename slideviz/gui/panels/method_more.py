@@ -178,4 +178,5 @@ def set_tip(field: QWidget, text: str) -> None:
     """Explain a field and its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)
-    field.setToolTip(wrapped(text))
+    if not isinstance(field, NumberField):  # that one may have more urgent things to say
+        field.setToolTip(wrapped(text))

@@ -24,6 +24,7 @@ from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_kinds import KINDS, new_motion
 from slideviz.gui.panels.motion_table import ask_table
 from slideviz.gui.widgets.elided import elide_items
+from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import folder_of, main_window
 from slideviz.mesh.model import Mesh
@@ -72,6 +73,7 @@ class MotionPanel(QWidget):
         layout.addStretch(1)
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
+        self.watch = FieldWatch(self, store, "motion")
 
     def _make_buttons(self) -> QHBoxLayout:
         row = QHBoxLayout()

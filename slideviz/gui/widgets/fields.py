@@ -7,8 +7,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from qtpy.QtCore import QLocale, Qt, Signal
-from qtpy.QtWidgets import QApplication, QHBoxLayout, QLabel, QLineEdit, QSizePolicy, QWidget
+from qtpy.QtCore import QEvent, QLocale, Qt, QTimer, Signal
+from qtpy.QtWidgets import (
+    QApplication,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QSpinBox,
+    QWidget,
+)
 
 from slideviz.gui.widgets.tips import wrapped
 
@@ -34,22 +42,33 @@ def short_text(value: float, scale: float = 0.0) -> str:
     return exact if len(exact) <= SHORT else f"{float(value):.6g}"
 
 
+def is_stray(event: QEvent, letters: str = "eE") -> bool:
+    """Tell whether a key is a letter that is in no number: it belongs to the window's shortcuts."""
+    if event.type() not in (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress):
+        return False
+    plain = Qt.KeyboardModifier.ShiftModifier
+    return event.text().isalpha() and event.text() not in letters and not event.modifiers() & ~plain
+
+
 class NumberField(QLineEdit):
     """A number; what is not allowed is marked at once, with the reason as tooltip.
 
     ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
     while it is edited; the value keeps them all. What is not valid when the field is left goes
-    back to the number before it was edited, not to a valid beginning of what was typed.
+    back to the number before it was edited, not to a valid beginning of what was typed. ``fault``
+    is the reason for which it is marked, ``together`` one that it has from others beside it;
+    ``marked`` tells that the reason has changed.
     """
 
     changed = Signal(float)
+    marked = Signal()
 
     def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
         super().__init__(short_text(value))
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
-        self._tip = ""
+        self._tip = self.fault = self.together = ""
         self._whole = False
         self._twice_ms = float("-inf")
         self.setCursorPosition(0)
@@ -68,6 +87,8 @@ class NumberField(QLineEdit):
         """Return why the text is not valid, or an empty text."""
         if self.text() in (number_text(self._value), short_text(self._value, self._scale)):
             return self._allowed(self._value)
+        if not self.text().strip():
+            return "a number is needed"
         try:
             # A decimal comma is what many people type; thousands are not separated here.
             value = float(self.text().strip().replace(",", "."))
@@ -80,7 +101,7 @@ class NumberField(QLineEdit):
     def set_tip(self, text: str) -> None:
         """Explain the field; shown while its value is valid."""
         self._tip = text
-        self.mark(self.problem)
+        self.mark()
 
     def set_scale(self, scale: float) -> None:
         """Take a length beside which the smallest numbers are shown as 0."""
@@ -91,13 +112,13 @@ class NumberField(QLineEdit):
 
     def show_value(self, value: float) -> None:
         """Show a number without telling; what is being typed is left if it means the same."""
-        if value == self._value and (self.hasFocus() or not self.problem):
+        if value == self._value and (self.hasFocus() or self.isModified() or not self.problem):
             return
         if not (self.hasFocus() and self.isModified()):
             self._before = float(value)
         self._value = float(value)
         self._write()
-        self.mark("")
+        self.mark()
 
     def _write(self) -> None:
         """Write the value, the first digits in sight."""
@@ -107,6 +128,12 @@ class NumberField(QLineEdit):
             self.setText(text)
         if not exact:
             self.setCursorPosition(0)
+
+    def event(self, event) -> bool:
+        if is_stray(event):
+            event.ignore()
+            return False
+        return super().event(event)
 
     def focusInEvent(self, event) -> None:
         if not self.problem:
@@ -145,11 +172,11 @@ class NumberField(QLineEdit):
             self._write()
 
     def _edited(self) -> None:
-        problem = self.problem
-        self.mark(problem)
-        if not problem:
+        if not self.problem:
             self._value = float(self.text().strip().replace(",", "."))
+            # First the number, then that it is valid: who hears of that would show the one before.
             self.changed.emit(self._value)
+        self.mark()
 
     def _tidy(self) -> None:
         if not self.problem:
@@ -157,24 +184,63 @@ class NumberField(QLineEdit):
             return
         typed, self._value = self._value, self._before
         self._write()
-        self.mark("")
         if typed != self._value:
             self.changed.emit(self._value)
+        self.mark()
 
-    def mark(self, problem: str) -> None:
-        """Show that the number is not valid, and why; or, with an empty text, that it is."""
+    def mark(self) -> None:
+        """Show that the number is not valid, and why, or that it is."""
+        problem = self.problem or self.together
         self.setToolTip(wrapped(problem or self._tip))
         if bool(self.property("bad")) != bool(problem):
             self.setProperty("bad", bool(problem))
             self.style().unpolish(self)
             self.style().polish(self)
+        if problem != self.fault:
+            self.fault = problem
+            self.marked.emit()
+
+
+class NumberBox(QSpinBox):
+    """A whole number with arrows; one without digits is marked as a ``NumberField`` is.
+
+    The wheel scrolls the panel instead of changing it. Of ``letters``, its words may have some.
+    """
+
+    marked = Signal()
+    letters = ""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.fault = ""
+        # It writes without telling that its text has changed.
+        for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
+            change.connect(lambda *_: self._look())
+
+    def event(self, event) -> bool:
+        if is_stray(event, self.letters):
+            event.ignore()
+            return False
+        return super().event(event)
+
+    def wheelEvent(self, event) -> None:
+        event.ignore()
+
+    def _look(self) -> None:
+        fault = "" if self.lineEdit().hasAcceptableInput() else "a number is needed"
+        if fault != self.fault:
+            self.fault = fault
+            self.setProperty("bad", bool(fault))
+            self.style().unpolish(self)
+            self.style().polish(self)
+            self.marked.emit()
 
 
 class VectorField(QWidget):
     """Two or three numbers in a row.
 
     ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
-    then, and the change is not told.
+    then, and the change is not told. When the last of them is left, they go back to what they were.
     """
 
     changed = Signal(tuple)
@@ -196,11 +262,14 @@ class VectorField(QWidget):
             label, field = QLabel(name), NumberField(value)
             field.setAccessibleName(name)
             field.changed.connect(lambda _: self._tell())
+            # When it is known where the focus goes.
+            field.editingFinished.connect(lambda: QTimer.singleShot(0, self, self._tidy))
             row.addWidget(label)
             row.addWidget(field, 1)
             self.fields.append(field)
             self._labels.append(label)
         self.count = len(self.fields)
+        self._good = self.value
         self._scale = 0.0
         self._compare()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -216,13 +285,19 @@ class VectorField(QWidget):
         return self._allowed(self.value)
 
     def _tell(self) -> None:
-        self._mark()
         if not self.problem:
+            self._good = self.value
             self.changed.emit(self.value)
+        self._mark()
+
+    def _tidy(self) -> None:
+        if self.problem and not any(field.hasFocus() for field in self.fields):
+            self._write(self._good)
 
     def _mark(self) -> None:
         for field in self.fields:
-            field.mark(field.problem or self.problem)
+            field.together = self.problem
+            field.mark()
 
     def set_count(self, count: int) -> None:
         """Show the first ``count`` numbers only."""
@@ -237,7 +312,12 @@ class VectorField(QWidget):
         self._compare()
 
     def show_value(self, values: Sequence[float]) -> None:
-        """Show numbers without telling."""
+        """Show numbers without telling; what is being typed is left if it means the same."""
+        if not (self.problem and tuple(values) == self._good):
+            self._write(values)
+
+    def _write(self, values: Sequence[float]) -> None:
+        self._good = tuple(values)
         for field, value in zip(self.fields, values, strict=False):
             field.show_value(value)
         self._compare()
@@ -253,6 +333,7 @@ class VectorField(QWidget):
         """Explain the field."""
         for field in self.fields:
             field.set_tip(text)
+        self._mark()
 
 
 def positive(value: float) -> str:

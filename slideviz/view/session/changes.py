@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from slideviz.view.missing import Missing, Place, is_missing
+from slideviz.view.missing import Missing, is_missing
 from slideviz.view.session.changes_case import (
     add_motion,
     confirm,
@@ -11,6 +11,7 @@ from slideviz.view.session.changes_case import (
     replace_motion,
     saved_case,
     set_case,
+    set_invalid,
     set_role,
 )
 from slideviz.view.session.changes_runs import (
@@ -47,7 +48,6 @@ __all__ = [
     "TASTE",
     "UNDEFORMED",
     "Missing",
-    "Place",
     "add_frames",
     "add_motion",
     "add_section",
@@ -72,6 +72,7 @@ __all__ = [
     "seen_beside",
     "select",
     "set_case",
+    "set_invalid",
     "set_role",
     "set_view",
     "show",

@@ -8,7 +8,7 @@ from typing import Any
 
 from slideviz.case.model import Case, Motion, Role
 from slideviz.view.session.rows import replaced, without
-from slideviz.view.session.state import Session
+from slideviz.view.session.state import Place, Session
 
 
 def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
@@ -38,6 +38,13 @@ def set_case(session: Session, **values: Any) -> Session:
     """Return the session with other settings of the case."""
     guess = "" if "reduction" in values else session.reduction_guess
     return replace(session, case=session.case.change(**values), reduction_guess=guess)
+
+
+def set_invalid(session: Session, place: Place, sentences: tuple[str, ...]) -> Session:
+    """Return the session with the fields of a panel that are not valid."""
+    others = tuple(each for each in session.invalid if each[0] != place)
+    found = (*others, *((place, sentence) for sentence in sentences))
+    return session if found == session.invalid else replace(session, invalid=found)
 
 
 def add_motion(session: Session, motion: Motion) -> Session:

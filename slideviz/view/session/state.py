@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ __all__ = [
     "ColourBy",
     "Frame",
     "Guess",
+    "Place",
     "PointsShown",
     "Run",
     "Session",
@@ -29,6 +31,10 @@ __all__ = [
     "essence",
     "round_above",
 ]
+
+
+Place = Literal["open", "boundaries", "motion", "method"]
+"""Where something is put right before a run: a panel, or the choice of a file."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,9 @@ class Session:
         Why data reduction was switched on without being asked for; empty when it was not.
     clash : str
         What the motions put through what, in a sentence; empty as far as is known.
+    invalid : tuple of (Place, str)
+        The fields that show something else than the case has, because it is not valid: the panel,
+        and a sentence. No run starts meanwhile.
     """
 
     mesh: Mesh | None = None
@@ -85,6 +94,7 @@ class Session:
     view: ViewState = field(default_factory=ViewState)
     reduction_guess: str = ""
     clash: str = ""
+    invalid: tuple[tuple[Place, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0
 

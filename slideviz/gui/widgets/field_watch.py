@@ -1,0 +1,46 @@
+"""Tells the session which fields of a panel are not valid, so that no run starts meanwhile."""
+
+from __future__ import annotations
+
+from qtpy.QtCore import QObject
+from qtpy.QtWidgets import QFormLayout, QWidget
+
+from slideviz.gui.widgets.fields import NumberBox, NumberField
+from slideviz.view.session import changes
+from slideviz.view.session.state import Place
+from slideviz.view.session.store import Store
+
+
+class FieldWatch(QObject):
+    """Keeps ``Session.invalid`` up to date for one panel: what is marked there as not valid."""
+
+    def __init__(self, panel: QWidget, store: Store, place: Place) -> None:
+        super().__init__(panel)
+        self.panel, self.store, self.place = panel, store, place
+        self._fields = [*panel.findChildren(NumberField), *panel.findChildren(NumberBox)]
+        for field in self._fields:
+            field.marked.connect(self.look)
+        # Another motion or method may hide a field or switch it off.
+        store.listen(lambda *_: self.look())
+
+    def look(self) -> None:
+        """Tell the session which fields are not valid."""
+        told = tuple(
+            f"{_title(field, self.panel)}: {field.fault}."
+            for field in self._fields
+            if field.fault and field.isEnabledTo(self.panel) and field.isVisibleTo(self.panel)
+        )
+        self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(told)))
+
+
+def _title(field: QWidget, panel: QWidget) -> str:
+    """Return what a form calls a field, or the row that it is in, with its own name there."""
+    # Numbers that are not valid together are the row's fault.
+    own, part = field.accessibleName() if getattr(field, "problem", "") else "", field
+    while part is not panel:
+        for form in panel.findChildren(QFormLayout):
+            label = form.labelForField(part)
+            if label is not None:
+                return f"{label.text()} {own}".rstrip()
+        part = part.parentWidget()
+    return field.accessibleName() or field.objectName()
