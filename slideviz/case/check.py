@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, ROLE_KEYS
 from slideviz.case.keys import KEYS
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, moves, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
@@ -67,10 +67,12 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     moving = case.markers_with("moving")
     told: set[str] = set()
     for place, motion in enumerate(case.motions, start=1):
-        if motion.marker and motion.marker not in moving and motion.marker not in told:
-            told.add(motion.marker)
+        for name in named(motion.marker):
+            if name in moving or name in told:
+                continue
+            told.add(name)
             sentence = (
-                f"motion {place} names {motion.marker!r}, which does not move: MARKER_MOVING= "
+                f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; one of the two is wrong"
             )
             found.append((("MOTION", "MARKER_MOVING"), sentence))
@@ -102,12 +104,11 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return which moving markers lack a motion, and which motions the mesh cannot have."""
-    given = {motion.marker for motion in case.motions}
     found = [
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
         "DEFORMATION_FILENAME"
         for marker in case.markers_with("moving")
-        if marker not in given and "" not in given
+        if not any(moves(motion, marker) for motion in case.motions)
     ]
     for place, motion in enumerate(case.motions, start=1):
         found += [f"motion {place}: {text}" for text in _motion_problems(motion, mesh.dim)]

@@ -13,6 +13,8 @@ Sliding = Literal["none", "ps", "ds"]
 PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
 PeriodicType = Literal["auto", "translational", "rotational"]
 Point = tuple[float, ...] | Literal["centroid"]
+Target = str | tuple[str, ...]
+"""What a motion moves: a marker, several as one body, or all that move where it is empty."""
 
 ROLES: tuple[Role, ...] = ("moving", "fixed", "sliding", "periodic", "internal")
 METHODS: tuple[Method, ...] = ("rbf", "idw", "elastic")
@@ -24,7 +26,7 @@ PERIODIC_MODES: tuple[PeriodicMode, ...] = ("none", "periodic", "fixed", "moving
 class Translate:
     """Shift a marker by ``vector`` (d,), in the mesh's length unit."""
 
-    marker: str
+    marker: Target
     vector: tuple[float, ...]
 
 
@@ -32,10 +34,11 @@ class Translate:
 class Rotate:
     """Turn a marker by ``angle_deg`` about ``point`` and ``axis`` (right-handed; any length).
 
-    In 2D the axis is that of z: positive angles turn counter-clockwise.
+    In 2D the axis is that of z: positive angles turn counter-clockwise. The centroid of several
+    markers is their common one.
     """
 
-    marker: str
+    marker: Target
     angle_deg: float
     point: Point = "centroid"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -45,7 +48,7 @@ class Rotate:
 class Scale:
     """Enlarge a marker by ``factors``, one for all or one for each axis, about ``point``."""
 
-    marker: str
+    marker: Target
     factors: tuple[float, ...]
     point: Point = "centroid"
 
@@ -58,7 +61,7 @@ class Radial:
     z in 2D; ``distance`` is in the mesh's length unit. Nodes on the axis stay on it.
     """
 
-    marker: str
+    marker: Target
     factor: float = 1.0
     distance: float = 0.0
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -73,10 +76,20 @@ class FromFile:
     """
 
     path: Path
-    marker: str = ""
+    marker: Target = ""
 
 
 Motion = Translate | Rotate | Scale | Radial | FromFile
+
+
+def named(target: Target) -> tuple[str, ...]:
+    """Return the markers that a target names; none where it is all that move."""
+    return (target,) * bool(target) if isinstance(target, str) else target
+
+
+def moves(motion: Motion, marker: str) -> bool:
+    """Tell whether a motion is one of this moving marker."""
+    return not motion.marker or marker in named(motion.marker)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,19 @@ from slideviz.case.check import (
     require_valid,
 )
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import Case, FromFile, Motion, Point, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    Case,
+    FromFile,
+    Motion,
+    Point,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+    moves,
+    named,
+)
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -31,6 +44,7 @@ __all__ = [
     "displacement_of",
     "displacements",
     "moved_points",
+    "moved_together",
     "read_files",
     "require_valid",
 ]
@@ -38,7 +52,7 @@ __all__ = [
 AGREE = 1e-9
 """Largest difference, as a part of the mesh's extent, of two displacements of one node."""
 
-Files = Mapping[tuple[Path, str], Displacements]
+Files = Mapping[tuple[Path, Target], Displacements]
 
 
 def displacements(case: Case, mesh: Mesh) -> Displacements:
@@ -57,10 +71,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     names = case.markers_with("moving")
     on = {name: mesh.marker(name).nodes for name in names}
     files = read_files(case, mesh)
-    vectors = [
-        displacement_of(_motions_of(case, name), mesh.points[on[name]], on[name], files)
-        for name in names
-    ]
+    vectors = list(moved_together(case.motions, mesh.points, on, files).values())
     nodes = np.concatenate(list(on.values()))
     order = np.argsort(nodes, kind="stable")
     stacked = np.concatenate(vectors)[order]
@@ -75,6 +86,40 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     keep = np.flatnonzero(first == np.arange(len(nodes)))
     warnings = [text for file in files.values() for text in file.warnings]
     return Displacements(nodes[keep], stacked[keep], tuple(dict.fromkeys(warnings)))
+
+
+def moved_together(
+    motions: Iterable[Motion], points: FloatArray, on: Mapping[str, IntArray], files: Files
+) -> dict[str, FloatArray]:
+    """Return the displacement (k, d) of the nodes of each marker, by motions in sequence.
+
+    Parameters
+    ----------
+    motions : iterable of Motion
+    points : (n, d) float64
+        Undeformed positions of all nodes.
+    on : mapping of str to (k,) int64
+        The nodes of the moving markers.
+    files : mapping of (path, target) to Displacements
+        As in `displacement_of`.
+    """
+    total = {name: np.zeros_like(points[nodes]) for name, nodes in on.items()}
+    for motion in motions:
+        here = {name: points[on[name]] + total[name] for name in on if moves(motion, name)}
+        one = motion if len(here) < 2 else _as_one(motion, here, on)
+        for name, at in here.items():
+            total[name] += _change(one, at, on[name], files)
+    return total
+
+
+def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, IntArray]) -> Motion:
+    """Return a motion of several markers with their common centroid, where it has one."""
+    if not isinstance(motion, Rotate | Scale) or motion.point != "centroid":
+        return motion
+    # What two of them share counts once, in the order of the nodes: not in that of the markers.
+    _, first = np.unique(np.concatenate([on[name] for name in points]), return_index=True)
+    centre = np.concatenate(list(points.values()))[first].mean(axis=0)
+    return replace(motion, point=tuple(centre.tolist()))
 
 
 def moved_points(
@@ -108,15 +153,23 @@ def displacement_of(
     """
     total = np.zeros_like(points)
     for motion in motions:
-        if not isinstance(motion, FromFile):
-            total += _increment(motion, points + total)
-        elif files and nodes is not None and (motion.path, motion.marker) in files:
-            total += files[motion.path, motion.marker].at(nodes)
+        total += _change(motion, points + total, nodes, files)
     return total
 
 
-def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, str], Displacements]:
-    """Return the displacement files of the case by path and marker, for `displacement_of`.
+def _change(
+    motion: Motion, points: FloatArray, nodes: IntArray | None, files: Files | None
+) -> FloatArray:
+    """Return by how much a motion displaces the points of a marker from where they are, (k, d)."""
+    if not isinstance(motion, FromFile):
+        return _increment(motion, points)
+    if not files or nodes is None or (motion.path, motion.marker) not in files:
+        return np.zeros_like(points)
+    return files[motion.path, motion.marker].at(nodes)
+
+
+def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, Target], Displacements]:
+    """Return the displacement files of the case by path and target, for `displacement_of`.
 
     Raises
     ------
@@ -128,13 +181,14 @@ def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, str], Displacements]:
         for name in case.markers_with("moving")
         if name in mesh.marker_names
     }
-    every = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
-    files: dict[tuple[Path, str], Displacements] = {}
+    files: dict[tuple[Path, Target], Displacements] = {}
     problems: list[str] = []
     for motion in case.motions:
-        if isinstance(motion, FromFile) and motion.marker in ("", *on):
-            nodes = on[motion.marker] if motion.marker else every
-            of = f"marker {motion.marker!r}" if motion.marker else "a moving marker"
+        mine = [nodes for name, nodes in on.items() if moves(motion, name)]
+        if isinstance(motion, FromFile) and (mine or not motion.marker):
+            nodes = np.unique(np.concatenate([*mine, np.empty(0, np.int64)]))
+            names = " or ".join(repr(name) for name in named(motion.marker))
+            of = f"marker {names}" if names else "a moving marker"
             try:
                 read = read_displacements(motion.path, nodes, mesh.points.shape, of)
             except CaseError as problem:
@@ -194,10 +248,6 @@ def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
     # On the axis there is no direction to be pushed into.
     outwards = np.divide(motion.distance, radius, out=np.zeros_like(radius), where=radius > 0)
     return arm * ((motion.factor - 1.0) + outwards)[:, None]
-
-
-def _motions_of(case: Case, marker: str) -> tuple[Motion, ...]:
-    return tuple(motion for motion in case.motions if motion.marker in ("", marker))
 
 
 def _disagreements(names: tuple[str, ...], nodes: IntArray, pairs: IntArray) -> list[str]:

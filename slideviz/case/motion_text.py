@@ -7,7 +7,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from slideviz.case.model import FromFile, Motion, Point, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    FromFile,
+    Motion,
+    Point,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+    named,
+)
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, is_none, name_text, nearest, number, shown, words_of
 from slideviz.errors import CaseError
@@ -77,18 +87,14 @@ def _read_motion(group: list[Word]) -> Motion:
     items = [word for word in group if not word.is_sign(",")]
     if len(items) < 2:
         raise CaseError(f"needed are a marker and one of {', '.join(VERBS)}")
-    head, verb, rest = items[0], items[1].text.lower(), items[2:]
-    if not head.text or head.is_sign("(") or head.is_sign(")"):
-        raise CaseError("it does not begin with the name of a marker")
+    marker, items = _read_target(items)
+    word = items[0].text if items else ""
+    verb, rest = word.lower(), items[1:]
     if verb not in VERBS:
         hint = nearest(verb, VERBS)
-        raise CaseError(f"{shown(items[1].text)} is not one of {', '.join(VERBS)}{hint}")
-    marker = head.text
-    every = marker == ALL_MOVING and not head.quoted
+        raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
     if verb == "file":
-        return _read_file("" if every else marker, rest)
-    if every:
-        raise CaseError("* (all moving markers) goes with `file` only; name the marker")
+        return _read_file(marker, rest)
     if verb == "translate":
         return Translate(marker, read_vector(_flat(rest), "the shift"))
     if verb == "rotate":
@@ -96,7 +102,24 @@ def _read_motion(group: list[Word]) -> Motion:
     return _read_scale(marker, rest) if verb == "scale" else _read_radial(marker, rest)
 
 
-def _read_file(marker: str, rest: list[Word]) -> FromFile:
+def _read_target(items: list[Word]) -> tuple[Target, list[Word]]:
+    """Return what a motion moves, and the words that follow."""
+    head = items[0]
+    if not head.is_sign("("):
+        if not head.text or head.is_sign(")"):
+            raise CaseError("it does not begin with the name of a marker")
+        every = head.text == ALL_MOVING and not head.quoted
+        return "" if every else head.text, items[1:]
+    end = next(place for place, word in enumerate(items) if word.is_sign(")"))
+    names = tuple(word.text for word in items[1:end])
+    if not all(names) or not names or any(word.is_sign("(") for word in items[1:end]):
+        raise CaseError("its first brackets are no list of markers; write ((A, B), rotate, ...)")
+    if len(set(names)) < len(names):
+        raise CaseError(f"({', '.join(names)}) names a marker twice; name each once")
+    return names if len(names) > 1 else names[0], items[end + 1 :]
+
+
+def _read_file(marker: Target, rest: list[Word]) -> FromFile:
     if len(rest) != 1 or not rest[0].text:
         raise CaseError(
             "needed is (MARKER, file, path); a path with spaces, commas or brackets needs quotes"
@@ -112,7 +135,7 @@ def _is_centroid(word: Word) -> bool:
     return not word.quoted and word.text.lower() == "centroid"
 
 
-def _read_rotate(marker: str, rest: list[Word]) -> Rotate:
+def _read_rotate(marker: Target, rest: list[Word]) -> Rotate:
     items = _flat(rest)
     if not items:
         raise CaseError("the angle is missing; write rotate, angle in degrees, centroid")
@@ -133,7 +156,7 @@ def _read_rotate(marker: str, rest: list[Word]) -> Rotate:
     return Rotate(marker, angle, point, axis)
 
 
-def _read_scale(marker: str, rest: list[Word]) -> Scale:
+def _read_scale(marker: Target, rest: list[Word]) -> Scale:
     items = _flat(rest)
     if items and _is_centroid(items[-1]):
         factors, place = items[:-1], []
@@ -157,7 +180,7 @@ def _read_scale(marker: str, rest: list[Word]) -> Scale:
     return Scale(marker, values, read_vector(place, "the point") if place else "centroid")
 
 
-def _read_radial(marker: str, rest: list[Word]) -> Radial:
+def _read_radial(marker: Target, rest: list[Word]) -> Radial:
     items = _flat(rest)
     letter = len(items) > 2 and items[2].text.lower() in ("x", "y", "z")
     n_axis = 1 if letter else 3 if len(items) > 5 else 0
@@ -175,13 +198,12 @@ def _read_radial(marker: str, rest: list[Word]) -> Radial:
 
 
 def _motion_text(motion: Motion) -> str:
+    head = _target_text(motion.marker)
     if isinstance(motion, FromFile):
-        marker = name_text(motion.marker) if motion.marker else ALL_MOVING
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
         path = f'"{path}"' if any(sign in path for sign in " ,") and path[0] != '"' else path
-        return f"({marker}, file, {path})"
-    head = name_text(motion.marker)
+        return f"({head}, file, {path})"
     if isinstance(motion, Translate):
         return f"({head}, translate, {_numbers(motion.vector)})"
     if isinstance(motion, Radial):
@@ -199,6 +221,15 @@ def _motion_text(motion: Motion) -> str:
     return f"({head}, {turn}, {axis}, {place})"
 
 
+def _target_text(target: Target) -> str:
+    names = [name_text(name) for name in named(target)]
+    if isinstance(target, str):
+        return names[0] if names else ALL_MOVING
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise CaseError(f"{target} are not several markers; give a name, or two different ones")
+    return f"({', '.join(names)})"
+
+
 def _numbers(values: tuple[float, ...]) -> str:
     return ", ".join(repr(float(value)) for value in values)
 
@@ -213,8 +244,9 @@ GRAMMAR = (
     "(BLADE, scale, FACTORS, (px, py[, pz]))",
     "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  radius r becomes FACTOR r + dr; 2D: no AXIS",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
-    "(*, file, path)                               the same for all moving boundaries",
-    "centroid: mean of the nodes of the boundary, where it is at that moment",
+    "(*, VERB, ...)                                all moving boundaries, as one body",
+    "((BLADE, TIP), VERB, ...)                     several boundaries, as one body",
+    "centroid: mean of the nodes of what is moved, where they are at that moment",
 )
 MOTIONS = Kind(
     "(MARKER, VERB, ...) ; (MARKER, VERB, ...)", read_motions, write_motions, details=GRAMMAR

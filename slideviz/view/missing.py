@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate, moves
 from slideviz.view.session.state import Place, Session
 
 
@@ -26,11 +26,10 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
     moving = case.markers_with("moving")
     if not moving:
         found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))
-    given = {motion.marker for motion in case.motions}
     found += [
         Missing(f"“{name}” has no motion: add one.", "motion")
         for name in moving
-        if name not in given and "" not in given
+        if not any(moves(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
         found.append(Missing("Nothing moves yet: type how far in the motion.", "motion"))

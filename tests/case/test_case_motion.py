@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from slideviz.case.check import contradictions
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.case.motion import displacement_of, displacements, moved_points, read_files
 from slideviz.errors import CaseError
@@ -182,6 +183,49 @@ class TestDisplacements:
         assert found.vectors[:, 0].tolist() == [2, 0, 0, 0, 0, 0, 1]
         (warning,) = found.warnings
         assert "5 of 7 nodes on a moving marker are not listed; they stay" in warning
+
+    def test_several_markers_turn_about_their_common_centroid(self, square):
+        names = ("UPPER", "RIGHT")
+        nodes = [3, 7, 11, 12, 13, 14, 15]
+        centre = square.points[nodes].mean(axis=0)
+        for target in (names, names[::-1], ""):
+            found = displacements(case(Rotate(target, 30.0), moving=names), square)
+            assert found.nodes.tolist() == nodes
+            one = displacement_of([Rotate("A", 30.0, tuple(centre.tolist()))], square.points[nodes])
+            assert (found.vectors == one).all(), "as one body, to the bit"
+            grown = displacements(case(Scale(target, (2.0,)), moving=names), square)
+            assert (grown.vectors == square.points[nodes] - centre).all()
+
+    def test_where_they_are_at_that_moment(self, square):
+        names = ("UPPER", "RIGHT")
+        shift = Translate(names, (5.0, -1.0))
+        turned = displacements(case(shift, Rotate(names, 180.0), moving=names), square)
+        apart = displacements(case(Rotate(names, 180.0), shift, moving=names), square)
+        np.testing.assert_allclose(turned.vectors, apart.vectors, atol=1e-14)
+
+    def test_one_that_moves_beside_them_is_left_alone(self, square):
+        moving = ("UPPER", "LOWER", "RIGHT")
+        several = case(
+            Translate(("UPPER", "RIGHT"), (1.0, 0.0)), Translate("LOWER", (1.0, 0.0)), moving=moving
+        )
+        assert (displacements(several, square).vectors == [1.0, 0.0]).all()
+        lost = case(Translate(("UPPER", "RIGHT"), (1.0, 0.0)), moving=moving)
+        with pytest.raises(CaseError, match="moving marker 'LOWER' has no motion"):
+            displacements(lost, square)
+        wrong = case(Rotate(("UPPER", "LEFT"), 1.0))
+        told = [text for _, text in contradictions(wrong)]
+        assert len(told) == 1
+        assert "motion 1 names 'LEFT', which does not move" in told[0]
+
+    def test_file_of_several_markers(self, square, tmp_path):
+        (tmp_path / "d.txt").write_text("15 1 0\n3 2 0\n")
+        names = ("UPPER", "RIGHT")
+        found = displacements(case(FromFile(tmp_path / "d.txt", names), moving=names), square)
+        assert found.vectors[:, 0].tolist() == [2, 0, 0, 0, 0, 0, 1]
+        (tmp_path / "d.txt").write_text("0 1 0\n")
+        match = r"d\.txt:1: node 0 is not on marker 'UPPER' or 'RIGHT'"
+        with pytest.raises(CaseError, match=match):
+            displacements(case(FromFile(tmp_path / "d.txt", names), moving=names), square)
 
     def test_file_of_one_marker(self, square, tmp_path):
         (tmp_path / "d.txt").write_text("12 1 0\n13 1 0\n14 1 0\n15 1 0\n")

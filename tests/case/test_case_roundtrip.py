@@ -46,6 +46,8 @@ names = text.filter(is_file_name)
 
 def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
     factors = st.lists(positive, min_size=1, max_size=3).map(tuple)
+    several = st.lists(marker, min_size=2, max_size=4).map(dict.fromkeys).map(tuple)
+    marker = marker | several.filter(lambda found: len(found) > 1) | st.just("")
     vector = st.tuples(finite, finite) | st.tuples(finite, finite, finite)
     return st.one_of(
         st.builds(Translate, marker, vector),
@@ -53,7 +55,7 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
         st.builds(Scale, marker, factors, point),
         st.builds(Radial, marker, positive, finite, axis, st.tuples(finite, finite, finite)),
         st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
-        st.builds(FromFile, path, marker | st.just("")),
+        st.builds(FromFile, path, marker),
     )
 
 

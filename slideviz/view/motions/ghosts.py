@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from slideviz.case.displacement import Displacements, read_displacements
-from slideviz.case.model import Case, FromFile
-from slideviz.case.motion import moved_points
+from slideviz.case.model import Case, FromFile, Target, moves
+from slideviz.case.motion import moved_together
 from slideviz.errors import SlidevizError
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 
 class Ghosts:
@@ -26,31 +27,30 @@ class Ghosts:
 
         A displacement file that cannot be read moves nothing here; the run will say why.
         """
-        found = {}
-        for name in case.markers_with("moving"):
-            nodes = self._nodes.get(name)
-            motions = [motion for motion in case.motions if motion.marker in ("", name)]
-            if nodes is None or not motions:
-                continue
-            files = {}
-            for motion in motions:
-                if isinstance(motion, FromFile):
-                    read = self._read(motion, case)
-                    if read is not None:
-                        files[motion.path, motion.marker] = read
-            found[name] = moved_points(motions, self.mesh.points[nodes], nodes, files)
-        return found
+        on = {
+            name: self._nodes[name]
+            for name in case.markers_with("moving")
+            if name in self._nodes and any(moves(motion, name) for motion in case.motions)
+        }
+        files: dict[tuple[Path, Target], Displacements] = {}
+        for motion in case.motions:
+            if isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
+                files[motion.path, motion.marker] = read
+        points = self.mesh.points
+        moved = moved_together(case.motions, points, on, files)
+        return {name: points[nodes] + moved[name] for name, nodes in on.items()}
 
-    def _read(self, motion: FromFile, case: Case) -> Displacements | None:
-        # A file of all moving boundaries lists nodes of each.
-        names = (motion.marker,) if motion.marker else case.markers_with("moving")
+    def _read(self, motion: FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
+        # A file of several boundaries lists nodes of each.
+        names = tuple(name for name in on if moves(motion, name))
+        if not names:
+            return None
         try:
             key = (motion.path, names, motion.path.stat().st_mtime)
         except OSError:
             return None
         if key not in self._files:
-            every = [self._nodes[name] for name in names if name in self._nodes]
-            wanted = np.unique(np.concatenate(every))
+            wanted = np.unique(np.concatenate([on[name] for name in names]))
             shape, of = self.mesh.points.shape, f"boundaries {', '.join(names)}"
             try:
                 self._files[key] = read_displacements(motion.path, wanted, shape, of)

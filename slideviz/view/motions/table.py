@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.displacement import parse_displacements
 from slideviz.case.lines import read_text
-from slideviz.case.model import Case
+from slideviz.case.model import Case, Target, named
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import IntArray, Mesh
@@ -38,9 +38,9 @@ class Rows:
     shape: tuple[int, ...]
 
     @classmethod
-    def on(cls, mesh: Mesh, case: Case, marker: str) -> Rows:
-        """Return those of a boundary, or of all that move where ``marker`` is empty."""
-        names = (marker,) if marker else case.markers_with("moving")
+    def on(cls, mesh: Mesh, case: Case, marker: Target) -> Rows:
+        """Return those of a boundary or several, or of all that move where ``marker`` is empty."""
+        names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
         return cls(", ".join(names), nodes, mesh.points.shape)
 

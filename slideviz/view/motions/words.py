@@ -5,7 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from slideviz.case.model import Case, FromFile, Motion, Point, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    Case,
+    FromFile,
+    Motion,
+    Point,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+    named,
+)
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -26,20 +37,27 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
     extent : float
         Size of the mesh: of a point, what rounding left of zero beside it is told as 0.
     """
-    return f"{motion.marker or 'all moving'}: {_in_full(motion, dim, extent)}"
+    return f"{target_words(motion.marker)}: {_in_full(motion, dim, extent)}"
+
+
+def target_words(target: Target) -> str:
+    """Return what a motion moves, in words."""
+    return " + ".join(named(target)) or "all moving"
 
 
 def _in_full(motion: Motion, dim: int, extent: float) -> str:
+    its = "its" if len(named(motion.marker)) == 1 else "their"
     if isinstance(motion, Translate):
         return f"translate by {vector_words(motion.vector)}"
     if isinstance(motion, Rotate):
         turned = f"rotate by {motion.angle_deg:.5g}°"
         if dim == 3:
-            through = _place(motion.point, extent)
+            through = _place(motion.point, extent, its=its)
             return f"{turned} about {direction_words(motion.axis)} through {through}"
-        return f"{turned} about {_place(motion.point, extent)}"
+        return f"{turned} about {_place(motion.point, extent, its=its)}"
     if isinstance(motion, Scale):
-        return f"scale by {_factors(motion.factors)} about {_place(motion.point, extent)}"
+        about = _place(motion.point, extent, its=its)
+        return f"scale by {_factors(motion.factors)} about {about}"
     if isinstance(motion, Radial):
         return f"push radially by {_push(motion)}"
     return f"displace as in {motion.path.name or '(no file yet)'}"
@@ -58,23 +76,23 @@ def motion_labels(cases: Sequence[Case]) -> list[str]:
     """
     if len({case.motions for case in cases}) < 2:
         return [""] * len(cases)
-    markers = {motion.marker for case in cases for motion in case.motions} - {""}
-    named = len(markers) > 1
-    labels = [_label(case, named, exact=False) for case in cases]
+    several = len({motion.marker for case in cases for motion in case.motions} - {""}) > 1
+    labels = [_label(case, several, exact=False) for case in cases]
     alike: dict[str, set[object]] = {}
     for label, case in zip(labels, cases, strict=True):
         alike.setdefault(label, set()).add(case.motions)
     return [
-        _label(case, named, exact=True) if len(alike[label]) > 1 else label
+        _label(case, several, exact=True) if len(alike[label]) > 1 else label
         for label, case in zip(labels, cases, strict=True)
     ]
 
 
-def _label(case: Case, named: bool, exact: bool) -> str:
+def _label(case: Case, several: bool, exact: bool) -> str:
     parts = []
     for motion in case.motions:
         words = _exactly(motion) if exact else _briefly(motion)
-        parts.append(f"{motion.marker}: {words}" if named and motion.marker else words)
+        told = several and bool(motion.marker)
+        parts.append(f"{target_words(motion.marker)}: {words}" if told else words)
     return " + ".join(parts) or "no motion"
 
 
@@ -125,9 +143,9 @@ def _push(motion: Radial) -> str:
     return " and ".join(parts)
 
 
-def _place(point: Point, extent: float = 0.0, form: str = ".4g") -> str:
+def _place(point: Point, extent: float = 0.0, form: str = ".4g", its: str = "its") -> str:
     if isinstance(point, str):
-        return f"its {point}"
+        return f"{its} {point}"
     return vector_words([v if abs(v) >= NOTHING * extent else 0.0 for v in point], form)
 
 

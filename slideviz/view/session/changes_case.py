@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from slideviz.case.model import Case, Motion, Role
+from slideviz.case.model import Case, Motion, Role, named
 from slideviz.view.session.rows import replaced, without
 from slideviz.view.session.state import Place, Session
 
@@ -16,15 +16,21 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     changed = tuple(names)
     roles = dict(session.case.roles) | dict.fromkeys(changed, role)
     guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
-    motions = tuple(
-        motion
-        for motion in session.case.motions
-        if not motion.marker or roles.get(motion.marker) == "moving"
-    )
+    still = (_of_moving(motion, roles) for motion in session.case.motions)
+    motions = tuple(motion for motion in still if motion is not None)
     case = session.case.change(roles=roles, motions=motions)
     if "periodic" not in roles.values():
         case = case.change(periodic="none")
     return replace(session, case=case, guesses=guesses)
+
+
+def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
+    """Return a motion of those of its boundaries that move; None where none of them does."""
+    names = named(motion.marker)
+    moving = tuple(name for name in names if roles.get(name) == "moving")
+    if moving == names:
+        return motion
+    return replace(motion, marker=moving if len(moving) > 1 else moving[0]) if moving else None
 
 
 def confirm(session: Session, names: Iterable[str] | None = None) -> Session:

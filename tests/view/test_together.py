@@ -1,0 +1,69 @@
+"""Motions of several boundaries: their ghosts, their words, and what is left of them."""
+
+import numpy as np
+import pytest
+
+from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.case.motion import displacements
+from slideviz.view.motions.ghosts import Ghosts
+from slideviz.view.motions.table import Rows
+from slideviz.view.motions.words import describe, motion_labels
+from slideviz.view.session import changes
+
+PAIR = ("bottom", "left")
+
+
+def roles(*names):
+    return dict.fromkeys(names, "moving")
+
+
+@pytest.mark.parametrize("target", [PAIR, PAIR[::-1], ""])
+def test_the_ghost_goes_where_the_run_takes_the_nodes(square, target, tmp_path):
+    (tmp_path / "d.txt").write_text("".join(f"{k} 0.1 0\n" for k in (0, 1)))
+    file = FromFile(tmp_path / "d.txt", PAIR)
+    turn, grow, go = Rotate(target, 30.0), Scale(target, (1.5,)), Translate(target, (1.0, 2.0))
+    case = Case(roles=roles(*PAIR), motions=(file, turn, go, grow))
+    found = displacements(case, square)
+    ghosts = Ghosts(square).moved(case)
+    assert set(ghosts) == set(case.markers_with("moving"))
+    for name, points in ghosts.items():
+        nodes = square.marker(name).nodes
+        assert (points == square.points[nodes] + found.at(nodes)).all()
+
+
+def test_words():
+    assert describe(Rotate(PAIR, 5.0)) == "bottom + left: rotate by 5° about their centroid"
+    assert describe(Rotate("", 5.0)) == "all moving: rotate by 5° about their centroid"
+    assert describe(Scale(PAIR, (2.0,))) == "bottom + left: scale by 2 about their centroid"
+    assert describe(Rotate("left", 5.0)) == "left: rotate by 5° about its centroid"
+    one, other = Case(motions=(Rotate(PAIR, 5.0),)), Case(motions=(Rotate("top", 5.0),))
+    assert motion_labels([one, other]) == ["bottom + left: rotate +5°", "top: rotate +5°"]
+
+
+def test_a_boundary_that_no_longer_moves_leaves_the_motion(session):
+    session = changes.set_role(session, ("bottom", "left", "top"), "moving")
+    session = changes.add_motion(session, Translate(("bottom", "left", "top"), (1.0, 0.0)))
+    session = changes.add_motion(session, Translate("", (1.0, 0.0)))
+    session = changes.set_role(session, ("left",), "fixed")
+    assert [m.marker for m in session.case.motions] == [("bottom", "top"), ""]
+    session = changes.set_role(session, ("top",), "fixed")
+    assert [m.marker for m in session.case.motions] == ["bottom", ""]
+    session = changes.set_role(session, ("bottom",), "fixed")
+    assert [m.marker for m in session.case.motions] == [""]
+
+
+def test_who_has_a_motion_is_not_asked_for_one(session):
+    session = changes.set_role(session, PAIR, "moving")
+    assert sum("has no motion" in m.text for m in changes.is_missing(session)) == 2
+    one = changes.add_motion(session, Translate("left", (0.0, 0.1)))
+    assert [m.text for m in changes.is_missing(one)] == ["“bottom” has no motion: add one."]
+    assert not changes.is_missing(changes.add_motion(session, Translate(PAIR, (0.0, 0.1))))
+    assert not changes.is_missing(changes.add_motion(session, Translate("", (0.0, 0.1))))
+
+
+def test_the_table_lists_the_nodes_of_all_of_them(square):
+    case = Case(roles=roles("bottom", "left", "top"))
+    rows = Rows.on(square, case, PAIR)
+    assert rows.of == "bottom, left"
+    every = np.concatenate([square.marker(name).nodes for name in PAIR])
+    assert rows.nodes.tolist() == np.unique(every).tolist()
