@@ -197,4 +197,6 @@ class Docks(QObject):
         dock = self.by_name[name]
         dock.show()
         dock.raise_()
-        dock.widget().setFocus()
+        # A field in it that is being typed in must not be left.
+        if not dock.isAncestorOf(self.window.focusWidget()):
+            dock.widget().setFocus()

@@ -37,6 +37,8 @@ MOUSE = (
     ("Ctrl+Click on a run", "show it beside the one that is shown"),
     ("F2 on a run", "give it a name"),
     ("Right click", "roles of the boundary, hide, isolate"),
+    ("F2 or Alt+Down on a boundary", "choose its role"),
+    ("Menu key or right click on a motion", "duplicate, copy, paste, order, remove"),
     ("Drop a file", "open it"),
 )
 

@@ -31,11 +31,17 @@ SETTINGS = "settings"
 
 
 class RunPanel(QWidget):
-    """Starts and cancels a run; says what a run still needs, as a link to where it is given."""
+    """Starts and cancels a run; says what a run still needs, as a link to where it is given.
+
+    Signals
+    -------
+    run_wanted(), cancel_wanted(), place_wanted(Missing)
+        The buttons; and the link to where what is missing is put right.
+    """
 
     run_wanted = Signal()
     cancel_wanted = Signal()
-    place_wanted = Signal(str)
+    place_wanted = Signal(object)
 
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -135,7 +141,7 @@ class RunPanel(QWidget):
         if target == SETTINGS:
             self.store.change(changes.take_settings, self.store.session.shown)
         else:
-            self.place_wanted.emit(target)
+            self.place_wanted.emit(self._missing[0])
 
     def take_theme(self, _look: Look, _colour: str) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""

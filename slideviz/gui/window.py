@@ -30,6 +30,7 @@ from slideviz.gui.viewing import Viewing
 from slideviz.gui.warm import WarmUp
 from slideviz.mesh.inputs import spared
 from slideviz.view import jobs
+from slideviz.view.missing import Missing
 from slideviz.view.session import changes
 from slideviz.view.session.store import Store
 
@@ -287,12 +288,15 @@ class MainWindow(QMainWindow):
         if mesh is not None:
             self.store.change(changes.show, mesh.marker_names)
 
-    def lead_to(self, place: str) -> None:
-        """Bring a panel to the front."""
-        if place == "open":
+    def lead_to(self, missing: Missing) -> None:
+        """Bring the panel to the front where something is put right, and the field."""
+        if missing.place == "open":
             self.files.ask_and_open()
-        else:
-            self.docks_.lead_to(place)
+            return
+        self.docks_.lead_to(missing.place)
+        panel = self.docks_.panels[missing.place]
+        if hasattr(panel, "lead_to"):
+            panel.lead_to(missing)
 
     def set_theme(self, name: str) -> None:
         """Change to the light or dark theme, or to that of the desktop."""

@@ -10,10 +10,20 @@ from slideviz.view.session.state import Place, Session
 
 @dataclass(frozen=True)
 class Missing:
-    """What must be put right before a run, in words, and which panel does it."""
+    """What must be put right before a run, in words, and which panel does it.
+
+    Attributes
+    ----------
+    marker : str
+        The boundary that wants a motion; empty where that is not what is missing.
+    motion : int
+        The motion that it is about, from 0.
+    """
 
     text: str
     place: Place
+    marker: str = ""
+    motion: int = 0
 
 
 def is_missing(session: Session) -> tuple[Missing, ...]:
@@ -27,16 +37,16 @@ def is_missing(session: Session) -> tuple[Missing, ...]:
     if not moving:
         found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))
     found += [
-        Missing(f"“{name}” has no motion: add one.", "motion")
+        Missing(f"“{name}” has no motion: add one.", "motion", name)
         for name in moving
         if not any(moves(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
         found.append(Missing("Nothing moves yet: type how far in the motion.", "motion"))
-    for motion in case.motions:
+    for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
             text = f"The displacement file {motion.path} does not exist."
-            found.append(Missing(text, "motion"))
+            found.append(Missing(text, "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         found.append(Missing(text, "method"))

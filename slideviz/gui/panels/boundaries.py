@@ -1,11 +1,13 @@
 """The boundaries panel: a row per marker with visibility, elements and role."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
 from functools import partial
 
-from qtpy.QtCore import QItemSelectionModel, Qt
-from qtpy.QtGui import QAction, QBrush
+from qtpy.QtCore import QItemSelectionModel, QPoint, Qt, Signal
+from qtpy.QtGui import QAction, QBrush, QContextMenuEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -31,6 +33,47 @@ from slideviz.view.session.store import Store
 NAME, COUNT, ROLE = 0, 1, 2
 
 
+class BoundariesTable(QTableWidget):
+    """A table that the tab key leaves, whose menu is about what is selected.
+
+    Signals
+    -------
+    menu_wanted(int, QPoint), role_wanted(int)
+        The menu of a row, at a place of the screen; its roles.
+    """
+
+    menu_wanted = Signal(int, QPoint)
+    role_wanted = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__(0, 3)
+        self.setTabKeyNavigation(False)
+
+    def chosen_row(self) -> int:
+        """Return the row that a key is about: the current one, or the first that is selected."""
+        rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
+        return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
+
+    def contextMenuEvent(self, event) -> None:
+        if event.reason() == QContextMenuEvent.Reason.Keyboard:
+            row = self.chosen_row()
+            where = self.visualRect(self.model().index(row, NAME)).center()
+        else:
+            where = event.pos()
+            row = self.rowAt(where.y())
+        if row >= 0:
+            self.menu_wanted.emit(row, self.viewport().mapToGlobal(where))
+
+    def keyPressEvent(self, event) -> None:
+        key, alt = event.key(), event.modifiers() & Qt.KeyboardModifier.AltModifier
+        plain = (Qt.Key.Key_F2, Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        row = self.chosen_row()
+        if row >= 0 and (key in plain or (alt and key == Qt.Key.Key_Down)):
+            self.role_wanted.emit(row)
+            return
+        super().keyPressEvent(event)
+
+
 class BoundariesPanel(QWidget):
     """Shows the roles of the boundaries and lets them be changed, several at once."""
 
@@ -46,11 +89,12 @@ class BoundariesPanel(QWidget):
         self.table = self._make_table()
         layout.addWidget(self.table, 1)
         layout.addLayout(self._make_guess_line())
+        self.setFocusProxy(self.table)
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
 
-    def _make_table(self) -> QTableWidget:
-        table = QTableWidget(0, 3)
+    def _make_table(self) -> BoundariesTable:
+        table = BoundariesTable()
         table.setObjectName("boundaries")
         table.setHorizontalHeaderLabels(["Boundary", "Elements", "Role"])
         table.verticalHeader().hide()
@@ -68,11 +112,11 @@ class BoundariesPanel(QWidget):
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         table.setShowGrid(False)
         table.setAlternatingRowColors(True)
-        table.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         table.setMinimumHeight(90)
         table.itemSelectionChanged.connect(self._selection_changed)
         table.itemChanged.connect(self._item_changed)
-        table.customContextMenuRequested.connect(self._menu_wanted)
+        table.menu_wanted.connect(self._menu_wanted)
+        table.role_wanted.connect(lambda row: self._choices[row].showPopup())
         return table
 
     def _make_guess_line(self) -> QHBoxLayout:
@@ -126,6 +170,8 @@ class BoundariesPanel(QWidget):
             self.table.setItem(row, COUNT, count)
             choice = Choice({role: role for role in ROLES})
             choice.setFrame(False)
+            # The tab key goes on to the next panel: F2 opens the roles.
+            choice.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
             choice.explain({role: f"{role}: {ROLE_MEANING[role]}" for role in ROLES})
@@ -166,7 +212,11 @@ class BoundariesPanel(QWidget):
         flags = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
         for row, name in enumerate(self._names):
             if name in wanted:
-                model.select(self.table.model().index(row, 0), flags)
+                index = self.table.model().index(row, 0)
+                if not model.selectedRows():
+                    # Keys go on from here.
+                    model.setCurrentIndex(index, QItemSelectionModel.SelectionFlag.NoUpdate)
+                model.select(index, flags)
                 self.table.scrollToItem(self.table.item(row, NAME))
 
     # Widgets to state ------------------------------------------------------------------
@@ -192,14 +242,10 @@ class BoundariesPanel(QWidget):
         chosen = self.selected()
         self.store.change(changes.set_role, chosen if name in chosen else (name,), role)
 
-    def _menu_wanted(self, where) -> None:
-        item = self.table.itemAt(where)
-        if item is None:
-            return
-        name = self._names[item.row()]
+    def _menu_wanted(self, row: int, where: QPoint) -> None:
+        name = self._names[row]
         names = self.selected()
-        menu = boundary_menu(self, self.store, names if name in names else (name,))
-        menu.popup(self.table.viewport().mapToGlobal(where))
+        boundary_menu(self, self.store, names if name in names else (name,)).popup(where)
 
 
 def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:

@@ -11,6 +11,7 @@ from slideviz.case.model import Reduction
 from slideviz.gui.panels.method_form import TIPS, MethodForm
 from slideviz.gui.panels.method_more import NO_REDUCTION, enable, not_used
 from slideviz.gui.widgets.field_watch import FieldWatch
+from slideviz.view.missing import Missing
 from slideviz.view.motions.period_words import found_text
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
@@ -50,6 +51,11 @@ class MethodPanel(MethodForm):
             # When its form has been laid out.
             lambda on: on and QTimer.singleShot(0, self, self._show_more)
         )
+
+    def lead_to(self, _missing: Missing) -> None:
+        """Put the cursor where something is put right."""
+        if not self.watch.focus():
+            self.sliding.setFocus()
 
     def _set(self, name: str, value: object) -> None:
         if getattr(self.store.session.case, name) != value:

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QWidget
 
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.model import (
+    FromFile,
+    Motion,
+    Radial,
+    Rotate,
+    Scale,
+    Target,
+    Translate,
+    named,
+)
 from slideviz.gui.panels.motion_form import ABOUT, MotionForm
 from slideviz.gui.panels.motion_kinds import new_motion
-from slideviz.view.motions.places import Axis
-from slideviz.view.motions.words import direction_words
+from slideviz.view.motions.places import Axis, radial
+from slideviz.view.motions.words import direction_words, target_words
 
-ALL_MOVING = ""
 Z = (0.0, 0.0, 1.0)
 
 
@@ -35,9 +44,10 @@ class MotionEditor(MotionForm):
         super().__init__(parent)
         self._motion: Motion | None = None
         self._dim = 3
-        self._markers: tuple[str, ...] = ()
-        self._centroid = {}
+        self._targets: tuple[Target, ...] = ()
+        self._centroid: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
         self._machine: Axis | None = None
+        self._as_point = False
         self._connect()
         self.show_motion(None, (), 3)
 
@@ -51,13 +61,13 @@ class MotionEditor(MotionForm):
         self.browse.clicked.connect(self._browse)
         self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
-    def show_motion(self, motion: Motion | None, markers: tuple[str, ...], dim: int) -> None:
-        """Show a motion of one of these moving boundaries, or nothing."""
+    def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
+        """Show a motion of one of these targets, or nothing."""
         self._motion, self._dim = motion, dim
         self.setVisible(motion is not None)
         if motion is None:
             return
-        self._sync_markers(motion, markers)
+        self._sync_targets(motion, targets)
         self.kind.show_value(type(motion))
         shown = self._show_numbers(motion, dim)
         if isinstance(motion, Rotate | Scale | Radial):
@@ -92,23 +102,35 @@ class MotionEditor(MotionForm):
         offered = ["point"] if isinstance(motion, Radial) else ["centroid", "point"]
         if self._machine is not None and not isinstance(motion, Scale):
             offered.insert(-1, "axis")
+        if self._radial(motion) is not None:
+            offered.insert(-1, "radial")
         words = [self._about_words(what) for what in offered]
         if [self.about.itemText(row) for row in range(self.about.count())] != words:
             self.about.clear()
             for what, word in zip(offered, words, strict=True):
                 self.about.addItem(word, what)
         what = "centroid" if motion.point == "centroid" else "point"
-        if "axis" in offered and self._is_machine(motion) and self.about.currentData() != "point":
+        if "axis" in offered and self._is_machine(motion) and not self._as_point:
             what = "axis"
+        elif "radial" in offered and what == "centroid" and motion.axis == self._radial(motion):
+            what = "radial"
         self.about.show_value(what)
-        if what != "centroid":
+        if motion.point != "centroid":
             self.point.show_value(motion.point)
         if not isinstance(motion, Scale):
             self.axis.show_value(motion.axis)
-        turns = not isinstance(motion, Scale) and dim == 3 and what != "axis"
+        turns = not isinstance(motion, Scale) and dim == 3 and what not in ("axis", "radial")
         return ({"point"} if what == "point" else set()) | ({"axis"} if turns else set())
 
+    def _radial(self, motion: Motion) -> tuple[float, float, float] | None:
+        """Return the radial direction through the centroid of what turns, if there is one."""
+        if self._machine is None or self._dim == 2 or not isinstance(motion, Rotate):
+            return None
+        return radial(self._machine, self._centroid(motion.marker))
+
     def _about_words(self, what: str) -> str:
+        if what in ("centroid", "radial") and len(named(self._motion.marker)) != 1:
+            return ABOUT[what].replace("its", "their")
         if what != "axis" or self._dim == 2:
             return ABOUT[what]
         axis, _ = self._machine
@@ -119,37 +141,57 @@ class MotionEditor(MotionForm):
         axis, origin = self._machine
         return motion.axis == axis and motion.point == origin[: self._dim]
 
-    def _sync_markers(self, motion: Motion, markers: tuple[str, ...]) -> None:
-        names = dict.fromkeys(markers)
-        if isinstance(motion, FromFile):
-            names[ALL_MOVING] = None
-        names[motion.marker] = None
-        if tuple(names) != self._markers:
-            self._markers = tuple(names)
+    def _sync_targets(self, motion: Motion, targets: tuple[Target, ...]) -> None:
+        targets = tuple(dict.fromkeys((*targets, motion.marker)))
+        if targets != self._targets:
+            self._targets = targets
             self.marker.clear()
-            for name in names:
-                self.marker.addItem(name or "all moving", name)
-        self.marker.show_value(motion.marker)
+            for place, target in enumerate(targets):
+                # By its number: Qt would make a list of several names.
+                self.marker.addItem(target_words(target), place)
+        self.marker.show_value(targets.index(motion.marker))
 
     def _kind_chosen(self, kind: type) -> None:
         if self._motion is not None and type(self._motion) is not kind:
             self.changed.emit(new_motion(kind, self._motion.marker, self._dim, self._machine))
 
     def _about_chosen(self, what: str) -> None:
-        if what == "point" and getattr(self._motion, "point", None) == "centroid":
-            centre = self._centroid.get(self._motion.marker, (0.0,) * self._dim)
-            self.point.show_value(centre)
+        motion, across = self._motion, self._radial(self._motion)
+        self._as_point = what == "point"
+        if what == "point" and getattr(motion, "point", None) == "centroid":
+            self.point.show_value(self._centroid(motion.marker))
         elif what == "axis":
             axis, origin = self._machine
             self.axis.show_value(axis)
             self.point.show_value(origin)
+        elif what == "radial":
+            self.axis.show_value(across)
+        elif what == "centroid" and across is not None and motion.axis == across:
+            self.axis.show_value(self._machine[0])
         self._tell()
         # What is about the axis already is the same motion: only the fields differ.
-        self.show_motion(self._motion, self._markers, self._dim)
+        self.show_motion(self._motion, self._targets, self._dim)
 
-    def set_centroids(self, centroids: dict[str, tuple[float, ...]]) -> None:
-        """Take the centroids of boundaries: where a point starts that nobody has typed yet."""
-        self._centroid = centroids
+    def show_another(self) -> None:
+        """Take note that another motion is shown from now on: nothing has been chosen for it."""
+        self._as_point = False
+
+    def focus(self) -> None:
+        """Put the cursor into the first field, so that what is typed goes there."""
+        first = {
+            Translate: self.vector.fields[0],
+            Rotate: self.angle,
+            Scale: self.factors.fields[0],
+            Radial: self.percent,
+            FromFile: self.path,
+        }.get(type(self._motion))
+        if first is not None:
+            first.setFocus()
+            first.selectAll()
+
+    def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
+        """Take what returns the centroid of a target, where a point starts."""
+        self._centroid = centroid
 
     def set_extent(self, extent: float) -> None:
         """Take the size of the mesh, beside which what rounding left of zero is shown as 0."""
@@ -160,11 +202,12 @@ class MotionEditor(MotionForm):
         self._machine = machine
 
     def _tell(self) -> None:
-        marker, kind = self.marker.currentData() or "", type(self._motion)
+        marker, kind = self._targets[self.marker.currentData()], type(self._motion)
         axis = self.axis.value if self._dim == 3 else Z
         if self.axis.problem:
             axis = getattr(self._motion, "axis", Z)
-        point = "centroid" if self.about.currentData() == "centroid" else self.point.value
+        about = self.about.currentData()
+        point = "centroid" if about in ("centroid", "radial") else self.point.value
         if kind is Translate:
             motion: Motion = Translate(marker, self.vector.value)
         elif kind is Rotate:

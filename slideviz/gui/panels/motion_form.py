@@ -8,14 +8,21 @@ from qtpy.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
+    QSizePolicy,
     QWidget,
 )
 
 from slideviz.gui.panels.motion_kinds import KINDS
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField, a_direction, not_zero
+from slideviz.gui.widgets.tips import wrapped
 
-ABOUT = {"centroid": "its centroid", "axis": "the machine's axis", "point": "a point"}
+ABOUT = {
+    "centroid": "its centroid",
+    "axis": "the machine's axis",
+    "radial": "radial through its centroid",
+    "point": "a point",
+}
 
 
 class MotionForm(QWidget):
@@ -47,6 +54,12 @@ class MotionForm(QWidget):
         self.distance.set_tip("How far outwards besides, in the mesh's length unit.")
         self.about = Choice({"centroid": ABOUT["centroid"], "point": ABOUT["point"]})
         self.about.setToolTip("What stays in place while it turns or grows.")
+        self.marker.setToolTip(
+            wrapped(
+                "What moves. To move some boundaries as one body, about their common centroid, "
+                "select them in the table of boundaries: they are offered here then."
+            )
+        )
         self.point = VectorField()
         self.point.set_tip("The point that stays in place.")
         self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
@@ -106,8 +119,14 @@ class MotionForm(QWidget):
             "Axis",
             "File",
         )
-        for title, widget in zip(titles, self._rows.values(), strict=True):
-            self.form.addRow(QLabel(title), widget)
+        labels = [QLabel(title) for title in titles]
+        # As wide whatever is shown: else the fields would jump from one motion to the next.
+        widest = max(label.sizeHint().width() for label in labels)
+        for label, widget in zip(labels, self._rows.values(), strict=True):
+            label.setMinimumWidth(widest)
+            self.form.addRow(label, widget)
+        for choice in (self.kind, self.marker, self.about):
+            choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_rows(self, names: set[str]) -> None:
         """Show these rows only."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate
+from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
 from slideviz.view.motions.places import Axis
 
 KINDS: dict[type, str] = {
@@ -16,7 +16,7 @@ KINDS: dict[type, str] = {
 }
 
 
-def new_motion(kind: type, marker: str, dim: int, machine: Axis | None = None) -> Motion:
+def new_motion(kind: type, marker: Target, dim: int, machine: Axis | None = None) -> Motion:
     """Return a motion of that kind which does not move anything yet.
 
     Where the mesh repeats about an axis, what turns or is pushed does so about that axis.

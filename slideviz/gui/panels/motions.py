@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import (
+    QApplication,
     QHBoxLayout,
     QLabel,
     QListWidget,
@@ -18,7 +21,8 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.model import FromFile
+from slideviz.case.model import FromFile, Motion, Target, Translate, named
+from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_kinds import KINDS, new_motion
@@ -29,7 +33,8 @@ from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.view.drawing.look import Look
-from slideviz.view.motions.places import centroids, machine_axis
+from slideviz.view.missing import Missing
+from slideviz.view.motions.places import centroid, machine_axis, new_target, targets
 from slideviz.view.motions.table import Rows
 from slideviz.view.motions.words import describe
 from slideviz.view.session import changes
@@ -60,6 +65,7 @@ class MotionPanel(QWidget):
         self.list.setAlternatingRowColors(True)
         elide_items(self.list)
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
+        self._make_menu()
         layout.addWidget(self.list, 4)
         self.editor = MotionEditor()
         self.editor.changed.connect(self._edited)
@@ -102,6 +108,25 @@ class MotionPanel(QWidget):
             row.addWidget(button)
         return row
 
+    def _make_menu(self) -> None:
+        """Give the list its menu; the keys of it work while the list has the focus."""
+        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self.menu_actions: dict[str, QAction] = {}
+        for name, text, keys, function in (
+            ("duplicate", "Duplicate", "Ctrl+D", self._duplicate),
+            ("copy", "Copy", "Ctrl+C", self._copy),
+            ("paste", "Paste", "Ctrl+V", self._paste),
+            ("earlier", "Perform it earlier", "Ctrl+Up", lambda: self._move(-1)),
+            ("later", "Perform it later", "Ctrl+Down", lambda: self._move(1)),
+            ("remove", "Remove", "Del", self._remove),
+        ):
+            act = QAction(text, self.list)
+            act.setShortcut(QKeySequence(keys))
+            act.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+            act.triggered.connect(lambda _=False, function=function: function())
+            self.menu_actions[name] = act
+            self.list.addAction(act)
+
     def _button(self, name: str, tip: str, function) -> QToolButton:
         button = QToolButton()
         button.setObjectName(f"motion_{name}")
@@ -130,6 +155,7 @@ class MotionPanel(QWidget):
             texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
             current = self.list.currentRow()
             if self.list.count() != len(texts):
+                self.editor.show_another()
                 # A new motion is the one to be edited; after a removal, its neighbour is.
                 current = len(texts) - 1 if len(texts) > self.list.count() else current
                 self.list.clear()
@@ -147,20 +173,30 @@ class MotionPanel(QWidget):
     def _take_mesh(self, mesh: Mesh | None) -> None:
         """Note what motions need to know of another mesh; that takes a while."""
         self._mesh, self._extent = mesh, mesh.extent if mesh is not None else 0.0
-        self.editor.set_centroids(centroids(mesh) if mesh is not None else {})
+        self.editor.set_centroid(self._centroid)
         self.editor.set_extent(self._extent)
+
+    def _centroid(self, target: Target) -> tuple[float, ...]:
+        """Return the centroid of what a motion moves."""
+        moving = self.store.session.case.markers_with("moving")
+        return centroid(self._mesh, named(target) or moving)
 
     def _sync_editor(self, session: Session) -> None:
         row, motions = self.list.currentRow(), session.case.motions
         dim = session.mesh.dim if session.mesh else 3
         motion = motions[row] if 0 <= row < len(motions) else None
-        self.editor.show_motion(motion, session.case.markers_with("moving"), dim)
+        self.editor.show_motion(motion, targets(session), dim)
 
     def _sync_buttons(self, session: Session, moving: tuple[str, ...]) -> None:
         row, count = self.list.currentRow(), self.list.count()
         self.up.setEnabled(row > 0)
         self.down.setEnabled(0 <= row < count - 1)
         self.remove.setEnabled(row >= 0)
+        for name, button in (("earlier", self.up), ("later", self.down), ("remove", self.remove)):
+            self.menu_actions[name].setEnabled(button.isEnabled())
+        for name in ("duplicate", "copy"):
+            self.menu_actions[name].setEnabled(row >= 0)
+        self.menu_actions["paste"].setEnabled(bool(moving))
         self.add.setEnabled(bool(moving))
         if session.mesh is None:
             why = "Open a mesh first."
@@ -176,25 +212,66 @@ class MotionPanel(QWidget):
 
     def _row_changed(self) -> None:
         if not self._syncing:
+            self.editor.show_another()
             session = self.store.session
             self._sync_editor(session)
             self._sync_buttons(session, session.case.markers_with("moving"))
 
-    def _next_marker(self) -> str:
-        """Return the boundary that a new motion is for."""
+    def _add(self, kind: type, *_checked: bool) -> None:
+        self._add_for(new_target(self.store.session), kind)
+
+    def _add_for(self, target: Target, kind: type) -> None:
+        """Add a motion that does nothing yet, and let its numbers be typed."""
+        session = self.store.session
+        motion = new_motion(kind, target, session.mesh.dim, machine_axis(session))
+        self.store.change(changes.add_motion, motion)
+        self.editor.focus()
+
+    def lead_to(self, missing: Missing) -> None:
+        """Put the cursor where something is put right; what wants a motion gets one."""
+        motions = self.store.session.case.motions
+        if self.watch.focus():
+            return
+        if missing.marker:
+            self._add_for(missing.marker, type(motions[-1]) if motions else Translate)
+        elif motions:
+            self.list.setCurrentRow(missing.motion)
+            self.editor.focus()
+
+    def _insert(self, motion: Motion) -> None:
+        """Add a motion below the chosen one, and choose it."""
+        row = self.list.currentRow() + 1
+        self.store.change(changes.add_motion, motion, row)
+        self.list.setCurrentRow(row)
+
+    def _duplicate(self) -> None:
+        self._insert(self.store.session.case.motions[self.list.currentRow()])
+
+    def _copy(self) -> None:
+        """Copy the motion as a case file has it."""
+        motion = self.store.session.case.motions[self.list.currentRow()]
+        try:
+            QApplication.clipboard().setText(write_motions((motion,)))
+        except SlidevizError as error:
+            main_window(self).banner.tell_error(error)
+
+    def _paste(self) -> None:
+        """Add the motions that were copied, here or from a case file, below the chosen one."""
         session = self.store.session
         moving = session.case.markers_with("moving")
-        chosen = [name for name in session.view.selected if name in moving]
-        return (chosen or list(moving))[0]
-
-    def _add(self, kind: type, *_checked: bool) -> None:
-        session = self.store.session
-        motion = new_motion(kind, self._next_marker(), session.mesh.dim, machine_axis(session))
-        self.store.change(changes.add_motion, motion)
+        try:
+            motions = read_motions(QApplication.clipboard().text().replace("\\\n", " "))
+        except SlidevizError as error:
+            said = SlidevizError(f"What was copied is no motion: {error}")
+            main_window(self).banner.tell_error(said)
+            return
+        for motion in motions:
+            fits = set(named(motion.marker)) <= set(moving)
+            self._insert(motion if fits else replace(motion, marker=new_target(session)))
 
     def new_table(self) -> None:
         """Let a table of displacements be typed, and add a motion that uses it."""
-        marker = self._next_marker()
+        marker = new_target(self.store.session)
         path = self._ask_table(marker, Path())
         if path is not None:
             self.store.change(changes.add_motion, FromFile(path, marker))
@@ -211,11 +288,11 @@ class MotionPanel(QWidget):
             self.store.change(changes.replace_motion, row, FromFile(Path(), motion.marker))
         self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
 
-    def _ask_table(self, marker: str, path: Path) -> Path | None:
+    def _ask_table(self, marker: Target, path: Path) -> Path | None:
         case, mesh_file = self.store.session.case, self.store.session.path
         beside = case.source or mesh_file
         folder = beside.parent if beside is not None else folder_of(self)
-        default = folder / f"displacement_{marker or 'all'}.txt"
+        default = folder / f"displacement_{'_'.join(named(marker)) or 'all'}.txt"
         try:
             rows = Rows.on(self.store.session.mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
@@ -240,9 +317,3 @@ class MotionPanel(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         return QSize(super().minimumSizeHint().width(), LEAST_HEIGHT)
-
-    def keyPressEvent(self, event) -> None:
-        if event.key() == Qt.Key.Key_Delete and self.list.hasFocus() and self.remove.isEnabled():
-            self._remove()
-            return
-        super().keyPressEvent(event)

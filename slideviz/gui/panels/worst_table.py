@@ -172,6 +172,7 @@ class WorstTable(QTableView):
     def __init__(self, model: WorstModel) -> None:
         super().__init__()
         self.setObjectName("worst")
+        self.setTabKeyNavigation(False)  # the tab key goes on to the next panel
         self._shared: tuple[str, ...] = ()
         self._needed: list[int] = []
         self._given: list[int] = []

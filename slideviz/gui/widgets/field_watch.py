@@ -32,6 +32,14 @@ class FieldWatch(QObject):
         )
         self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(told)))
 
+    def focus(self) -> bool:
+        """Put the cursor into the first field that is not valid; return whether there is one."""
+        field = next((field for field in self._fields if field.fault), None)
+        if field is not None:
+            field.setFocus()
+            field.selectAll()
+        return field is not None
+
 
 def _title(field: QWidget, panel: QWidget) -> str:
     """Return what a form calls a field, or the row that it is in, with its own name there."""

@@ -53,9 +53,11 @@ def set_invalid(session: Session, place: Place, sentences: tuple[str, ...]) -> S
     return session if found == session.invalid else replace(session, invalid=found)
 
 
-def add_motion(session: Session, motion: Motion) -> Session:
-    """Return the session with one more motion, performed last."""
-    return set_case(session, motions=(*session.case.motions, motion))
+def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
+    """Return the session with one more motion, performed last or as the one of that index."""
+    motions = list(session.case.motions)
+    motions.insert(len(motions) if index is None else index, motion)
+    return set_case(session, motions=tuple(motions))
 
 
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:

@@ -1,0 +1,257 @@
+"""What the keys do in the panels of boundaries and motions, and where the cursor goes."""
+
+import pytest
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QContextMenuEvent
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
+
+from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
+from slideviz.view.session import changes
+
+
+@pytest.fixture
+def opened(driver, passage_file):
+    driver.open(passage_file)
+    driver.role("airfoil", "moving")
+    driver.window.store.change(changes.select, ())
+    return driver
+
+
+def menu_key(view):
+    """Press the Menu key; Qt tells the focus widget, wherever the mouse is."""
+    where = view.rect().center()
+    event = QContextMenuEvent(QContextMenuEvent.Reason.Keyboard, where, view.mapToGlobal(where))
+    QApplication.sendEvent(view, event)
+
+
+@pytest.mark.parametrize("name", ["inflow", "periodic_1", "periodic_2", "outflow"])
+@pytest.mark.parametrize("by_click", [True, False])
+def test_the_menu_key_is_about_the_row_that_is_selected(opened, name, by_click):
+    panel = opened.window.boundaries
+    if by_click:
+        opened.click_row(name)
+    else:
+        # As a click on the boundary in the view does.
+        opened.window.store.change(changes.select, (name,))
+    panel.table.setFocus()
+    menu_key(panel.table)
+    (menu,) = [menu for menu in panel.findChildren(QMenu) if menu.isVisible()]
+    assert menu.actions()[0].text() == name
+    menu.close()
+
+
+def test_a_right_click_is_about_the_row_below_the_mouse(opened):
+    panel = opened.window.boundaries
+    opened.click_row("inflow")
+    table = panel.table
+    where = table.visualItemRect(table.item(opened.row("outflow"), 1)).center()
+    there = table.viewport().mapToGlobal(where)
+    event = QContextMenuEvent(QContextMenuEvent.Reason.Mouse, where, there)
+    QApplication.sendEvent(table.viewport(), event)
+    (menu,) = [menu for menu in panel.findChildren(QMenu) if menu.isVisible()]
+    assert menu.actions()[0].text() == "outflow"
+    menu.close()
+
+
+@pytest.mark.parametrize(
+    ("key", "modifier"),
+    [
+        (Qt.Key.Key_F2, Qt.KeyboardModifier.NoModifier),
+        (Qt.Key.Key_Return, Qt.KeyboardModifier.NoModifier),
+        (Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier),
+    ],
+)
+def test_roles_are_chosen_by_keys_alone(opened, key, modifier):
+    table = opened.window.boundaries.table
+    table.setFocus()
+    table.setCurrentCell(opened.row("outflow"), 0)
+    QTest.keyClick(table, key, modifier)
+    choice = table.cellWidget(opened.row("outflow"), 2)
+    opened.qtbot.waitUntil(lambda: choice.view().isVisible())
+    QTest.keyClick(choice.view(), Qt.Key.Key_Home)
+    QTest.keyClick(choice.view(), Qt.Key.Key_Return)
+    assert opened.session.role("outflow") == "moving"
+    assert table.hasFocus(), "the next one is chosen by keys, too"
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_the_tab_key_leaves_every_table(opened, back):
+    window = opened.window
+    views = window.findChildren(QAbstractItemView)
+    assert not [v.objectName() for v in views if isinstance(v, QTableView) and v.tabKeyNavigation()]
+    table = window.boundaries.table
+    table.setFocus()
+    QTest.keyClick(table, Qt.Key.Key_Backtab if back else Qt.Key.Key_Tab)
+    assert not table.hasFocus()
+    assert not table.isAncestorOf(window.focusWidget())
+
+
+def test_the_tab_key_comes_around(opened):
+    """From anywhere, tabs alone reach the roles, the motions, the method and Run."""
+    window, seen = opened.window, set()
+    window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
+    window.boundaries.table.setFocus()
+    for _ in range(120):
+        at = window.focusWidget()
+        if at in seen:
+            break
+        seen.add(at)
+        QTest.keyClick(at, Qt.Key.Key_Tab)
+    assert {window.boundaries.table, window.motions.list, window.run_panel.run} <= seen
+
+
+FIRST = {
+    Translate: lambda editor: editor.vector.fields[0],
+    Rotate: lambda editor: editor.angle,
+    Scale: lambda editor: editor.factors.fields[0],
+    Radial: lambda editor: editor.percent,
+    FromFile: lambda editor: editor.path,
+}
+
+
+@pytest.mark.parametrize("kind", list(FIRST))
+def test_what_is_typed_after_adding_a_motion_goes_into_its_first_field(opened, kind):
+    opened.add_motion(kind)
+    field = FIRST[kind](opened.window.motions.editor)
+    opened.qtbot.waitUntil(field.hasFocus)
+    QTest.keyClicks(opened.window.focusWidget(), "7")
+    assert field.text() == "7"
+
+
+def link(driver):
+    """Click the link beside the button Run."""
+    panel = driver.window.run_panel
+    panel.text.linkActivated.emit("motion")
+
+
+def test_the_link_of_a_motion_that_does_nothing_leads_to_its_field(opened):
+    opened.add_motion(Rotate)
+    opened.window.boundaries.table.setFocus()
+    assert "Nothing moves yet" in opened.window.run_panel.text.text()
+    link(opened)
+    field = opened.window.motions.editor.angle
+    assert field.hasFocus()
+    assert field.selectedText() == "0"
+
+
+def test_the_link_of_a_boundary_without_motion_adds_one_for_it(opened):
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.add_motion, Translate("airfoil", (0.01, 0.0)))
+    assert "“outflow” has no motion: add one." in opened.window.run_panel.text.text()
+    link(opened)
+    assert opened.session.case.motions[1:] == (Translate("outflow", (0.0, 0.0)),)
+    assert opened.window.motions.list.currentRow() == 1
+    assert opened.window.motions.editor.vector.fields[0].hasFocus()
+
+
+def test_the_link_of_a_wrong_field_leads_to_it(opened):
+    opened.add_motion(Rotate)
+    field = opened.window.motions.editor.angle
+    field.selectAll()
+    QTest.keyClicks(field, "3..")
+    link(opened)
+    assert field.hasFocus()
+    assert field.selectedText() == "3.."
+
+
+# Several boundaries -----------------------------------------------------------------------
+
+
+def words(choice):
+    return [choice.itemText(row) for row in range(choice.count())]
+
+
+def test_a_motion_is_for_all_that_are_selected(opened):
+    opened.role("outflow", "moving")
+    opened.role("inflow", "moving")
+    opened.click_row("airfoil")
+    opened.click_row("outflow", Qt.KeyboardModifier.ControlModifier)
+    opened.add_motion(Rotate)
+    assert opened.session.case.motions == (Rotate(("airfoil", "outflow"), 0.0),)
+    editor = opened.window.motions.editor
+    assert words(editor.marker) == [
+        "airfoil", "inflow", "outflow", "airfoil + outflow", "all moving",
+    ]  # fmt: skip
+    assert editor.marker.currentText() == "airfoil + outflow"
+    assert editor.about.currentText() == "their centroid"
+    opened.choose(editor.marker, words(editor.marker).index("all moving"))
+    assert opened.session.case.motions[0].marker == ""
+    opened.choose(editor.marker, words(editor.marker).index("inflow"))
+    assert opened.session.case.motions[0].marker == "inflow"
+
+
+def test_or_for_those_without_one_or_for_all(opened):
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.select, ())
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[0].marker == ""
+    opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),))
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[1].marker == "outflow"
+    opened.add_motion(Translate)
+    assert opened.session.case.motions[2].marker == ""
+
+
+def test_their_point_begins_at_their_common_centroid(opened):
+    opened.role("outflow", "moving")
+    opened.window.store.change(changes.set_case, motions=(Rotate("", 1.0),))
+    opened.choose(opened.window.motions.editor.about, "point")
+    mesh = opened.session.mesh
+    nodes = [*mesh.marker("airfoil").nodes, *mesh.marker("outflow").nodes]
+    assert opened.session.case.motions[0].point == pytest.approx(mesh.points[nodes].mean(axis=0))
+
+
+# The menu of the motions ------------------------------------------------------------------
+
+
+def press(driver, keys):
+    """Press keys in the list of motions."""
+    motions = driver.window.motions.list
+    motions.setFocus()
+    QTest.keySequence(motions, keys)
+
+
+def test_motions_are_duplicated_copied_and_pasted(opened):
+    one, other = Translate("airfoil", (0.1, 0.0)), Rotate("airfoil", 1 / 3, (0.0, 0.1))
+    opened.window.store.change(changes.set_case, motions=(one, other))
+    listed = opened.window.motions.list
+    listed.setCurrentRow(0)
+    press(opened, "Ctrl+D")
+    assert opened.session.case.motions == (one, one, other)
+    assert listed.currentRow() == 1
+    listed.setCurrentRow(2)
+    press(opened, "Ctrl+C")
+    assert QApplication.clipboard().text() == "(airfoil, rotate, 0.3333333333333333, (0.0, 0.1))"
+    listed.setCurrentRow(0)
+    press(opened, "Ctrl+V")
+    assert opened.session.case.motions == (one, other, one, other)
+    assert listed.currentRow() == 1
+    press(opened, "Ctrl+Down")
+    assert opened.session.case.motions == (one, one, other, other)
+    press(opened, "Del")
+    assert opened.session.case.motions == (one, one, other)
+    opened.window.store.undo()
+    assert opened.session.case.motions == (one, one, other, other)
+
+
+def test_motions_are_pasted_from_a_case_file(opened):
+    text = "(HUB, translate, 0.1, 0.0) ; \\\n    (*, rotate, 5.0, centroid)"
+    QApplication.clipboard().setText(text)
+    press(opened, "Ctrl+V")
+    assert opened.session.case.motions == (Translate("airfoil", (0.1, 0.0)), Rotate("", 5.0))
+    QApplication.clipboard().setText("half a sentence")
+    press(opened, "Ctrl+V")
+    assert "What was copied is no motion" in opened.window.banner.text.text()
+    assert len(opened.session.case.motions) == 2
+
+
+def test_the_menu_of_the_motions_offers_what_can_be_done(opened):
+    panel = opened.window.motions
+    able = {name: act.isEnabled() for name, act in panel.menu_actions.items()}
+    assert able == dict.fromkeys(able, False) | {"paste": True}
+    opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),) * 2)
+    panel.list.setCurrentRow(0)
+    able = {name for name, act in panel.menu_actions.items() if act.isEnabled()}
+    assert able == {"duplicate", "copy", "paste", "later", "remove"}
+    assert [act.text() for act in panel.list.actions()][:3] == ["Duplicate", "Copy", "Paste"]
