@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from slideviz.case.bounds import unsoundness
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
-from slideviz.errors import DeformError, Note
+from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
@@ -137,7 +138,12 @@ class Climb:
         Parameters
         ----------
         halve : bool
-            Whether a step that folds a cell is made in two, up to ``HALVINGS`` times.
+            Whether a step that folds a cell or is unsound is made in two, up to ``HALVINGS`` times.
+
+        Raises
+        ------
+        DeformError
+            A step cannot be solved, or its result cannot be right.
         """
         plan, mesh = self.plan, self.mesh
         ahead = [(k / count, 0) for k in range(1, count + 1)]
@@ -160,13 +166,16 @@ class Climb:
                 moved = _followed(plan, mesh.halo, points, moved)
             if not np.all(np.isfinite(points)):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
+            unsound = unsoundness(plan, mesh, solution, moved, part)
             if halve:
                 now = quality(mesh.with_points(points), mesh).inverted
-                if now > folded and halvings < HALVINGS:
+                if (now > folded or unsound) and halvings < HALVINGS:
                     ahead[0] = part, halvings + 1
                     ahead.insert(0, ((done + part) / 2, halvings + 1))
                     continue
                 folded = now
+            if unsound:
+                raise UnsoundError(f"step {index + 1}: {unsound}")
             coords, done, index = moved, part, index + 1
             before = solution
             ahead.pop(0)

@@ -23,6 +23,10 @@ class DeformError(SlidevizError):
     """The mesh and the case are sound, but the deformation cannot be computed."""
 
 
+class UnsoundError(DeformError):
+    """A step was computed, but its result cannot be right."""
+
+
 class Cancelled(SlidevizError):
     """The one who pulls the work asked it to stop; nothing is wrong."""
 

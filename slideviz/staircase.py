@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan, make_plan
 from slideviz.climb import Climb, Progress, Step, Trial, renumbered
-from slideviz.errors import DeformError
+from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.problem import Watch
@@ -77,14 +77,25 @@ def _automatic(climb: Climb) -> Iterator[Step]:
 
     Enough: no cell is inverted, and the next number does not raise the minimum quality by more
     than the part ``steps_gain``. If none is free of inverted cells, the one with fewest.
+
+    Raises
+    ------
+    DeformError
+        A step cannot be solved, or with two numbers in a row one gives no sound result.
     """
     tried: list[Trial] = []
     best: tuple[Trial, list[Step]] | None = None
-    worse = 0
+    worse, failure = 0, None
     for count in COUNTS:
         if tried and count <= tried[-1].steps:
             continue  # halving made so many already
-        steps = list(climb.steps(count, halve=True))
+        try:
+            steps = list(climb.steps(count, halve=True))
+        except UnsoundError as problem:
+            worse, failure = worse + 1, problem
+            if worse == 2:
+                break
+            continue
         found = quality(steps[-1].mesh, climb.mesh, climb.case.quality_metric)
         trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
         tried.append(trial)
@@ -98,7 +109,9 @@ def _automatic(climb: Climb) -> Iterator[Step]:
             worse += 1
         if worse == 2:
             break  # more steps do not help: two numbers in a row were no better
-    assert best is not None
+    if best is None:
+        assert failure is not None
+        raise failure
     yield from renumbered(best[1], tuple(tried))
 
 

@@ -25,6 +25,12 @@ ROUNDING = 1e-14
 """Part of the largest coordinate by which projecting a point of a flat boundary may move it."""
 
 
+LOST = 1e-9
+"""Errors at control nodes above this part of the largest displacement are spread around them:
+badly conditioned systems have weights so large that their sum loses digits, which no refinement
+of the weights brings back."""
+
+
 class Fit(Protocol):
     """An interpolant that grows with the constraints it is given."""
 
@@ -147,11 +153,15 @@ def _finish(
     if problem.reduction is not None:
         lag = np.zeros_like(displacement)
         lag[nodes] = total
-    if problem.reduction is not None or len(fit.dropped):
+    left_out = np.isin(problem.same_as[nodes], fit.dropped)
+    lost = 0.0
+    if problem.reduction is None:
+        lost = float(np.linalg.norm(errors[~left_out], axis=1).max(initial=0.0))
+    off = lost > LOST * np.linalg.norm(values, axis=1).max(initial=0.0)
+    if problem.reduction is not None or len(fit.dropped) or off:
         with watch.phase("correct") as tick:
             correct(problem, displacement, nodes, errors, tick)
     displacement[nodes] = values
-    left_out = np.isin(problem.same_as[nodes], fit.dropped)
     return Solution(
         displacement,
         len(fit.found.nodes),
@@ -163,4 +173,5 @@ def _finish(
         lag=lag,
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
+        lost=lost,
     )

@@ -171,6 +171,9 @@ class Solution:
         Largest misfit of this step at the nodes that the pivot guard left out.
     short : str
         Why the selection ended above its tolerance, and a remedy; empty where it did not.
+    lost : float
+        By how much the solution of an exact system misses its own control nodes, before they
+        are set.
     """
 
     displacement: FloatArray
@@ -184,6 +187,7 @@ class Solution:
     lag: FloatArray | None = None
     dropped_error: float = 0.0
     short: str = ""
+    lost: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

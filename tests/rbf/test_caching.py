@@ -98,7 +98,7 @@ def test_all_loops_have_this_cache():
     """None is compiled by Numba's own decorator."""
     root = Path(sys.modules["slideviz"].__file__).parent
     users = [path.name for path in root.rglob("*.py") if "njit" in path.read_text()]
-    own = [path.name for path in root.rglob("*.py") if "rbf.caching import njit" in path.read_text()]
+    own = [p.name for p in root.rglob("*.py") if "rbf.caching import njit" in p.read_text()]
     assert sorted(users) == sorted([*own, "caching.py"])
 
 

@@ -1,0 +1,88 @@
+"""Results that cannot be right: nodes that go far beyond the motion, systems that were not solved.
+
+A smooth function that has to turn from one displacement to another within a thin layer overshoots
+behind it: a wall that moves along itself beside a wall that stays, with cells of 1e-6 between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.case.plan import Plan
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.rbf.problem import Solution
+
+GROWTH = 5.0
+"""How many times as far as the largest prescribed displacement a node may go. Interpolation with
+sliding nodes reaches 2 on the thesis's cases, and 3 with badly conditioned radial functions."""
+
+STEEP = 10.0
+"""A difference of displacements over the distance from which on it explains an overshoot: cells
+between such nodes are sheared by 84 degrees."""
+
+
+HOPELESS = 0.1
+"""A system whose solution misses its own data by this part of the largest was not solved."""
+
+
+def unsoundness(
+    plan: Plan, mesh: Mesh, solution: Solution, moved: FloatArray, part: float
+) -> str | None:
+    """Return a sentence where the result of a step cannot be right: why, and what helps.
+
+    Parameters
+    ----------
+    moved : (n, d)
+        Coordinates in the frame after the step. Angles count with the largest radius, so that a
+        body that turns takes nothing farther than itself.
+    part : float
+        Of the whole displacement, 0 to 1.
+    """
+    largest = part * float(np.linalg.norm(plan.target, axis=1).max(initial=0.0))
+    if solution.lost > HOPELESS * largest:
+        return (
+            f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
+            f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
+            f"{_cause(plan, moved)}"
+        )
+    length = np.linalg.norm(moved - plan.coords, axis=1)
+    node = int(np.argmax(length))
+    if length[node] <= GROWTH * largest:
+        return None
+    where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
+    return (
+        f"node {node} at ({where}) would move by {length[node]:.3g}, {length[node] / largest:.3g} "
+        f"times the largest displacement that is asked for ({largest:.3g}): {_cause(plan, moved)}"
+    )
+
+
+def _cause(plan: Plan, moved: FloatArray) -> str:
+    """Return why the interpolation fails, and what helps."""
+    nodes = np.concatenate([plan.known, plan.classes.sliding])
+    at, shift = plan.coords[nodes], (moved - plan.coords)[nodes]
+    near = cKDTree(at).query(at, k=min(2, len(nodes)))
+    gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
+    apart = np.linalg.norm(shift - shift[others], axis=1)
+    steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
+    k = int(np.argmax(steep))
+    if steep[k] < STEEP:
+        return (
+            f"{plan.basis.kernel} is too smooth for nodes so close to each other; use a less "
+            "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "
+            "DATA_REDUCTION= YES"
+        )
+    pair = sorted((int(nodes[k]), int(nodes[others[k]])))
+    named = " and ".join(f"{node} ({_boundaries(plan, node)})" for node in pair)
+    return (
+        f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
+        "smooth function cannot follow; let the boundary that stays go along (role moving, "
+        "internal or periodic), use RBF_KERNEL= wendland-c0, which does not overshoot, or "
+        "DATA_REDUCTION= YES"
+    )
+
+
+def _boundaries(plan: Plan, node: int) -> str:
+    """Return the names of the boundaries that a node is on."""
+    mine = (plan.boundary.facets == node).any(axis=1)
+    return ", ".join(plan.boundary.names[k] for k in np.unique(plan.boundary.marker[mine]))
