@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Scale, Translate
 from slideviz.case.samples import sample
-from slideviz.rbf.classify import _cluster
+from slideviz.rbf.classify import _Around, _cluster
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.correction import correct
 from slideviz.rbf.evaluate import Basis, no_tick
@@ -156,8 +156,10 @@ def test_fans_are_joined_over_others_between_them_in_any_order():
     angles = np.radians([0.0, 8.0, 16.0, 90.0])
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     roles = np.array(["sliding"] * 4, object)
+    merge, one = np.cos(np.radians(10.0)), np.zeros(4, np.int64)
+    around = _Around(one, one, roles, normals, merge, merge)
     for order in permutations(range(4)):
-        labels = _cluster(normals[list(order)], roles, np.cos(np.radians(10.0)))
+        labels = _cluster(around, np.array(order))
         assert sorted(np.bincount(labels)) == [1, 3]
 
 
