@@ -10,6 +10,7 @@ import numpy as np
 
 from slideviz.mesh.check import check_mesh, first_fault, path_error, printable
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.foreign_links import require_own
 from slideviz.mesh.foreign_markers import Block, find_markers
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 from slideviz.mesh.quiet_meshio import formats_of, load, quiet
@@ -42,9 +43,11 @@ def read_foreign(path: Path, progress: Progress) -> Mesh:
     Raises
     ------
     MeshError
-        meshio cannot read the file, or slideviz cannot use the mesh.
+        meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
     """
     progress(0.0)
+    with quiet(path, "read"):
+        require_own(path)
     data = load(path, formats_of(path))
     progress(0.5)
     with quiet(path, "understood"):

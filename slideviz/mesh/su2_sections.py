@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 from slideviz.errors import MeshError
 from slideviz.mesh.su2_scan import Lines, show
@@ -115,6 +116,14 @@ def _zone_heads(lines: Lines, sections: list[Section]) -> dict[int, Section]:
             f"has {given}; correct NZONE or restore the missing zone",
         )
     return heads
+
+
+def misspelt(sections: list[Section], key: str) -> str:
+    """Return which unknown keyword may be meant as this one, for a message, or nothing."""
+    for section in sections:
+        if section.key not in KNOWN and get_close_matches(section.key, [key], cutoff=0.8):
+            return f"; line {section.line + 1} has {section.key}=, did you mean {key}=?"
+    return ""
 
 
 def count_of(lines: Lines, section: Section) -> int:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.su2_rows import Rows
 from slideviz.mesh.su2_scan import Lines, show
-from slideviz.mesh.su2_sections import KNOWN, Bounds, Section, count_of
+from slideviz.mesh.su2_sections import KNOWN, Bounds, Section, count_of, misspelt
 
 SEND_RECEIVE = "SEND_RECEIVE"
+_NAME_IT = "; name the marker"
+_COUNT_THEM = "; add it with the number of elements"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +117,11 @@ class _Walk:
         found = [section for section in self.sections if section.key == key]
         if not found:
             remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
+            meant = misspelt(self.sections, key)
+            why = "" if meant else "; perhaps the file is cut off, so write it again" + remedy
             raise self.lines.error(
                 self.bounds.end - 1,
-                f"the mesh ends here, but has no line {key}=; perhaps the file is cut off, so "
-                f"write it again{remedy}",
+                f"the mesh ends here, but has no line {key}={meant}{why}",
             )
         if len(found) > 1:
             raise self.lines.error(
@@ -147,7 +150,9 @@ class _Walk:
                     markers.append(MarkerRows(name, section.line, rows))
             elif section.key == "MARKER_ELEMS":
                 raise self.lines.error(
-                    section.line, "MARKER_ELEMS= has no MARKER_TAG= before it; name the marker"
+                    section.line,
+                    "MARKER_ELEMS= has no MARKER_TAG= before it"
+                    + (misspelt(self.sections[at - 2 : at - 1], "MARKER_TAG") or _NAME_IT),
                 )
             elif section.key not in KNOWN:
                 kept.append(section)
@@ -160,8 +165,8 @@ class _Walk:
         if following is None or following.key != "MARKER_ELEMS":
             raise self.lines.error(
                 tag.line,
-                f"marker {show(tag.value)} is not followed by MARKER_ELEMS=; add it with the "
-                "number of elements",
+                f"marker {show(tag.value)} is not followed by MARKER_ELEMS="
+                + (misspelt(self.sections[at : at + 1], "MARKER_ELEMS") or _COUNT_THEM),
             )
         at, domain = at + 1, b""
         if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
