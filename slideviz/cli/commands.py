@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ __all__ = ["info", "keys", "quality", "run", "sample", "shots", "window"]
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given."""
     from slideviz.errors import CaseError
+    from slideviz.view.screen import missing_screen
 
     if arguments.file is not None and not arguments.file.exists():
         from slideviz.cli.parser import COMMANDS
@@ -27,18 +27,12 @@ def window(arguments: argparse.Namespace) -> int:
             f"{arguments.file}: there is no such file, and no such command "
             f"(commands: {', '.join(COMMANDS)})"
         )
-    if sys.platform.startswith("linux") and not _has_screen():
-        raise CaseError(
-            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set); `slideviz run CASE` "
-            "works without one"
-        )
+    why = missing_screen() if sys.platform.startswith("linux") else ""
+    if why:
+        raise CaseError(f"there is no screen ({why}); `slideviz run CASE` works without one")
     from slideviz.gui.app import launch
 
     return launch(arguments.file, run=arguments.run)
-
-
-def _has_screen() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def info(arguments: argparse.Namespace) -> int:

@@ -17,6 +17,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.view.drawing.look import Look
 from slideviz.view.legend import set_letters
+from slideviz.view.screen import x_answers
 
 SMALLEST, LARGEST = 64, 8192
 """Pixels that a picture may be wide or high; graphics drivers draw no larger ones."""
@@ -42,7 +43,7 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
     import pyvista as pv
 
     check_size(size)
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+    if sys.platform.startswith("linux") and not x_answers():
         # VTK would first try X, and complain, before it turns to EGL.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
