@@ -180,14 +180,14 @@ def _systems(plan: Plan, case: Case) -> list[int]:
 
 def _require_free(needed: float, what: str, remedy: str) -> None:
     """Raise DeformError when so many bytes are not free."""
-    free = _free_memory()
+    free = free_memory()
     if needed > free:
         raise DeformError(
             f"{what} {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free; {remedy}"
         )
 
 
-def _free_memory() -> float:
+def free_memory() -> float:
     """Return the bytes a process may still take; infinite where the system does not say."""
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123

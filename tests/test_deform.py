@@ -182,7 +182,7 @@ def test_nothing_known_is_refused():
 @pytest.mark.parametrize(("method", "unknowns"), [("none", 32), ("ps", 32), ("ds", 44)])
 def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unknowns, monkeypatch):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "_free_memory", lambda: 1000.0)
+    monkeypatch.setattr(staircase, "free_memory", lambda: 1000.0)
     monkeypatch.setattr(solve, "extend", lambda *_: pytest.fail("the system was built"))
     text = rf"{unknowns} unknowns need 0\.0 GB of memory, 0\.0 GB are free; give large bound"
     with pytest.raises(DeformError, match=text):
@@ -191,7 +191,7 @@ def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unk
 
 def test_direct_sliding_along_axes_needs_memory_for_one_axis_at_a_time(monkeypatch):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "_free_memory", lambda: 15_000.0)  # 44 unknowns: 40,000
+    monkeypatch.setattr(staircase, "free_memory", lambda: 15_000.0)  # 44 unknowns: 40,000
     case = square_case(mesh, sliding="ds")
     last(case, mesh)
     turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
@@ -199,8 +199,8 @@ def test_direct_sliding_along_axes_needs_memory_for_one_axis_at_a_time(monkeypat
         last(case, mesh.with_points(mesh.points @ turn))
 
 
-def test_free_memory_is_a_number_of_bytes():
-    assert staircase._free_memory() > 1e7
+def testfree_memory_is_a_number_of_bytes():
+    assert staircase.free_memory() > 1e7
 
 
 def test_a_marker_element_that_is_no_side_is_told():

@@ -49,7 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     before = quality(mesh, metric=case.quality_metric)
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
-    write(output, last.mesh, overwrite=arguments.force, cell_data=cell_data(output, found))
+    data = cell_data(output, found)
+    write(output, last.mesh, overwrite=arguments.force, cell_data=data, base=mesh)
     if qualities:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()

@@ -198,5 +198,6 @@ class Docks(QObject):
         dock.show()
         dock.raise_()
         # A field in it that is being typed in must not be left.
-        if not dock.isAncestorOf(self.window.focusWidget()):
+        at = self.window.focusWidget()
+        if at is None or not dock.isAncestorOf(at):
             dock.widget().setFocus()

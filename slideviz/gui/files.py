@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -213,7 +214,7 @@ class Files(QObject):
         self.window.start_job(
             f"Saving {path.name}",
             lambda saved: self._mesh_saved(saved, last),
-            jobs.save_mesh,
+            partial(jobs.save_mesh, base=session.mesh),
             path,
             frame,
             overwrite,

@@ -17,7 +17,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui.widgets.bar import QuietBar
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.advice import ended, help_for, inverted_words
+from slideviz.view.advice import ended, exact_cost, help_for, inverted_words
 from slideviz.view.drawing.look import Look
 from slideviz.view.jobs import Doing
 from slideviz.view.session import changes
@@ -48,6 +48,7 @@ class RunPanel(QWidget):
         self.store = store
         self._busy = ""
         self._missing = ()
+        self._cost = ""
         layout = QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 6, 6)
         layout.setSpacing(5)
@@ -90,6 +91,7 @@ class RunPanel(QWidget):
         if key != getattr(self, "_key", None):
             self._key = key
             self._missing = is_missing(session)
+            self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)
         self.bar.setVisible(bool(self._busy))
@@ -118,14 +120,15 @@ class RunPanel(QWidget):
         """Tell how the run that is shown ended, or that the panels say something else."""
         run, bad = session.run_shown, ""
         if run is None:
-            self.text.setText("Ready.")
+            self.text.setText(f"Ready. {self._cost}".rstrip())
         elif not session.outdated:
             bad = inverted_words(run)
             text = html.escape(ended(run))
             self.text.setText(f"<b>{text}</b>" if bad else text)
             self.text.setToolTip(wrapped(help_for(run.case)) if bad else "")
         elif run is session.runs[-1]:
-            self.text.setText("Settings changed since the last run.")
+            text = "Settings changed since the last run."
+            self.text.setText(f"{text} {self._cost}".rstrip())
         else:
             link = f"<a href='{SETTINGS}'>Use its settings</a>"
             self.text.setText(f"The panels differ from run {run.number}. {link}")

@@ -9,6 +9,7 @@ from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
+from slideviz.errors import SlidevizError
 from slideviz.gui.dialogs import Banner
 from slideviz.gui.worker import JobRunner
 from slideviz.view import jobs
@@ -17,6 +18,7 @@ from slideviz.view.jobs import Doing
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame, Run
 from slideviz.view.session.store import Store
+from slideviz.view.window_words import in_window_words
 
 log = logging.getLogger("slideviz")
 
@@ -127,6 +129,9 @@ class Running(QObject):
         return warnings
 
     def _failed(self, error: Exception) -> None:
+        if self._deforms and isinstance(error, SlidevizError):
+            # What is said of the case, not of a file with one.
+            error = type(error)(in_window_words(str(error)))
         self.banner.tell_error(error)
         log.error("%s", error)
         self.said.emit("")

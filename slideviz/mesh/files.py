@@ -113,6 +113,7 @@ def write(
     mesh: Mesh,
     overwrite: bool = False,
     cell_data: Mapping[str, ArrayLike] | None = None,
+    base: Mesh | None = None,
     going_on: Callable[[], object] | None = None,
 ) -> None:
     """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
@@ -127,6 +128,8 @@ def write(
         Whether ``path`` may be the file that the mesh was read from.
     cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
         Values on the cells by name; not for SU2, which has no place for them.
+    base : Mesh, optional
+        The undeformed mesh: VTU files get the displacement of every point, as vectors.
     going_on : callable, optional
         Called between the blocks of an SU2 file; what it raises stops the writing, and what was
         at ``path`` stays.
@@ -148,7 +151,8 @@ def write(
     if path.suffix.lower() != ".su2":
         from slideviz.mesh.foreign_write import write_foreign
 
-        write_foreign(path, mesh, values, replaces)
+        moved = {} if base is None else {"displacement": mesh.points - base.points}
+        write_foreign(path, mesh, values, moved, replaces)
         return
     if values:
         raise path_error(

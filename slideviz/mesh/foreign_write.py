@@ -40,13 +40,17 @@ _EXACT = 1e-12
 
 
 def write_foreign(
-    path: Path, mesh: Mesh, cell_data: Mapping[str, NDArray], replaces: Path | None = None
+    path: Path,
+    mesh: Mesh,
+    cell_data: Mapping[str, NDArray],
+    point_data: Mapping[str, NDArray] | None = None,
+    replaces: Path | None = None,
 ) -> None:
     """Write a mesh in the format that the ending names.
 
-    Names of boundaries are kept in VTU, Gmsh, MED and Abaqus files; other formats get numbers at
-    most. What meshio wrote is read again and compared, for it leaves out what a format cannot
-    hold.
+    Only VTU files get the point data. Names of boundaries are kept in VTU, Gmsh, MED and Abaqus
+    files; other formats get numbers at most. What meshio wrote is read again and compared, for it
+    leaves out what a format cannot hold.
 
     Raises
     ------
@@ -56,7 +60,7 @@ def write_foreign(
     check_mesh(mesh)
     if path.suffix.lower() == ".vtu":
         with atomic_write(path, replaces=replaces) as file:
-            for block in vtu_blocks(mesh, cell_data):
+            for block in vtu_blocks(mesh, cell_data, point_data):
                 file.write(block)
         return
     name = formats_of(path)[0]

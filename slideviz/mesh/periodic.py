@@ -240,8 +240,41 @@ def pair_up(
     reasons: list[MeshError] = []
     found = pairs_of(list(names), None)
     if found is None:
-        raise next((r for r in reasons if "one period" in str(r)), reasons[0])
+        raise next((r for r in reasons if "one period" in str(r)), None) or _left_over(
+            mesh, names, lambda one, two: match(mesh, one, two, kind, axis, origin), reasons[0]
+        )
     return found
+
+
+def _left_over(
+    mesh: Mesh, names: Sequence[str], matched: Callable[[str, str], Pair], first: MeshError
+) -> MeshError:
+    """Return the error for markers that have no partner; it names the pairs that match, too."""
+    good: list[Pair] = []
+    alone: list[str] = []
+    rest = list(names)
+    while rest:
+        one = rest.pop(0)
+        for other in rest:
+            try:
+                good.append(matched(one, other))
+            except MeshError:
+                continue
+            rest.remove(other)
+            break
+        else:
+            alone.append(one)
+    if not good or len(alone) < 2:
+        return first
+    why = "they are no images of each other; choose other markers"
+    if len(alone) == 2:
+        try:
+            matched(alone[0], alone[1])
+        except MeshError as problem:
+            why = str(problem).partition(" do not match: ")[2]
+    pairs = ", ".join(f"{p.first!r} and {p.second!r} match ({p.describe()})" for p in good)
+    left = " and ".join(repr(name) for name in alone)
+    return MeshError(f"{mesh.name}: the periodic markers {pairs}, but {left} do not: {why}")
 
 
 def _agree(one: Pair, other: Pair) -> bool:

@@ -21,7 +21,9 @@ _BLOCK_BYTES = 3 << 18
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
-def vtu_blocks(mesh: Mesh, cell_data: Mapping[str, NDArray]) -> Iterator[bytes]:
+def vtu_blocks(
+    mesh: Mesh, cell_data: Mapping[str, NDArray], point_data: Mapping[str, NDArray] | None = None
+) -> Iterator[bytes]:
     """Yield a VTU file, block by block.
 
     The cells come first, in their order, then the elements of the markers. The cell data
@@ -32,6 +34,8 @@ def vtu_blocks(mesh: Mesh, cell_data: Mapping[str, NDArray]) -> Iterator[bytes]:
     ----------
     cell_data : mapping of str to (n_cells,) or (n_cells, k)
         Values by name; they are NaN on the elements of the markers.
+    point_data : mapping of str to (n,) or (n, d), optional
+        Values on the points; vectors get a third component, as ParaView's arrows want.
     """
     groups = [mesh.cells, *(marker.cells for marker in mesh.markers)]
     lengths = [len(cells) for cells in groups]
@@ -66,7 +70,11 @@ def vtu_blocks(mesh: Mesh, cell_data: Mapping[str, NDArray]) -> Iterator[bytes]:
         padded = np.full((len(types), *values.shape[1:]), np.nan)
         padded[: len(values)] = values
         yield from _array(name, padded)
-    yield b"</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+    yield b"</CellData>\n<PointData>\n"
+    for name, values in (point_data or {}).items():
+        vectors = values.ndim == 2 and values.shape[1] == 2
+        yield from _array(name, np.pad(values, ((0, 0), (0, 1))) if vectors else values)
+    yield b"</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
 
 
 def _in_vtk_order(nodes: IntArray, offsets: IntArray, types: NDArray[np.uint8]) -> IntArray:

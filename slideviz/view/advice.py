@@ -2,9 +2,43 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from slideviz.case.model import Case
 from slideviz.errors import Note
+from slideviz.mesh.model import Mesh
 from slideviz.view.session.state import Run
+from slideviz.view.window_words import in_window_words
+
+LARGE = 1e9
+"""Bytes from which on it is told beforehand what a run takes."""
+RATE = 2e10
+"""Operations a second of a machine with few cores, when it factors a large matrix."""
+
+
+def exact_cost(case: Case, mesh: Mesh) -> str:
+    """Return in a sentence what a large run without data reduction takes; else an empty text.
+
+    All boundary nodes are control nodes then: memory grows with the square of their number, and
+    time with the cube.
+    """
+    from slideviz.staircase import free_memory
+
+    if case.method != "rbf" or case.reduction is not None:
+        return ""
+    counted = [m.nodes for m in mesh.markers if case.roles.get(m.name, "fixed") != "internal"]
+    count = len(np.unique(np.concatenate([*counted, np.empty(0, np.int64)])))
+    size = 8.0 * 2.6 * count**2
+    if size < LARGE:
+        return ""
+    minutes = max(case.steps, 1) * 2.0 / 3.0 * count**3 / RATE / 60.0
+    time = f"{minutes:.0f} minutes" if minutes >= 1.5 else "a minute"
+    free = free_memory()
+    left = f" ({free / 1e9:.0f} GB are free)" if np.isfinite(free) else ""
+    return (
+        f"{count:,} control nodes, without data reduction: about {size / 1e9:.0f} GB of "
+        f"memory{left} and {time}, more or less."
+    )
 
 
 def ended(run: Run) -> str:
@@ -40,10 +74,12 @@ def help_for(case: Case) -> str:
 def warnings_of(run: Run) -> tuple[str, ...]:
     """Return what a run warns of, without what is harmless."""
     step = run.last.step if run.last is not None else None
-    return () if step is None else tuple(t for t in step.warnings if not isinstance(t, Note))
+    found = () if step is None else step.warnings
+    return tuple(in_window_words(text) for text in found if not isinstance(text, Note))
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
     """Return what a run remarks that is harmless."""
     step = run.last.step if run.last is not None else None
-    return () if step is None else tuple(t for t in step.warnings if isinstance(t, Note))
+    found = () if step is None else step.warnings
+    return tuple(in_window_words(text) for text in found if isinstance(text, Note))

@@ -25,7 +25,7 @@ class MeshFormat:
 
 MESH_FORMATS: dict[str, MeshFormat] = {
     ".su2": MeshFormat("SU2 (keeps all markers and sections)", False, "names"),
-    ".vtu": MeshFormat("VTU for ParaView, with quality", True, "names"),
+    ".vtu": MeshFormat("VTU for ParaView, with quality and displacement", True, "names"),
     ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
     ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),
     ".med": MeshFormat("MED for Salome, with quality", True, "names"),

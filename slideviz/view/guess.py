@@ -12,9 +12,10 @@ from slideviz.view.session.state import Guess
 
 NAMES: tuple[tuple[Role, str], ...] = (
     ("periodic", r"per|period|periodic|cyclic|pitchwise"),
-    ("moving", r"airfoil|aerofoil|foil|profile|blade|vane|rotor|stator|wing|naca\d*|cylinder"),
-    ("sliding", r"hub|shroud|casing|endwall|sym|symm|symmetry"),
-    ("sliding", r"inflow|inlet|outflow|outlet|exit|in|out"),
+    ("moving", r"airfoil|aerofoil|foil|profile|blade|vane|wing|naca\d*|cylinder"),
+    ("sliding", r"hub|shroud|casing|endwall|sidewall|sym|symm|symmetry"),
+    ("sliding", r"inflow|inlet|outflow|outlet|exit|in|out|interface"),
+    ("moving", r"rotor|stator"),
     ("fixed", r"walls?|far|farfield|freestream|upper|lower|left|right|top|bottom|front|back"),
 )
 """A role and the words that hint at it, the first row that fits wins."""
@@ -61,6 +62,14 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
         case = case.change(sliding="ps", steps=5)
     for pair in pairs:
         if roles[pair.first] == roles[pair.second] == "periodic":
-            mode = "moving" if case.sliding == "ps" else "fixed"
-            return case.change(periodic=mode, axis=pair.axis, origin=pair.origin)
+            return with_periodicity(case, pair)
     return case
+
+
+def with_periodicity(case: Case, pair: Pair | None) -> Case:
+    """Return the case with what repeats deformed alike, about the axis of a pair if there is one.
+
+    The corners of the domain slide along where anything slides.
+    """
+    case = case.change(periodic="fixed" if case.sliding == "none" else "moving")
+    return case if pair is None else case.change(axis=pair.axis, origin=pair.origin)

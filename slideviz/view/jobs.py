@@ -161,8 +161,17 @@ def overall(now: object) -> float:
     return float((step - 1 + inside) / total)
 
 
-def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, stopped: Stopped) -> Path:
+def save_mesh(
+    path: Path,
+    frame: Frame,
+    overwrite: bool,
+    report: Report,
+    stopped: Stopped,
+    base: Mesh | None = None,
+) -> Path:
     """Write the mesh of a frame, with its quality where the format can hold it.
+
+    Of the undeformed mesh ``base`` the displacement is written, too.
 
     Raises
     ------
@@ -176,7 +185,7 @@ def save_mesh(path: Path, frame: Frame, overwrite: bool, report: Report, stopped
     if holds_quality(path):
         measured = frame.quality
         data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
-    write(path, frame.mesh, overwrite, data, lambda: require_going(stopped))
+    write(path, frame.mesh, overwrite, data, base, lambda: require_going(stopped))
     return path
 
 

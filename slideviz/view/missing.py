@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Translate, moves
 from slideviz.view.session.state import Place, Session
+from slideviz.view.window_words import in_window_words
 
 
 @dataclass(frozen=True)
@@ -73,4 +74,5 @@ def _problems(session: Session) -> list[str]:
     from slideviz.case.motion import check_case
 
     assert session.mesh is not None
-    return [str(problem) for problem in check_case(session.case, session.mesh)]
+    said = (in_window_words(text) for text in check_case(session.case, session.mesh))
+    return [text[:1].upper() + text[1:] for text in said]

@@ -54,7 +54,7 @@ def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_
     monkeypatch,
 ):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "_free_memory", lambda: 1000.0)
+    monkeypatch.setattr(staircase, "free_memory", lambda: 1000.0)
     case = Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),), method="elastic")
     with pytest.raises(DeformError, match=r"elasticity of 48 nodes needs .* METHOD= idw"):
         list(sv.deform(case, mesh))

@@ -26,6 +26,7 @@ from slideviz.gui.widgets.fields import (
     positive,
 )
 from slideviz.gui.widgets.tips import wrapped
+from slideviz.view.window_words import METHOD_WORDS, PERIODIC_WORDS, SLIDING_WORDS, TYPE_WORDS
 
 MAX_STEPS = 9999
 
@@ -103,27 +104,12 @@ class MethodForm(QWidget):
         return layout
 
     def _make_fields(self) -> None:
-        self.method = Choice(
-            {
-                "rbf": "RBF interpolation",
-                "idw": "Inverse distance weighting",
-                "elastic": "Linear elasticity",
-            }
-        )
-        self.sliding = Choice({"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"})
+        self.method = Choice(METHOD_WORDS)
+        self.sliding = Choice(SLIDING_WORDS)
         self.sliding.explain(SLIDING_TIPS)
-        self.periodic = Choice(
-            {
-                "none": "none",
-                "periodic": "periodic distance",
-                "fixed": "periodic, fixed vertices",
-                "moving": "periodic, moving vertices",
-            }
-        )
+        self.periodic = Choice(PERIODIC_WORDS)
         self.periodic.explain(PERIODIC_TIPS)
-        self.periodic_type = Choice(
-            {"auto": "automatic", "translational": "translational", "rotational": "rotational"}
-        )
+        self.periodic_type = Choice(TYPE_WORDS)
         self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
         self.origin = VectorField((0.0, 0.0, 0.0))
         self.found = QLabel()

@@ -225,7 +225,7 @@ class WorstPanel(QWidget):
 def info_text(session: Session, cell: int, every: bool = False) -> str:
     """Return what is told of a cell of the step that is shown, as rich text of few lines.
 
-    ``every`` tells every corner and coordinate.
+    ``every`` tells every corner.
     """
     info = cell_info(session.frame, cell)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
@@ -237,7 +237,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
         f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
         _place_text(info.position, around),
     ]
-    if every and around is not None:
+    if around is not None:
         lines.append(_place_text(info.position, None))
     near = nearest_boundary(session.frame.mesh, info.position)
     if near is not None:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -22,6 +21,7 @@ from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
 from slideviz.mesh.atomic import atomic_write
 from slideviz.view.drawing.look import LIGHT, Look
 from slideviz.view.plots.draw import PRINT, Style
+from slideviz.view.plots.written import figure_bytes
 
 REST_MS = 200
 """Between two drawings while steps are played, at least."""
@@ -243,10 +243,9 @@ def write_plot(path: Path, draw_on: Draw) -> None:
         raise SlidevizError(f"{path}: a plot is a .png, .svg or .pdf file; choose one of these")
     figure = Figure(FIGURE_INCHES, layout="constrained")
     draw_on(figure, replace(PRINT, size=8.5))
-    data = io.BytesIO()
-    figure.savefig(data, format=kind, dpi=300)
+    data = figure_bytes(figure, kind)
     with atomic_write(path, SlidevizError) as file:
-        file.write(data.getvalue())
+        file.write(data)
 
 
 def ask_and_write(

@@ -30,6 +30,13 @@ def found_text(session: Session) -> str:
         for pair in session.pairs
         if pair.first in names and pair.second in names
     ]
-    if not lines and len(names) >= 2 and session.mesh is not None:
-        lines.append("No match found yet between the periodic boundaries; the run will try.")
+    paired = {
+        end
+        for p in session.pairs
+        if {p.first, p.second} <= set(names)
+        for end in (p.first, p.second)
+    }
+    alone = [name for name in names if name not in paired]
+    if alone and len(names) >= 2 and session.mesh is not None:
+        lines.append(f"No match found yet for {' and '.join(alone)}; the run will try.")
     return "\n".join(lines)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from slideviz.view.pictures.mark_words import draw_mark
 from slideviz.view.pictures.offscreen import CAPTION_AT, TITLE
 from slideviz.view.pictures.studio import Studio, ordered
 from slideviz.view.plots.bar import number_bar
+from slideviz.view.plots.written import figure_bytes
 from slideviz.view.session.state import COLOUR_BY, Session
 
 SUFFIXES = (".svg", ".pdf")
@@ -52,18 +52,12 @@ def write_vector(studio: Studio, figure: Figure, file: Path) -> None:
     SlidevizError
         The mesh is 3D or has too many cells, or the file cannot be written.
     """
-    from matplotlib import rc_context
-
     require_vector(studio.session, file)
     drawn = draw_vector(studio, figure)
-    kind, data = file.suffix.lower()[1:], BytesIO()
-    # Without the date, and with names that are not random, the same view gives the same file.
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
-    with rc_context({"svg.hashsalt": "slideviz"}):
-        clear = figure.background == "transparent"
-        drawn.savefig(data, format=kind, metadata=metadata, transparent=clear)
+    clear = figure.background == "transparent"
+    data = figure_bytes(drawn, file.suffix.lower()[1:], drawn.dpi, clear)
     with atomic_write(file) as out:
-        out.write(data.getvalue())
+        out.write(data)
 
 
 def require_vector(session: Session, file: Path) -> None:

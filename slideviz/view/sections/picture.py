@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.polygons import Polygons, joined
 from slideviz.view.legend import UNITS
 from slideviz.view.plots.style import PRINT
+from slideviz.view.plots.written import figure_bytes
 from slideviz.view.sections.around import draw_around, window
 from slideviz.view.sections.curve import Colours, CurveRow, curve_of, draw_curves, position_label
 from slideviz.view.sections.dress import add_bar, dress_axes
@@ -127,16 +127,10 @@ def write_figure(figure: Any, dpi: float, target: Path) -> None:
     CaseError
         The file cannot be written.
     """
-    from matplotlib import rc_context
-
-    data = BytesIO()
     kind = target.suffix.lower()[1:]
-    # Without the date, and with names that are not random, the same section gives the same file.
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with rc_context({"svg.hashsalt": "slideviz"}):
-        figure.savefig(data, format=kind, dpi=dpi if kind == "png" else 300, metadata=metadata)
+    data = figure_bytes(figure, kind, dpi if kind == "png" else 300)
     with atomic_write(target, CaseError) as out:
-        out.write(data.getvalue())
+        out.write(data)
 
 
 def draw_section(

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from slideviz.case.model import Case, Motion, Role, named
+from slideviz.view.guess import with_periodicity
 from slideviz.view.session.rows import replaced, without
 from slideviz.view.session.state import Place, Session
 
@@ -21,6 +22,9 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     case = session.case.change(roles=roles, motions=motions)
     if "periodic" not in roles.values():
         case = case.change(periodic="none")
+    elif case.periodic == "none" and "periodic" not in session.case.roles.values():
+        mine = (p for p in session.pairs if {p.first, p.second} & set(changed))
+        case = with_periodicity(case, next(mine, None))
     return replace(session, case=case, guesses=guesses)
 
 

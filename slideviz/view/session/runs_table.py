@@ -83,12 +83,12 @@ COLUMNS: tuple[Column, ...] = (
 def best(runs: Sequence[Run]) -> frozenset[int]:
     """Return the numbers of the runs of highest minimum quality among those of the same motion.
 
-    Runs of different motions cannot be compared; of runs whose minima read alike, all are best,
-    or none where all are.
+    Runs of different motions cannot be compared, nor those that did not come to their end; of runs
+    whose minima read alike, all are best, or none where all are.
     """
     alike: dict[object, dict[int, float]] = {}
     for run in runs:
-        if run.last is not None:
+        if run.last is not None and run.end == "done":
             group = alike.setdefault(deformation(run.case), {})
             group[run.number] = round(run.last.quality.min, DIGITS)
     found: set[int] = set()
