@@ -13,13 +13,16 @@ from slideviz.case.plan import Plan
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Solution
 
-GROWTH = 5.0
-"""How many times as far as the largest prescribed displacement a node may go. Interpolation with
-sliding nodes reaches 2 on the thesis's cases, and 3 with badly conditioned radial functions."""
+GROWTH = 10.0
+"""How many times as far as the largest prescribed displacement no node may go. Interpolation with
+sliding nodes reaches 2 on the thesis's cases, and 8 around a thin sharp profile that slides."""
 
-STEEP = 10.0
-"""A difference of displacements over the distance from which on it explains an overshoot: cells
-between such nodes are sheared by 84 degrees."""
+REMARKABLE = 5.0
+"""From where on it is told."""
+
+STEEP = 100.0
+"""A slope between neighbours explains an overshoot when it is so many times that of the largest
+displacement over the whole mesh."""
 
 
 HOPELESS = 0.1
@@ -44,20 +47,37 @@ def unsoundness(
         return (
             f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
             f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
-            f"{_cause(plan, moved)}"
+            f"{_cause(plan, mesh, moved)}"
         )
+    ratio, sentence = _farthest(plan, mesh, moved, largest)
+    return f"{sentence}: {_cause(plan, mesh, moved)}" if ratio > GROWTH else None
+
+
+def overshoot(plan: Plan, mesh: Mesh, moved: FloatArray, part: float) -> str | None:
+    """Return a warning where a node goes far beyond the motion; None where none does.
+
+    Parameters as of `unsoundness`, whose limit is twice as high.
+    """
+    largest = part * float(np.linalg.norm(plan.target, axis=1).max(initial=0.0))
+    ratio, sentence = _farthest(plan, mesh, moved, largest)
+    return f"{sentence}; look at the result with care" if ratio > REMARKABLE else None
+
+
+def _farthest(plan: Plan, mesh: Mesh, moved: FloatArray, largest: float) -> tuple[float, str]:
+    """Return how many times as far as asked the node goes that goes farthest, and a sentence."""
     length = np.linalg.norm(moved - plan.coords, axis=1)
     node = int(np.argmax(length))
-    if length[node] <= GROWTH * largest:
-        return None
+    if length[node] <= largest:
+        return 1.0, ""
+    ratio = float(length[node] / largest) if largest > 0.0 else np.inf
     where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
-    return (
-        f"node {node} at ({where}) would move by {length[node]:.3g}, {length[node] / largest:.3g} "
-        f"times the largest displacement that is asked for ({largest:.3g}): {_cause(plan, moved)}"
+    return ratio, (
+        f"node {node} at ({where}) goes {length[node]:.3g} far, {ratio:.3g} times the largest "
+        f"displacement that is asked for ({largest:.3g})"
     )
 
 
-def _cause(plan: Plan, moved: FloatArray) -> str:
+def _cause(plan: Plan, mesh: Mesh, moved: FloatArray) -> str:
     """Return why the interpolation fails, and what helps."""
     nodes = np.concatenate([plan.known, plan.classes.sliding])
     at, shift = plan.coords[nodes], (moved - plan.coords)[nodes]
@@ -66,7 +86,8 @@ def _cause(plan: Plan, moved: FloatArray) -> str:
     apart = np.linalg.norm(shift - shift[others], axis=1)
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))
-    if steep[k] < STEEP:
+    usual = float(np.linalg.norm(plan.target, axis=1).max()) / mesh.extent
+    if steep[k] < STEEP * usual:
         return (
             f"{plan.basis.kernel} is too smooth for nodes so close to each other; use a less "
             "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "

@@ -24,7 +24,7 @@ from slideviz.errors import CaseError, DeformError, MeshError
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.periodic import TOLERANCE, Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
@@ -35,7 +35,9 @@ from slideviz.rbf.images import COINCIDENT, find_images, require_free, spread
 from slideviz.rbf.methods import METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
-from slideviz.rbf.rows import AGREE
+
+ROUNDING = 1e-13
+"""What displacements in a frame may be off, as a part of the largest coordinate."""
 
 LOOSE = 0.1
 """A tolerance above this part of the largest displacement leaves much to the correction."""
@@ -303,7 +305,9 @@ def _prescribed(
         )
     values = np.zeros(mesh.points.shape)
     values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    allowed = AGREE * case.influence_factor * mesh.extent
+    # Images match to a part of the mesh, and so what a motion makes of them to that part of it.
+    largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
+    allowed = TOLERANCE * largest + ROUNDING * float(np.abs(mesh.points).max())
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):
