@@ -154,7 +154,7 @@ _ROWS = (
     setting(
         "INFLUENCE_FACTOR",
         METHOD,
-        real(0.0),
+        real(1e-6, 1e6),
         "influence_factor",
         "Support radius of the radial function over the largest extent of the mesh.",
     ),
@@ -172,7 +172,7 @@ _ROWS = (
     setting(
         "IDW_POWER",
         METHOD,
-        real(0.0),
+        real(0.0, 20.0, closed=True),
         "idw_power",
         "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
         "given.",
@@ -180,7 +180,7 @@ _ROWS = (
     setting(
         "IDW_FIXED_WEIGHT",
         METHOD,
-        real(0.0),
+        real(1e-12, 1e12),
         "idw_fixed_weight",
         "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
     ),

@@ -187,7 +187,7 @@ class GreedyFit:
     def _fraction(self, errors: FloatArray) -> float:
         """Return how far the error has fallen from its first value, on a logarithmic scale."""
         first, now = self.history[0].error, float(errors.max(initial=0.0))
-        span = np.log(max(first, 1e-300) / self._settings.tolerance)
+        span = np.log(max(first, 1e-300) / max(self._settings.tolerance, 1e-300))
         return float(np.clip(np.log(max(first, 1e-300) / max(now, 1e-300)) / max(span, 1e-9), 0, 1))
 
     def _record(self, errors: FloatArray) -> None:

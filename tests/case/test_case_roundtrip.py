@@ -102,7 +102,7 @@ def cases(draw: st.DrawFn, folder: Path) -> Case:
         feature_angle_deg=draw(st.floats(0, 180, exclude_min=True)),
         curved=draw(st.booleans()),
         steps=draw(whole),
-        influence_factor=draw(positive),
+        influence_factor=draw(st.floats(1e-6, 1e6, exclude_min=True, exclude_max=True)),
         reduction=draw(st.none() | reductions),
         quality_metric=draw(st.sampled_from(["knupp", "rbf-slide"])),
         generate_quality=draw(st.booleans()),

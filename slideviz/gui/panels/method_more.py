@@ -9,7 +9,9 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QFormLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from slideviz.case.kernels import kernel_titles
+from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Reduction
+from slideviz.errors import CaseError
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, angle_limit, positive
 from slideviz.gui.widgets.tips import wrapped
@@ -81,7 +83,7 @@ class MoreSettings(QWidget):
 
     def _make_fields(self) -> None:
         self.kernel = Choice(dict(kernel_titles()))
-        self.influence_factor = NumberField(2.5, positive)
+        self.influence_factor = NumberField(2.5, _radius_problem)
         self.feature_angle_deg = NumberField(40.0, angle_limit)
         self.quality_metric = Choice({"knupp": "Knupp", "rbf-slide": "as RBF-SliDe"})
         self.selection = Choice(
@@ -180,3 +182,13 @@ def set_tip(field: QWidget, text: str) -> None:
         field.set_tip(text)
     if not isinstance(field, NumberField):  # that one may have more urgent things to say
         field.setToolTip(wrapped(text))
+
+
+
+def _radius_problem(value: float) -> str:
+    """Return why a number is no support radius, as a case file with it would be refused."""
+    try:
+        KEYS["INFLUENCE_FACTOR"].kind.read(repr(value))
+    except CaseError as problem:
+        return positive(value) or str(problem)
+    return ""

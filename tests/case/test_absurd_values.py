@@ -1,0 +1,86 @@
+"""Absurd but finite numbers in a case are refused in a sentence, or do what they say."""
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.key import METHOD, REDUCTION
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case, Reduction, Translate
+from slideviz.errors import CaseError
+from slideviz.rbf.kernels import KERNELS
+from tests import builders
+
+TEXTS = ("1e300", "1.7e308", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
+FIELDS = [key for key in KEYS.values() if key.group in (METHOD, REDUCTION)]
+REALS = [key.name for key in FIELDS if key.kind.allowed.startswith("a number")]
+REFUSED = {
+    "small": ("INFLUENCE_FACTOR", "IDW_FIXED_WEIGHT"),
+    "large": (
+        *("INFLUENCE_FACTOR", "IDW_FIXED_WEIGHT", "IDW_POWER"),
+        *("FEATURE_ANGLE", "STEPS_GAIN", "LVL_TOL_CRIT"),
+    ),
+}
+ENDS = [
+    *[("INFLUENCE_FACTOR", text, kernel) for text in ("1.1e-6", "9e5") for kernel in KERNELS],
+    *[("IDW_POWER", text, "") for text in ("20", "1e-320")],
+    *[("IDW_FIXED_WEIGHT", text, "") for text in ("1.1e-12", "9e11")],
+]
+
+
+def case_with(name, text, sliding, kernel="wendland-c2"):
+    key = KEYS[name]
+    mesh = builders.square(6) if sliding != "ps" else builders.sector(5)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
+    reduction = Reduction(tolerance=1e-4, multilevel=sliding == "ps", criterion="tol")
+    case = Case(
+        roles=roles,
+        motions=(Translate("BLOCK", (0.02, 0.01)),),
+        sliding=sliding,
+        method="idw" if name.startswith("IDW") else "rbf",
+        kernel=kernel,
+        reduction=reduction if key.group == REDUCTION or sliding == "none" else None,
+        steps=2 if name != "STEPS_GAIN" else 0,
+    )
+    return key.put(case, key.kind.read(text)), mesh
+
+
+def test_the_real_keys_are_found():
+    assert {"INFLUENCE_FACTOR", "GAMMA", "FEATURE_ANGLE", "LVL_TOL_CRIT", "IDW_POWER"} < {*REALS}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
+@pytest.mark.parametrize("text", TEXTS)
+@pytest.mark.parametrize("name", REALS)
+def test_an_absurd_number_is_refused_or_works(name, text, sliding):
+    if name in REFUSED["small" if float(text) < 1 else "large"]:
+        with pytest.raises(CaseError, match=f"{text} is out of range; needed is a number above"):
+            KEYS[name].kind.read(text)
+        return
+    case, mesh = case_with(name, text, sliding)
+    *_, last = sv.deform(case, mesh)
+    assert np.all(np.isfinite(last.mesh.points))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sliding", ["none", "ps", "ds"])
+@pytest.mark.parametrize(("name", "text", "kernel"), ENDS)
+def test_the_ends_of_what_is_allowed_work(name, text, kernel, sliding):
+    case, mesh = case_with(name, text, sliding, kernel or "wendland-c2")
+    *_, last = sv.deform(case, mesh)
+    assert np.all(np.isfinite(last.mesh.points))
+    moved = mesh.marker("BLOCK").nodes
+    np.testing.assert_allclose(last.mesh.points[moved], mesh.points[moved] + (0.02, 0.01))
+
+
+@pytest.mark.parametrize("value", [1e-300, 1e300])
+def test_a_program_is_told_of_an_absurd_radius(value):
+    mesh = builders.square(6)
+    case = Case(
+        roles={"BLOCK": "moving"},
+        motions=(Translate("BLOCK", (0.02, 0.01)),),
+        influence_factor=value,
+    )
+    with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; needed is"):
+        next(sv.deform(case, mesh))
