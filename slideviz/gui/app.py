@@ -10,7 +10,7 @@ import tempfile
 from importlib import import_module
 from pathlib import Path
 
-from qtpy.QtCore import QCoreApplication, QStandardPaths, Qt, QTimer
+from qtpy.QtCore import QCoreApplication, QSettings, QStandardPaths, Qt, QTimer
 from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 from threadpoolctl import ThreadpoolController
@@ -21,7 +21,9 @@ from slideviz.gui.warm import prepare_drawing
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
 from slideviz.gui.worker import hold_libraries_back
+from slideviz.mesh.private import private_file, private_folder
 
+log = logging.getLogger("slideviz")
 WARM_UP_MS = 300
 """The window is drawn first: compilation slows everything down a little."""
 
@@ -46,9 +48,11 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     app.setApplicationName("slideviz")
     app.setWindowIcon(logo())
     places = QStandardPaths.StandardLocation
-    crashes = _folder(places.CacheLocation) / "crashes"
+    kept, cache = _folder(places.AppDataLocation), _folder(places.CacheLocation)
+    crashes = cache / "crashes"
+    _keep_private(kept, cache)
     with crash_log(crashes):
-        window = MainWindow(kept=_folder(places.AppDataLocation) / "sessions")
+        window = MainWindow(kept=kept / "sessions")
         with caught(window.faults):
             be_quick()
             window.show()
@@ -124,6 +128,18 @@ def be_quick() -> Tidy:
 
 def _folder(place: QStandardPaths.StandardLocation) -> Path:
     return Path(QStandardPaths.writableLocation(place) or tempfile.gettempdir())
+
+
+def _keep_private(*folders: Path) -> None:
+    """Let nobody else read settings, sessions and crashes, nor the samples."""
+    settings = Path(QSettings("slideviz", "slideviz").fileName())
+    try:
+        for folder in (*folders, settings.parent):
+            if folder.name == "slideviz":  # not /tmp, where there is no place of its own
+                private_folder(folder)
+        private_file(settings)
+    except OSError as problem:
+        log.warning("others may read what is kept: %s", problem)
 
 
 def _run_when_read(window: MainWindow) -> None:

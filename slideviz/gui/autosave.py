@@ -24,6 +24,7 @@ from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.worker import JobRunner
+from slideviz.mesh.private import private_file, private_folder
 from slideviz.view.session.keep import Camera, keep_view
 from slideviz.view.session.state import Session
 from slideviz.view.session.store import Store
@@ -104,12 +105,14 @@ class Autosave(QObject):
             self._timer.start()
 
     def _write(self, case: Case, _report: object, _stopped: object) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        private_folder(self.path.parent)
         if self._lock is None:
             self._lock = _lock(self.path)
-            self._lock.tryLock(0)
+            if self._lock.tryLock(0):
+                private_file(Path(self._lock.fileName()))
         remarks = () if case.source is None else (f"{SOURCE}{case.source}",)
         write_case(self.path, case, remarks)
+        private_file(self.path)
 
     def _done(self, _: object) -> None:
         self._written = self._asked

@@ -84,6 +84,7 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle("Unsaved changes")
+    box.setTextFormat(Qt.TextFormat.PlainText)
     question, _, more = what.partition("\n")
     box.setText(question)
     box.setInformativeText(more)
@@ -113,28 +114,25 @@ def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
     """Return whether files that exist may be replaced."""
     names = ", ".join(path.name for path in paths[:3]) + (", …" if len(paths) > 3 else "")
     several = len(paths) > 1
-    answer = QMessageBox.question(
-        parent,
-        "Replace files?",
-        f"{len(paths)} files exist already ({names}). Replace them?"
-        if several
-        else f"{names} exists already. Replace it?",
-        QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
-        QMessageBox.StandardButton.Cancel,
-    )
-    return answer == QMessageBox.StandardButton.Yes
+    text = f"{names} exists already. Replace it?"
+    if several:
+        text = f"{len(paths)} files exist already ({names}). Replace them?"
+    return _agreed(parent, QMessageBox.Icon.Question, "Replace files?", text)
 
 
 def ask_overwrite_input(parent: QWidget, path: Path) -> bool:
     """Return whether the mesh that was opened may be replaced by the deformed one."""
-    answer = QMessageBox.warning(
-        parent,
-        "Replace the input mesh?",
-        f"{path.name} is the mesh you opened. Replacing it cannot be undone.",
-        QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
-        QMessageBox.StandardButton.Cancel,
-    )
-    return answer == QMessageBox.StandardButton.Yes
+    text = f"{path.name} is the mesh you opened. Replacing it cannot be undone."
+    return _agreed(parent, QMessageBox.Icon.Warning, "Replace the input mesh?", text)
+
+
+def _agreed(parent: QWidget, icon: QMessageBox.Icon, title: str, text: str) -> bool:
+    """Return whether a question is answered with yes; names in it are shown as they are."""
+    yes, no = QMessageBox.StandardButton.Yes, QMessageBox.StandardButton.Cancel
+    box = QMessageBox(icon, title, text, yes | no, parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)
+    box.setDefaultButton(no)
+    return box.exec() == yes
 
 
 def message_of(error: BaseException) -> str:

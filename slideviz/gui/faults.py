@@ -21,6 +21,7 @@ from typing import Any
 from qtpy.QtCore import QObject, QTimer, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
+from slideviz.mesh.private import private_file, private_folder
 from slideviz.mesh.undone import is_alive
 
 REST_S = 5.0
@@ -180,7 +181,8 @@ def crash_log(folder: Path) -> Iterator[None]:
     """Write where every thread was to ``crash-PID.log`` in a folder, should the program crash."""
     path = folder / f"crash-{os.getpid()}.log"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        private_folder(folder)
+        private_file(path)
         file = path.open("w", encoding="utf-8")
     except OSError as problem:
         log.warning("a crash would leave no trace: %s", problem)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import html
 from datetime import datetime
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
+from slideviz.gui.widgets.tips import rich_label, wrapped
 
 WIDEST = 860
 """Pixels: longer lines would be hard to read."""
@@ -81,7 +83,7 @@ class StartPage(QScrollArea):
     def _make_head(self) -> QHBoxLayout:
         head, picture = QHBoxLayout(), QLabel()
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
-        title = QLabel(
+        title = rich_label(
             "<span style='font-size:22pt; font-weight:600'>slideviz</span><br>"
             "Deform CFD meshes, and see at once where and why they suffer"
         )
@@ -202,9 +204,9 @@ class RecentButton(QPushButton):
         row.setContentsMargins(8, 4, 8, 4)
         when = changed_words(path)
         self.setEnabled(bool(when))
-        self.setToolTip(str(path) if when else f"{path} is not there any more.")
+        self.setToolTip(wrapped(str(path) if when else f"{path} is not there any more."))
         self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
-        name, self.folder = QLabel(f"<b>{path.name}</b>"), QLabel()
+        name, self.folder = rich_label(f"<b>{html.escape(path.name)}</b>"), QLabel()
         time = QLabel(when or "missing")
         for label in (name, self.folder, time):
             label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -237,6 +239,6 @@ def changed_words(path: Path, now: datetime | None = None) -> str:
 
 
 def _heading(text: str) -> QLabel:
-    label = QLabel(f"<b>{text}</b>")
+    label = rich_label(f"<b>{text}</b>")
     label.setContentsMargins(0, 2, 0, 4)
     return label

@@ -28,6 +28,7 @@ from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewing import Viewing
 from slideviz.gui.warm import WarmUp
+from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.inputs import spared
 from slideviz.view import jobs
 from slideviz.view.missing import Missing
@@ -89,6 +90,7 @@ class MainWindow(QMainWindow):
         self.warm_up = WarmUp(self)
         self.warm_up.compiling.connect(self.preparing.setVisible)
         self._keep_session(kept)
+        plain_labels(self)
         self.sync_actions()
 
     # Parts -----------------------------------------------------------------------------

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
+from slideviz.mesh.private import private_folder
 from slideviz.view.jobs import Doing, Opened, Report, Stopped, open_file, require_going
 
 SIZES = {"turbine-row": 20_000, "stator": 20_000}
@@ -21,6 +23,8 @@ def open_sample(name: str, folder: Path, report: Report, stopped: Stopped) -> Op
     from slideviz.case.samples import write_sample
 
     report(Doing(f"Making the sample {name}"))
+    with suppress(OSError):  # writing says why
+        private_folder(folder)
     written = write_sample(name, folder / name, SIZES.get(name), overwrite=True)
     require_going(stopped)
     case = next(path for path in written if path.suffix == ".cfg")

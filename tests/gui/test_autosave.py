@@ -9,7 +9,7 @@ import pytest
 from qtpy.QtWidgets import QMessageBox
 
 from slideviz.case.model import Case
-from slideviz.gui import autosave, dialogs
+from slideviz.gui import autosave, dialogs, faults
 from slideviz.gui.autosave import find_sessions
 from slideviz.gui.window import MainWindow
 from slideviz.view.session import changes
@@ -74,6 +74,21 @@ def crashed(make, qtbot, folder, case_file):
 @pytest.fixture(autouse=True)
 def nothing_asked(monkeypatch):
     monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+
+
+def test_nobody_else_may_read_what_is_kept(make, qtbot, folder, case_file, tmp_path):
+    window = make()
+    open_in(window, case_file, qtbot)
+    kept(window, qtbot)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    modes = {path.name: path.stat().st_mode & 0o777 for path in folder.iterdir()}
+    assert len(modes) == 2
+    assert set(modes.values()) == {0o600}
+    crashes = tmp_path / "crashes"
+    with faults.crash_log(crashes):
+        (log,) = crashes.iterdir()
+        assert log.stat().st_mode & 0o777 == 0o600
+    assert crashes.stat().st_mode & 0o777 == 0o700
 
 
 def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypatch):

@@ -69,6 +69,7 @@ class FilmDialog(QDialog):
         outer.addLayout(self._make_previews())
         outer.addWidget(self.form)
         self.words = QLabel()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
         self.words.setWordWrap(True)
         outer.addWidget(self.words)
         self.bar = QuietBar()

@@ -121,6 +121,7 @@ class PictureDialog(QDialog):
         self.preview.setObjectName("preview")
         self.preview.setAccessibleName("Preview of the picture")
         self.words = QLabel()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
         self.kinds = QLabel(_kinds(self.studio))
         self.kinds.setProperty("hint", True)
         self.kinds.setWordWrap(True)

@@ -191,7 +191,7 @@ class BoundariesPanel(QWidget):
         shown = name not in session.view.hidden
         item.setCheckState(Qt.CheckState.Checked if shown else Qt.CheckState.Unchecked)
         item.setForeground(QBrush() if shown else self.palette().placeholderText())
-        item.setToolTip(f"{name}\nThe check mark shows or hides it in the view.")
+        item.setToolTip(wrapped(f"{name}\nThe check mark shows or hides it in the view."))
         choice.show_value(role)
         for index, each in enumerate(ROLES):
             choice.setItemText(index, f"{each} ?" if guess and each == role else each)

@@ -31,6 +31,7 @@ from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import folder_of, main_window
+from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import Mesh
 from slideviz.view.drawing.look import Look
 from slideviz.view.missing import Missing
@@ -162,7 +163,7 @@ class MotionPanel(QWidget):
                 self.list.addItems(texts)
             for row, text in enumerate(texts):
                 self.list.item(row).setText(text)
-                self.list.item(row).setToolTip(text)
+                self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
         finally:
             self._syncing = False

@@ -6,7 +6,7 @@ import html
 
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QFontMetrics
-from qtpy.QtWidgets import QToolTip
+from qtpy.QtWidgets import QLabel, QToolTip, QWidget
 
 TIPS: dict[str, str] = {
     "open": "Open a mesh, or a case with its mesh.",
@@ -66,6 +66,23 @@ def tip_of(name: str, text: str) -> str:
     return TIPS.get(name, f"{text.replace('…', '').replace('&', '')}.")
 
 
+def rich_label(text: str) -> QLabel:
+    """Return a label for rich text; names in it must be escaped."""
+    label = QLabel(text)
+    label.setTextFormat(Qt.TextFormat.RichText)
+    return label
+
+
+def plain_labels(widget: QWidget) -> None:
+    """Let the labels in a widget show text as it is written, but for those made for rich text.
+
+    Qt guesses else: a boundary named ``<img src=...>`` would be a picture.
+    """
+    for label in widget.findChildren(QLabel):
+        if label.textFormat() == Qt.TextFormat.AutoText:
+            label.setTextFormat(Qt.TextFormat.PlainText)
+
+
 LETTERS = 60
 """In a line of a tooltip."""
 
@@ -73,9 +90,11 @@ LETTERS = 60
 def wrapped(text: str) -> str:
     """Return a tooltip in lines of about 60 letters; Qt shows plain text on one line.
 
-    Short lines, and what is rich text already, stay as they are.
+    Short lines stay as they are. What looks like rich text is the name of a boundary or file, and
+    is shown as it is written.
     """
-    if Qt.mightBeRichText(text) or all(len(line) <= LETTERS + 10 for line in text.splitlines()):
+    short = all(len(line) <= LETTERS + 10 for line in text.splitlines())
+    if short and not Qt.mightBeRichText(text):
         return text
     width = round(1.05 * LETTERS * QFontMetrics(QToolTip.font()).averageCharWidth())
     lines = html.escape(text, quote=False).replace("\n", "<br>")
