@@ -82,6 +82,7 @@ def test_a_full_disk_under_the_output_is_told_and_under_the_errors_not():
         (">&- 2>&- <&-", 0, ""),
         (">/dev/full", 1, "slideviz: the standard output cannot be written: No space left on "),
         ("| head -c 1", 0, "m"),
+        ("--help >/dev/full", 1, "slideviz: the standard output cannot be written: No space left"),
     ],
 )
 def test_streams_that_are_closed_or_full(square, end, code, said):

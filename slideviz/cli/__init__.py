@@ -21,7 +21,14 @@ DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
     with terminal():
-        return _run(argv)
+        code = _run(argv)
+        try:
+            sys.stdout.flush()  # here, where it can still be told that it fails
+        except BrokenPipeError:
+            return DONE
+        except SlidevizError as problem:
+            return _fail(str(problem), WRONG_INPUT)
+        return code
 
 
 def _run(argv: Sequence[str]) -> int:
@@ -39,9 +46,7 @@ def _run(argv: Sequence[str]) -> int:
             spared(lambda: arguments.inputs),
             compiling_told(getattr(arguments, "quiet", False)),
         ):
-            code = int(arguments.command(arguments))
-        sys.stdout.flush()  # here, where a reader that is gone can still be handled
-        return code
+            return int(arguments.command(arguments))
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):

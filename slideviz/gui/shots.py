@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.shots_wait import settle
+from slideviz.mesh.undone import draft, ended
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -40,11 +41,11 @@ def shots(folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise SlidevizError(f"{folder}: cannot be made a folder ({problem.strerror})") from None
-    with tempfile.TemporaryDirectory() as place, display():
+    with draft(Path(tempfile.gettempdir()), is_folder=True) as place, display():
         made = []
         for state in STATES:
-            with open_window(Path(place)) as window:
-                state.bring(window, Path(place))
+            with open_window(place) as window:
+                state.bring(window, place)
                 made.append(photograph(window, folder / f"{state.name}.png"))
         return [*made, film_of_passage(folder / "passage.gif")]
 
@@ -73,18 +74,19 @@ def display() -> Iterator[None]:
     call = [program, "-displayfd", str(write), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"]
     server = subprocess.Popen(call, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
-    try:
-        with os.fdopen(read) as number:
-            os.environ["DISPLAY"] = f":{number.readline().strip()}"
-        os.environ.pop("WAYLAND_DISPLAY", None)
-        os.environ["QT_QPA_PLATFORM"] = "xcb"
-        yield
-    finally:
-        for name in names:
-            os.environ.pop(name, None)
-        os.environ.update(before)
-        server.terminate()
-        server.wait()
+    with ended(server):
+        try:
+            with os.fdopen(read) as number:
+                os.environ["DISPLAY"] = f":{number.readline().strip()}"
+            os.environ.pop("WAYLAND_DISPLAY", None)
+            os.environ["QT_QPA_PLATFORM"] = "xcb"
+            yield
+        finally:
+            for name in names:
+                os.environ.pop(name, None)
+            os.environ.update(before)
+            server.terminate()
+            server.wait()
 
 
 @contextmanager

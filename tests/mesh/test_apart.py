@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -141,3 +143,24 @@ def test_limits_grow_with_the_file():
     seconds, memory = np.transpose([apart._limits(size) for size in (0, 10**6, 10**9)])
     assert seconds.tolist() == [20, 40, 20020]
     assert memory[0] <= memory[1] <= memory[2]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has such a call")
+def test_the_reader_does_not_outlive_a_killed_program():
+    child = "import os, time; from slideviz.mesh.apart import _die_with; _die_with(os.getppid())"
+    code = (
+        "import subprocess, sys\n"
+        f"call = [sys.executable, '-c', {child + '; print(1, flush=True); time.sleep(300)'!r}]\n"
+        "reader = subprocess.Popen(call, stdout=subprocess.PIPE)\n"
+        "reader.stdout.read(1)\n"
+        "print(reader.pid, flush=True)\n"
+        "reader.wait()\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as parent:
+        reader = Path(f"/proc/{int(parent.stdout.readline())}/stat")
+        assert reader.exists()
+        parent.kill()
+    give_up = time.monotonic() + 60
+    while reader.exists() and ") Z " not in reader.read_text():
+        assert time.monotonic() < give_up
+        time.sleep(0.01)
