@@ -76,6 +76,10 @@ class Actions:
             act = self.samples.addAction(f"{name}: {text}")
             act.setStatusTip(tip_of("open_sample", name))
             act.triggered.connect(partial(lambda name, _=False: files.open_sample(name), name))
+        self.samples.addSeparator()
+        self.samples.addAction(
+            self._add("sample_of_size", "Of another &size…", files.ask_and_open_sample)
+        )
         self.samples.setEnabled(bool(files.samples))
         menu.addSeparator()
         for name, text, function, keys, image in (
@@ -210,6 +214,7 @@ class Actions:
             group.addAction(act)
             act.triggered.connect(lambda _=False, theme=theme: window.set_theme(theme))
             themes.addAction(act)
+        menu.addAction(self._add("full_screen", "F&ull screen", window.toggle_full_screen, "F11"))
         self.panels = self._menu(menu, "panels", "&Panels")
 
     def _add_section(self, name: str) -> None:
@@ -223,6 +228,8 @@ class Actions:
             act.setStatusTip(f"Show or hide the panel {dock.windowTitle()}.")
             self.panels.addAction(act)
         self.panels.addSeparator()
+        toggle = self.window.docks_.toggle_all
+        self.panels.addAction(self._add("hide_panels", "&Hide or show all", toggle, "F9"))
         restore = self._add("restore_layout", "&Restore layout", self.window.restore_layout)
         self.panels.addAction(restore)
 

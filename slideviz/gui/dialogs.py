@@ -12,6 +12,7 @@ from qtpy.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFileDialog,
+    QFormLayout,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -25,6 +26,8 @@ from qtpy.QtWidgets import (
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.faults import details_of
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
 from slideviz.view.formats import formats_for
 
@@ -72,7 +75,7 @@ def _with_ending(name: str, chosen: str, default: Path) -> Path:
 
 
 def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",)) -> str:
-    """Return ``case`` or ``mesh`` to save it, ``discard`` or ``cancel``, for what would be lost.
+    """Return ``case``, ``mesh`` or ``both`` to save, ``discard`` or ``cancel``.
 
     Parameters
     ----------
@@ -89,14 +92,16 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     box.setText(question)
     box.setInformativeText(more)
     several = len(can_save) > 1
+    words = {"case": "Save &case…", "mesh": "Save &mesh…", "both": "Save &both…"}
+    offered = [*can_save, "both"] if several else list(can_save)
+    role = QMessageBox.ButtonRole
     buttons = {
-        name: box.addButton(
-            f"Save {name}…" if several else "Save…", QMessageBox.ButtonRole.AcceptRole
-        )
-        for name in can_save
+        name: box.addButton(words[name] if several else "&Save…", role.AcceptRole)
+        for name in offered
     }
-    buttons["discard"] = box.addButton("Don’t save", QMessageBox.ButtonRole.DestructiveRole)
-    buttons["cancel"] = box.addButton("Cancel", QMessageBox.ButtonRole.RejectRole)
+    buttons["discard"] = box.addButton("&Don’t save", role.DestructiveRole)
+    # Not &Cancel: Alt+C is the case.
+    buttons["cancel"] = box.addButton("C&ancel", role.RejectRole)
     box.setEscapeButton(buttons["cancel"])
     box.setDefaultButton(next(iter(buttons.values())) if can_save else buttons["cancel"])
     box.exec()
@@ -108,6 +113,41 @@ def ask_folder(parent: QWidget, title: str, default: Path) -> Path | None:
     """Return a folder that exists, or None."""
     name = QFileDialog.getExistingDirectory(parent, title, str(default))
     return Path(name) if name else None
+
+
+def ask_sample(
+    parent: QWidget, samples: Mapping[str, str], sizes: Mapping[str, int]
+) -> tuple[str, int] | None:
+    """Return the name of a sample and its size, or None; ``sizes`` are those offered at first."""
+    dialog = QDialog(parent)
+    dialog.setWindowTitle("Open a sample")
+    form = QFormLayout(dialog)
+    name, size, about = Choice({name: name for name in samples}), NumberBox(), QLabel()
+    size.setRange(2, 10_000_000)
+    size.setGroupSeparatorShown(True)
+    about.setWordWrap(True)
+    about.setProperty("hint", True)
+
+    def show(chosen: str) -> None:
+        size.setValue(sizes[chosen])
+        large = sizes[chosen] > 1000
+        what = "of all cells, about" if large else "of cells along one side"
+        about.setText(f"{samples[chosen]}. Size: number {what}.")
+
+    name.currentIndexChanged.connect(lambda _: show(name.currentData()))
+    show(name.currentData())
+    buttons = QDialogButtonBox(
+        QDialogButtonBox.StandardButton.Open | QDialogButtonBox.StandardButton.Cancel
+    )
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    form.addRow("Sample", name)
+    form.addRow("Size", size)
+    form.addRow(about)
+    form.addRow(buttons)
+    dialog.setMinimumWidth(420)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    return (name.currentData(), size.value()) if accepted else None
 
 
 def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:

@@ -26,7 +26,11 @@ Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
 LEFT_WIDTH, RIGHT_WIDTH = 356, 316
-"""Pixels that the panels at the sides need at least."""
+"""Pixels that the panels at the sides need at least, on a screen that has room for them."""
+NARROWEST = {LEFT: 300, RIGHT: 264}
+"""Pixels that they may shrink to on a smaller screen, in proportion."""
+ROOMY = 1280
+"""Pixels of the width of a screen with room."""
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 SIDE = 0.22
 """Part of the window's width that the panels of a side take, until somebody chooses otherwise."""
@@ -83,6 +87,12 @@ class Docks(QObject):
         super().__init__(window)
         self.window = window
         self._widths: dict[Side, int] = {}
+        self._hidden: QByteArray | None = None
+        part = min(1.0, window.screen().availableGeometry().width() / ROOMY)
+        self.least = {
+            side: max(NARROWEST[side], round(part * width))
+            for side, width in ((LEFT, LEFT_WIDTH), (RIGHT, RIGHT_WIDTH))
+        }
         window.installEventFilter(self)
         window.setDockOptions(
             QMainWindow.DockOption.AnimatedDocks
@@ -106,7 +116,7 @@ class Docks(QObject):
         dock.setWidget(panel)
         # A window once made small must not leave names and fields cut off for ever.
         if row.area != BOTTOM:
-            dock.setMinimumWidth(LEFT_WIDTH if row.area == LEFT else RIGHT_WIDTH)
+            dock.setMinimumWidth(self.least[row.area])
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 
@@ -159,7 +169,7 @@ class Docks(QObject):
     def _shares(self) -> dict[Side, int]:
         """Return the width that each side has as long as nobody has moved it."""
         part = round(SIDE * self.window.width())
-        return {LEFT: max(part, LEFT_WIDTH), RIGHT: max(part, RIGHT_WIDTH)}
+        return {side: max(part, least) for side, least in self.least.items()}
 
     def _share_width(self) -> None:
         """Give both sides their part of the window's width."""
@@ -191,6 +201,21 @@ class Docks(QObject):
     def _as_wide_as(self, widths: Mapping[Side, int]) -> bool:
         seen = {side: self._seen(side) for side in widths}
         return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
+
+    def toggle_all(self) -> None:
+        """Hide every panel, or show those again that were hidden so."""
+        if any(dock.isVisible() for dock in self.by_name.values()):
+            self._hidden = self.window.saveState()
+            for dock in self.by_name.values():
+                dock.hide()
+        else:
+            self.show_hidden()
+
+    def show_hidden(self) -> None:
+        """Show the panels that were hidden all at once, as they were."""
+        state, self._hidden = self._hidden, None
+        if state is not None and not any(dock.isVisible() for dock in self.by_name.values()):
+            self.window.restoreState(state)
 
     def lead_to(self, name: str) -> None:
         """Bring a dock to the front."""

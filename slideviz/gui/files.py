@@ -13,8 +13,10 @@ from pathlib import Path
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
+from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
+from slideviz.mesh.atomic import atomic_write
 from slideviz.view import jobs, jobs_sample
 from slideviz.view.formats import left_out
 from slideviz.view.session import changes
@@ -34,6 +36,7 @@ class Files(QObject):
         self.samples = known_samples()
         self._saved_to: Path | None = None
         self.saving = False
+        self._answered = False
         self.after_save: Callable[[], object] | None = None
         window.running.ended.connect(self._job_ended)
 
@@ -85,14 +88,23 @@ class Files(QObject):
         self.open_path(session.path, zone)
         self.window.sync_actions()
 
-    def open_sample(self, name: str, run: bool = False) -> None:
+    def ask_and_open_sample(self) -> None:
+        """Ask for a sample and its size, and open it."""
+        from slideviz.case.samples import DEFAULT_SIZES
+
+        sizes = {name: jobs_sample.SIZES.get(name, DEFAULT_SIZES[name]) for name in self.samples}
+        found = dialogs.ask_sample(self.window, self.samples, sizes)
+        if found is not None:
+            self.open_sample(found[0], size=found[1])
+
+    def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:
         """Write a sample case into a folder of this program and open it; ``run`` deforms it."""
-        if not self.may_go_on(lambda: self.open_sample(name, run)):
+        if not self.may_go_on(lambda: self.open_sample(name, run, size)):
             return
         self.window.start_job(
             f"Opening the sample {name}",
             self._opened_to_run if run else self._opened,
-            jobs_sample.open_sample,
+            partial(jobs_sample.open_sample, size=size),
             name,
             sample_folder(),
         )
@@ -129,18 +141,27 @@ class Files(QObject):
         before : str
             What the changes would be lost by, in words.
         """
-        while unsaved := self._unsaved():
-            can_save = [name for name in unsaved if name in ("case", "mesh")]
-            question = self._question(unsaved, before)
-            answer = dialogs.ask_unsaved(self.window, question, can_save)
-            if answer == "discard":
-                return True
-            if answer == "mesh":
-                self.save_mesh(last=True, then=again)
-                return False
-            if answer == "cancel" or not self.save_case():
-                return False
-        return True
+        unsaved = {} if self._answered else self._unsaved()
+        if not unsaved:
+            return True
+        can_save = [name for name in unsaved if name in ("case", "mesh")]
+        question = self._question(unsaved, before)
+        answer = dialogs.ask_unsaved(self.window, question, can_save)
+        # What else there is was in the question, too: it is not asked about again.
+        if answer in ("case", "both") and not self.save_case():
+            return False
+        if answer in ("mesh", "both"):
+            self.save_mesh(last=True, then=lambda: self._go_on(again))
+            return False
+        return answer != "cancel"
+
+    def _go_on(self, again: Callable[[], object]) -> None:
+        """Do what was asked about, without asking once more."""
+        self._answered = True
+        try:
+            again()
+        finally:
+            self._answered = False
 
     def _unsaved(self) -> dict[str, str]:
         """Return what would be lost, in words, by what it is."""
@@ -241,6 +262,9 @@ class Files(QObject):
         path = dialogs.ask_save(self.window, "Save case", default, dialogs.CASE_FILTERS)
         if path is None:
             return False
+        if not self._take_along(path):
+            return False
+        session = self.window.store.session
         case = session.case
         if self._saved_to is not None and self._saved_to.suffix == ".su2":
             case = case.change(mesh_out=self._saved_to)
@@ -252,6 +276,40 @@ class Files(QObject):
         self.window.store.change(changes.saved_case, replace(case, source=path))
         self.remember(path)
         self.window.say(f"Saved {path}")
+        if case.mesh_file is not None and not case.mesh_file.is_file():
+            self.window.banner.tell(
+                f"Saved. But its mesh {case.mesh_file} is not there any more: the case cannot be "
+                "opened without it. Put it back, or save the mesh under that name (step 0)."
+            )
+        return True
+
+    def _take_along(self, path: Path) -> bool:
+        """Copy the files of a sample beside its case: where it is opened, it is not to be kept.
+
+        Return whether the case can be saved.
+        """
+        case = self.window.store.session.case
+        used = [case.mesh_file, *(m.path for m in case.motions if isinstance(m, FromFile))]
+        ours = [file for file in used if file and sample_folder() in file.parents]
+        moved = {
+            file: path.with_suffix(file.suffix)
+            if file == case.mesh_file
+            else path.with_name(f"{path.stem}_{file.name}")
+            for file in ours
+            if file.is_file() and sample_folder() not in path.parents
+        }
+        there = [target for target in moved.values() if target.exists()]
+        if there and not dialogs.ask_replace(self.window, there):
+            return False
+        try:
+            for file, target in moved.items():
+                with atomic_write(target) as out:
+                    out.write(file.read_bytes())
+        except (OSError, SlidevizError) as error:
+            self.window.banner.tell_error(error)
+            return False
+        if moved:
+            self.window.store.change(changes.moved_files, moved)
         return True
 
 

@@ -30,6 +30,8 @@ WIDEST = 860
 """Pixels: longer lines would be hard to read."""
 RECENT = 5
 COLUMNS = 4
+NARROWEST = 126
+"""Pixels that a card needs for its name."""
 TRIED = "passage"
 """The sample that is deformed by one click."""
 
@@ -47,7 +49,7 @@ class StartPage(QScrollArea):
         self.setObjectName("start")
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.page = QWidget()
         self.page.setMaximumWidth(WIDEST)
         middle, outer = QWidget(), QHBoxLayout()
@@ -134,13 +136,14 @@ class StartPage(QScrollArea):
 
     def _place_cards(self) -> None:
         """Make the cards as large as there is room for: all are seen without scrolling."""
-        room = min(self.viewport().width() - 48, WIDEST) // COLUMNS - 20
-        width = min(max(room, SIZE[0] // 2), SIZE[0])
+        whole = min(self.viewport().width() - 48, WIDEST)
+        columns = max(1, min(COLUMNS, whole // NARROWEST))
+        width = min(max(whole // columns - 20, SIZE[0] // 2), SIZE[0])
         for k, button in enumerate(self.sample_buttons.values()):
             button.setIconSize(QSize(width, width * SIZE[1] // SIZE[0]))
-            self._cards.addWidget(button, k // COLUMNS, k % COLUMNS)
+            self._cards.addWidget(button, k // columns, k % columns)
         for column in range(COLUMNS):
-            self._cards.setColumnStretch(column, 1)
+            self._cards.setColumnStretch(column, int(column < columns))
 
     def _draw_cards(self) -> None:
         line = self.palette().color(self.palette().ColorRole.WindowText)

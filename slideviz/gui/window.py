@@ -8,7 +8,7 @@ import logging
 from contextlib import ExitStack
 from pathlib import Path
 
-from qtpy.QtCore import QSettings, QTimer
+from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidget
 
 from slideviz.gui import theme
@@ -32,6 +32,7 @@ from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.inputs import spared
 from slideviz.view import jobs
 from slideviz.view.missing import Missing
+from slideviz.view.motions.words import box_words
 from slideviz.view.session import changes
 from slideviz.view.session.store import Store
 
@@ -60,8 +61,9 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")
         self.setObjectName("slideviz")
-        self.setMinimumSize(900, 620)
-        self.resize(1280, 800)
+        room = self.screen().availableGeometry().size()
+        self.setMinimumSize(QSize(900, 620).boundedTo(room))
+        self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
         self.store = Store()
         self.banner = Banner()
@@ -165,6 +167,7 @@ class MainWindow(QMainWindow):
 
     def _make_status(self) -> None:
         self.mesh_text = QLabel()
+        self._measured = None
         self.preparing = QLabel("Preparing… ")
         self.preparing.setToolTip("The numerics are compiled, once after each installation.")
         self.preparing.hide()
@@ -190,7 +193,22 @@ class MainWindow(QMainWindow):
         state, geometry = self.settings.value("state"), self.settings.value("geometry")
         if geometry is not None:
             self.restoreGeometry(geometry)
+        self._fit_screen()
         self.docks_.restore(state)
+
+    def _fit_screen(self) -> None:
+        """Make the window no larger than the screen, and keep all of it there."""
+        room = self.screen().availableGeometry()
+        self.resize(self.size().boundedTo(room.size()))
+        corner = self.pos()
+        x = min(max(corner.x(), room.left()), room.right() + 1 - self.width())
+        y = min(max(corner.y(), room.top()), room.bottom() + 1 - self.height())
+        if (x, y) != (corner.x(), corner.y()):
+            self.move(x, y)
+
+    def toggle_full_screen(self) -> None:
+        """Fill the screen with the window, or end that."""
+        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def _keep_session(self, folder: Path | None) -> None:
         self.autosave: Autosave | None = None
@@ -212,16 +230,19 @@ class MainWindow(QMainWindow):
         ready = self.run_panel.run.isEnabled()
         self.actions_.sync(session, self.runner.busy, ready)
         name = session.case.source or session.path
-        changed = "*" if session.unsaved_case or session.unsaved_mesh else ""
+        # The mesh of a run that the case on disk repeats is not what is unsaved of it.
+        lost = session.unsaved_mesh and not session.repeatable
+        changed = "*" if session.unsaved_case or lost else ""
         self.setWindowTitle(f"{changed}{name.name} – slideviz" if name else "slideviz")
         mesh = session.mesh
-        if mesh is not None:
+        if mesh is not None and mesh is not self._measured:
+            self._measured = mesh
             halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
-            self.mesh_text.setText(
-                f"{mesh.dim}D   {len(mesh.cells):,} cells{halo}   {len(mesh.points):,} points "
-            )
-            words = "" if mesh.halo is None else mesh.halo.describe().capitalize()
-            self.mesh_text.setToolTip(words and f"{words}, which follow what they are copies of")
+            cells = f"{len(mesh.cells):,} cells{halo}"
+            size, box = box_words(mesh)
+            self.mesh_text.setText(f"{mesh.dim}D   {cells}   {len(mesh.points):,} points   {size} ")
+            about = "" if mesh.halo is None else f"{mesh.halo.describe().capitalize()}.\n"
+            self.mesh_text.setToolTip(about + box)
 
     def show_opened(self, opened: jobs.Opened) -> None:
         """Show a mesh that was just opened."""
@@ -338,6 +359,9 @@ class MainWindow(QMainWindow):
                 event.ignore()
                 return
             self._closed = True
+            # The next window begins with its panels, and with a frame.
+            self.docks_.show_hidden()
+            self.setWindowState(self.windowState() & ~Qt.WindowState.WindowFullScreen)
             self.settings.setValue("geometry", self.saveGeometry())
             self.settings.setValue("state", self.saveState())
             self.hide()

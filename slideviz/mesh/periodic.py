@@ -240,36 +240,38 @@ def pair_up(
     reasons: list[MeshError] = []
     found = pairs_of(list(names), None)
     if found is None:
-        raise next((r for r in reasons if "one period" in str(r)), None) or _left_over(
-            mesh, names, lambda one, two: match(mesh, one, two, kind, axis, origin), reasons[0]
-        )
+        period = next((reason for reason in reasons if "one period" in str(reason)), None)
+        raise period or _left_over(mesh, names, (kind, axis, origin), reasons[0])
     return found
 
 
 def _left_over(
-    mesh: Mesh, names: Sequence[str], matched: Callable[[str, str], Pair], first: MeshError
+    mesh: Mesh,
+    names: Sequence[str],
+    how: tuple[Kind, Sequence[float], Sequence[float]],
+    first: MeshError,
 ) -> MeshError:
-    """Return the error for markers that have no partner; it names the pairs that match, too."""
+    """Return the error for markers that have no partner; it names the pairs that match, too.
+
+    ``how`` has kind, axis and origin of `pair_up`; without any pair, the error is ``first``.
+    """
+    kind, axis, origin = how
+    kinds: tuple[Kind, ...] = ("translational", "rotational") if kind == "auto" else (kind,)
     good: list[Pair] = []
-    alone: list[str] = []
-    rest = list(names)
-    while rest:
-        one = rest.pop(0)
-        for other in rest:
-            try:
-                good.append(matched(one, other))
-            except MeshError:
-                continue
-            rest.remove(other)
-            break
-        else:
-            alone.append(one)
+    alone, why = list(names), "they are no images of each other; choose other markers"
+    for each in kinds:
+        for one, other in combinations(names, 2):
+            if one in alone and other in alone:
+                try:
+                    good.append(match(mesh, one, other, each, axis, origin))
+                except MeshError:
+                    continue
+                alone = [name for name in alone if name not in (one, other)]
     if not good or len(alone) < 2:
         return first
-    why = "they are no images of each other; choose other markers"
     if len(alone) == 2:
         try:
-            matched(alone[0], alone[1])
+            match(mesh, alone[0], alone[1], kind, axis, origin)
         except MeshError as problem:
             why = str(problem).partition(" do not match: ")[2]
     pairs = ", ".join(f"{p.first!r} and {p.second!r} match ({p.describe()})" for p in good)

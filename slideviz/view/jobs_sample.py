@@ -12,8 +12,12 @@ SIZES = {"turbine-row": 20_000, "stator": 20_000}
 """Cells of the samples that are large unless asked for: the first look should be quick."""
 
 
-def open_sample(name: str, folder: Path, report: Report, stopped: Stopped) -> Opened:
+def open_sample(
+    name: str, folder: Path, report: Report, stopped: Stopped, size: int | None = None
+) -> Opened:
     """Return a sample case, written into a folder of its own and ready to be shown.
+
+    ``size`` as of ``slideviz.case.samples.sample``; without one, not larger than ``SIZES``.
 
     Raises
     ------
@@ -25,7 +29,8 @@ def open_sample(name: str, folder: Path, report: Report, stopped: Stopped) -> Op
     report(Doing(f"Making the sample {name}"))
     with suppress(OSError):  # writing says why
         private_folder(folder)
-    written = write_sample(name, folder / name, SIZES.get(name), overwrite=True)
+    own = folder / (name if size is None else f"{name}-{size}")
+    written = write_sample(name, own, size or SIZES.get(name), overwrite=True)
     require_going(stopped)
     case = next(path for path in written if path.suffix == ".cfg")
     return open_file(case, None, report, stopped)

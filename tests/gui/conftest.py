@@ -24,6 +24,7 @@ DIALOGS = (
     "ask_numbered",
     "ask_folder",
     "ask_replace",
+    "ask_sample",
     "ask_unsaved",
     "ask_overwrite_input",
 )

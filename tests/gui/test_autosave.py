@@ -303,26 +303,26 @@ def run_in(window, qtbot):
     assert window.store.session.unsaved_mesh
 
 
-def test_the_mesh_and_then_the_case_are_saved_before_the_window_closes(
+def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
     make, qtbot, case_file, monkeypatch, tmp_path
 ):
     window = make()
     open_in(window, case_file, qtbot)
     window.store.change(changes.set_case, steps=2)
     run_in(window, qtbot)
-    asked, answers = [], iter(["mesh", "case"])
-    names = iter([tmp_path / "out.su2", tmp_path / "out.cfg"])
+    asked = []
+    names = iter([tmp_path / "out.cfg", tmp_path / "out.su2"])
 
     def ask(_parent, what, can_save):
         asked.append((what, tuple(can_save)))
-        return next(answers)
+        return "both"
 
     monkeypatch.setattr(dialogs, "ask_unsaved", ask)
     monkeypatch.setattr(dialogs, "ask_save", lambda *_: next(names))
     window.store.change(changes.show_frame, 1)
     assert not window.close(), "first the mesh is written"
     qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
-    assert [can for _, can in asked] == [("case", "mesh"), ("case",)]
+    assert [can for _, can in asked] == [("case", "mesh")]
     assert "the deformed mesh of run 1" in asked[0][0]
     assert (tmp_path / "out.cfg").is_file()
     from slideviz.mesh.files import read
@@ -331,27 +331,27 @@ def test_the_mesh_and_then_the_case_are_saved_before_the_window_closes(
     assert (read(tmp_path / "out.su2").points == last.points).all(), "the last step, not that shown"
 
 
-def test_cancel_at_the_second_question_keeps_the_window(
-    make, qtbot, case_file, monkeypatch, tmp_path
-):
+@pytest.mark.parametrize("answer", ["case", "mesh"])
+def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, answer):
     window = make()
     open_in(window, case_file, qtbot)
     window.store.change(changes.set_case, steps=2)
     run_in(window, qtbot)
-    answers = iter(["case", "cancel"])
+    answers = iter([answer])
     monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: next(answers))
-    monkeypatch.setattr(dialogs, "ask_save", lambda *_: tmp_path / "out.cfg")
-    assert not window.close()
-    assert window.isVisible()
-    assert not window.store.session.unsaved_case
+    file = tmp_path / {"case": "out.cfg", "mesh": "out.su2"}[answer]
+    monkeypatch.setattr(dialogs, "ask_save", lambda *_: file)
+    window.close()
+    qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
+    assert file.is_file()
 
 
 @pytest.mark.parametrize(
     ("can_save", "words"),
     [
-        (("case", "mesh"), ["Save case…", "Save mesh…", "Don’t save", "Cancel"]),
-        (("mesh",), ["Save…", "Don’t save", "Cancel"]),
-        ((), ["Don’t save", "Cancel"]),
+        (("case", "mesh"), ["Save &case…", "Save &mesh…", "Save &both…", "&Don’t save", "C&ancel"]),
+        (("mesh",), ["&Save…", "&Don’t save", "C&ancel"]),
+        ((), ["&Don’t save", "C&ancel"]),
     ],
 )
 def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, words):

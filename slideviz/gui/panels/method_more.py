@@ -184,7 +184,6 @@ def set_tip(field: QWidget, text: str) -> None:
         field.setToolTip(wrapped(text))
 
 
-
 def _radius_problem(value: float) -> str:
     """Return why a number is no support radius, as a case file with it would be refused."""
     try:

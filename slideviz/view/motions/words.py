@@ -17,6 +17,7 @@ from slideviz.case.model import (
     Translate,
     named,
 )
+from slideviz.mesh.model import Mesh
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -126,6 +127,17 @@ def _exactly(motion: Motion) -> str:
         return f"radially {by}" + _about(motion.point) + _along(motion.axis)
     turned = f"rotate {motion.angle_deg:+.15g}°" + _about(motion.point)
     return turned + _along(motion.axis)
+
+
+def box_words(mesh: Mesh) -> tuple[str, str]:
+    """Return the size of a mesh along each axis, and the ends of it, a line for each axis."""
+    if not len(mesh.points):
+        return "", ""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    size = " × ".join(f"{value:.4g}" for value in high - low)
+    rows = zip("xyz", low, high, high - low, strict=False)
+    ends = (f"{axis} from {a:.6g} to {b:.6g}: {c:.6g}" for axis, a, b, c in rows)
+    return size, "\n".join(["The undeformed mesh, in its length unit:", *ends])
 
 
 def vector_words(values: Sequence[float], form: str = ".4g") -> str:

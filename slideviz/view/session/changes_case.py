@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case, Motion, Role, named
+from slideviz.case.model import Case, FromFile, Motion, Role, named
 from slideviz.view.guess import with_periodicity
 from slideviz.view.session.rows import replaced, without
 from slideviz.view.session.state import Place, Session
@@ -80,6 +81,26 @@ def move_motion(session: Session, index: int, by: int) -> Session:
     motion = motions.pop(index)
     motions.insert(max(0, index + by), motion)
     return set_case(session, motions=tuple(motions))
+
+
+def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
+    """Return the session with files at other places: of the mesh, and of displacements."""
+
+    def there(case: Case) -> Case:
+        motions = tuple(
+            replace(m, path=moved.get(m.path, m.path)) if isinstance(m, FromFile) else m
+            for m in case.motions
+        )
+        file = case.mesh_file
+        return case.change(motions=motions, mesh_file=moved.get(file, file) if file else None)
+
+    return replace(
+        session,
+        path=moved.get(session.path, session.path) if session.path else None,
+        case=there(session.case),
+        # The same files: what ran with them is what the case says.
+        runs=tuple(replace(run, case=there(run.case)) for run in session.runs),
+    )
 
 
 def saved_case(session: Session, case: Case) -> Session:

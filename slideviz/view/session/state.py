@@ -149,6 +149,13 @@ class Session:
         return self.mesh is not None and self.saved is not None and self.case != self.saved
 
     @property
+    def repeatable(self) -> bool:
+        """Tell whether the case, as it is on disk, gives the run that is shown once more."""
+        run = self.run_shown
+        kept = self.case.source is not None and not self.unsaved_case
+        return kept and run is not None and run.end == "done" and not self.outdated
+
+    @property
     def outdated(self) -> bool:
         """Tell whether the steps shown were computed with other settings than now."""
         run = self.run_shown
