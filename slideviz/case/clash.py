@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.crossing import Crossing, first_crossing, swept_crossing
-from slideviz.mesh.found import boundary_of
+from slideviz.mesh.found import boundary_of, shell_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import axis_basis, in_axis_frame, pair_up
 from slideviz.mesh.topology import components, facet_vectors, unit
@@ -20,7 +20,7 @@ LOOKED_AT = 5
 BESIDE = 1e-4
 """How far off its surface, in sizes of a facet, the mesh beside a body is looked for."""
 OPEN = 0.1
-"""What the winding of a closed surface may miss of 1, or 0, where it has small gaps."""
+"""What the winding of markers may miss of 1 where they are closed but for small gaps."""
 HALF = 0.5
 """Winding between those of inside and outside."""
 
@@ -96,7 +96,7 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     whole = boundary_of(mesh).facets
     # A surface with holes has no inside.
     if abs(winding(mesh.points, whole, before[:1])[0] - 1.0) > OPEN:
-        return False
+        whole = shell_of(mesh)
     if not _is_out(whole, after, there):
         return False
     far = float(np.linalg.norm(after[facets] - mesh.points[facets], axis=-1).max())

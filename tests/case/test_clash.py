@@ -9,6 +9,7 @@ from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.samples import sample
 from slideviz.errors import CaseError
+from slideviz.mesh.model import Mesh
 from tests.builders import airfoil, cube, make_mesh, passage, sphere_in_box
 
 
@@ -100,6 +101,19 @@ def test_a_jump_over_a_wall_inside_is_a_warning():
     assert any("goes through other" in text for text in last.warnings)
     lost = moved(case, mesh, Translate("one", (60.0, 0.0)))
     assert "takes one out of the mesh" in clash(*lost)
+
+
+@pytest.mark.parametrize("gone", ["RIGHT", "UPPER"])
+def test_markers_that_are_not_closed_are_no_excuse(square, gone):
+    mesh, case = square
+    markers = tuple(marker for marker in mesh.markers if marker.name != gone)
+    mesh = Mesh(mesh.points, mesh.cells, markers, name=mesh.name)
+    case = case.change(roles={n: role for n, role in case.roles.items() if n != gone})
+    assert "takes BLOCK out of the mesh" in clash(*moved(case, mesh, Translate("BLOCK", (-3, 0.0))))
+    assert "takes BLOCK out of the mesh" in clash(
+        *moved(case, mesh, Translate("BLOCK", (9.0, 7.0)))
+    )
+    assert clash(*moved(case, mesh, Translate("BLOCK", (0.1, 0.2)))) is None
 
 
 def test_a_domain_that_moves_as_a_whole_and_an_outer_wall_are_fine(square):
