@@ -16,7 +16,7 @@ from slideviz.climb import Step
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
 from tools.laws.meshes import images
-from tools.laws.oracle import carried, goals, nodes_with
+from tools.laws.oracle import carried, goals, nodes_with, ways
 from tools.laws.renumber import renumbered
 from tools.laws.surfaces import off_surface
 
@@ -105,8 +105,9 @@ def growth_is_bounded(run: Run, steps: list[Step]) -> Iterator[str]:
     """Yield which node goes much farther than the nodes that are moved."""
     where = goals(run.case, run.mesh)
     nodes = np.array(list(where))
-    asked = np.linalg.norm(np.array(list(where.values())) - run.mesh.points[nodes], axis=1).max()
-    made = np.linalg.norm(steps[-1].mesh.points - run.mesh.points, axis=1)
+    before = run.mesh.points
+    asked = ways(run.period, before[nodes], np.array(list(where.values())), before).max()
+    made = ways(run.period, before, steps[-1].mesh.points, before)
     told = any("times the largest displacement" in text for text in steps[-1].warnings)
     limit = GROWTH if told else REMARKABLE
     if made.max() > limit * asked + ROUND * _magnitude(run):

@@ -32,6 +32,23 @@ def _padded(points: FloatArray) -> FloatArray:
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 
+def ways(
+    period: Period | None, before: FloatArray, after: FloatArray, mesh: FloatArray
+) -> FloatArray:
+    """Return how far points (k, d) go, (k,); turns about an axis count at the mesh's outside.
+
+    So a passage that turns as a whole goes as far as its hub that is asked to turn.
+    """
+    if period is None or not period.angle_deg:
+        return np.linalg.norm(after - before, axis=1)
+    basis = axis_basis(period.axis)
+    a, b, whole = ((_padded(x) - np.array(period.origin)) @ basis.T for x in (before, after, mesh))
+    out = np.hypot(whole[:, 0], whole[:, 1]).max()
+    turn = np.angle((b[:, 0] + 1j * b[:, 1]) * (a[:, 0] - 1j * a[:, 1]))
+    radial = np.hypot(b[:, 0], b[:, 1]) - np.hypot(a[:, 0], a[:, 1])
+    return np.sqrt(radial**2 + (out * turn) ** 2 + (b[:, 2] - a[:, 2]) ** 2)
+
+
 def goals(case: Case, mesh: Mesh) -> dict[int, FloatArray]:
     """Return where each moving node must be in the end, motion by motion."""
     found: dict[int, FloatArray] = {}
