@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, IntArray, Mesh
 
 LARGEST = 1e50
-"""Coordinates are not larger: the products of three or more of them must stay numbers."""
+"""Coordinates that are computed with are not larger: products of several must stay numbers."""
 
 
 def printable(path: str | Path) -> str:
@@ -79,8 +79,8 @@ def check_mesh(mesh: Mesh) -> None:
     Raises
     ------
     MeshError
-        A coordinate is not finite or too large, an element has the wrong dimension or wrong
-        nodes, or two markers have one name.
+        A coordinate is not finite, an element has the wrong dimension or wrong nodes, or two
+        markers have one name.
     """
     check_points(mesh)
     if len(mesh.cells) == 0:
@@ -104,22 +104,35 @@ def check_mesh(mesh: Mesh) -> None:
 
 
 def check_points(mesh: Mesh) -> None:
-    """Do nothing when all coordinates can be computed with.
+    """Do nothing when all coordinates are finite.
 
     Raises
     ------
     MeshError
-        One is NaN or infinite, or larger than ``LARGEST``.
+        One is NaN or infinite.
     """
-    bad = ~(np.abs(mesh.points) <= LARGEST).all(axis=1)
+    bad = ~np.isfinite(mesh.points).all(axis=1)
     if bad.any():
         k = int(np.argmax(bad))
         raise MeshError(
-            f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}, which is "
-            f"{unusable(mesh.points[k])}; correct the file or the displacement that put it there"
+            f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}, which is not finite; "
+            "correct the file or the displacement that put it there"
         )
 
 
-def unusable(values: FloatArray) -> str:
-    """Return in words why nothing can be computed with some coordinates."""
-    return f"larger than {LARGEST:g}" if np.isfinite(values).all() else "not finite"
+def check_size(mesh: Mesh) -> None:
+    """Do nothing when all coordinates are small enough to be computed with.
+
+    Raises
+    ------
+    MeshError
+        One is larger than ``LARGEST``.
+    """
+    # What is not finite is told elsewhere, or makes its cells inverted.
+    bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise MeshError(
+            f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}; nothing can be "
+            f"computed with coordinates larger than {LARGEST:g}, so correct it or scale the mesh"
+        )

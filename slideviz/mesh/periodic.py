@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.errors import MeshError
+from slideviz.mesh.check import check_size
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 
 Kind = Literal["auto", "translational", "rotational"]
@@ -307,7 +308,13 @@ def find_pairs(
     Translations are tried first, then rotations about z, x and y through 0. A guess, to be
     confirmed: the opposite sides of every box match. ``going_on`` is called before each try;
     what it raises ends the search.
+
+    Raises
+    ------
+    MeshError
+        Coordinates are too large to be computed with.
     """
+    check_size(mesh)
     chosen = list(names or mesh.marker_names)
     count = {name: len(mesh.marker(name).nodes) for name in chosen}
     axes = _AXES[:1] if mesh.dim == 2 else _AXES

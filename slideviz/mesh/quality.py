@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import (
     check_cells,
     chunks,
@@ -162,13 +163,15 @@ def quality(
     Raises
     ------
     MeshError
-        The mesh has no cells or unusable ones, or the reference is another mesh.
+        The mesh has no cells or unusable ones, coordinates too large, or the reference is another
+        mesh.
     CaseError
         The metric is unknown.
     """
     if metric not in METRICS:
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")
     check_cells(mesh)
+    check_size(mesh)
     base = mesh if reference is None else _checked(reference, mesh)
     sums = corner_sums(base)
     signs = orientation(mesh.cells, sums)

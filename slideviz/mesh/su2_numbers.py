@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.check import LARGEST, first_fault, unusable
+from slideviz.mesh.check import first_fault
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.mesh.su2_scan import BLOCK_BYTES, Lines, Progress, show, word_bounds
@@ -182,13 +182,11 @@ def parse_points(
         )
     column = column[:, None] + np.arange(dim)
     points = flat[column]
-    usable = np.abs(points) <= LARGEST
-    if not usable.all():
-        k, axis = np.argwhere(~usable)[0].tolist()
+    if not np.isfinite(points).all():
+        k, axis = np.argwhere(~np.isfinite(points))[0].tolist()
         word = lines.line(rows[k]).split()[axis]
-        why = unusable(points[k, axis])
         raise lines.error(
-            rows[k], f"the coordinate {show(word)} is {why}; correct it or mesh again"
+            rows[k], f"the coordinate {show(word)} is not finite; correct it or mesh again"
         )
     begins, ends = np.empty_like(column), np.empty_like(column)
     base = 0

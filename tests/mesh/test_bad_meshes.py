@@ -16,6 +16,8 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, first_fault
 from slideviz.mesh.files import read, write
 from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.quality import quality
 from slideviz.mesh.su2 import read_su2
 from slideviz.mesh.su2_write import su2_blocks
 
@@ -55,7 +57,6 @@ FAULTS = {
         "not followed by MARKER_ELEMS=; line 15 has MARKER_ELEM=, did you mean MARKER_ELEMS=",
     ),
     "misspelt count": ("NPOIN= 6\n", "NPOINT= 6\n", 20, "line 6 has NPOINT=, did you mean NPOIN="),
-    "too large": ("1.1 0.3 1", "1.1 2e150 1", 8, r"the coordinate 2e150 is larger than 1e\+50"),
     "no equals": ("NPOIN= 6\n", "NPOIN 6\n", 20, "has no line NPOIN="),
     "NDIME 1": ("NDIME= 2", "NDIME= 1", 1, "NDIME= 1 is not possible; write 2 or 3"),
     "NDIME 4": ("NDIME= 2", "NDIME= 4", 1, "NDIME= 4 is not possible"),
@@ -576,3 +577,11 @@ def test_cell_data_of_another_length(tmp_path):
             MeshError, match=r"cell data 'q' has shape .*, but the mesh has 1 cells"
         ):
             write(tmp_path / "out.vtu", mesh, cell_data={"q": values})
+
+
+@pytest.mark.parametrize("work", [quality, find_pairs])
+def test_coordinates_too_large_to_compute_with_are_named(tmp_path, work):
+    mesh = read(save(tmp_path, edited(SQUARE, "1.1 0.3 1", "1.1 2e150 1")))
+    match = r"grid.su2: point 1 is at \(1.1, 2e\+150\); nothing can be computed with .* 1e\+50"
+    with pytest.raises(MeshError, match=match):
+        work(mesh)
