@@ -37,6 +37,7 @@ from slideviz.case.model import (
 )
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import ordered_sum
 
 __all__ = [
     "Displacements",
@@ -213,7 +214,7 @@ def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) 
 
 def _centre(point: Point, points: FloatArray) -> FloatArray:
     if point == "centroid":
-        return points.mean(axis=0) if len(points) else np.zeros(points.shape[1])
+        return ordered_sum(points) / max(1, len(points))
     return np.array(point, np.float64)
 
 

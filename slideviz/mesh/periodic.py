@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from slideviz.errors import MeshError
@@ -97,13 +98,28 @@ def axis_basis(axis: Vector) -> FloatArray:
     return np.stack([e1, np.cross(e3, e1), e3])
 
 
+def ordered_sum(values: NDArray) -> NDArray:
+    """Return the sum (d,) of rows (n, d), the same bits in whatever order they are given."""
+    return np.asarray(np.sort(values, axis=0).sum(axis=0))
+
+
+def along(rows: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the components (n, k) of points (n, d) along rows (k, d).
+
+    Added up one by one: a matrix product rounds a point by its place among the others, so that
+    renumbered nodes would have other bits.
+    """
+    parts = [sum(x * value for x, value in zip(points.T, row, strict=True)) for row in rows]
+    return np.stack(parts, axis=1)
+
+
 def in_axis_frame(
     points: FloatArray, axis: Vector = _Z, origin: Vector = (0.0, 0.0, 0.0)
 ) -> FloatArray:
     """Return points (n, d) as coordinates (n, 3) along e1, e2, e3 of the axis from the origin."""
     padded = np.zeros((len(points), 3))
     padded[:, : points.shape[1]] = points
-    return (padded - np.asarray(origin, float)) @ axis_basis(axis).T
+    return along(axis_basis(axis), padded - np.asarray(origin, float))
 
 
 def match(
@@ -166,13 +182,13 @@ def _match_kind(
     axis, origin = (0.0, 0.0, 1.0) if mesh.dim == 2 else frame[0], frame[1]
     vector, angle = np.zeros(mesh.dim), 0.0
     if kind == "translational":
-        vector = xb.mean(axis=0) - xa.mean(axis=0)
+        vector = ordered_sum(xb) / len(b) - ordered_sum(xa) / len(a)
         image, target = xa + vector, xb
     else:
         ya, yb = (in_axis_frame(x, axis, origin) for x in (xa, xb))
         za, zb = (y[:, 0] + 1j * y[:, 1] for y in (ya, yb))
         # A rotation turns the sum of all complex positions by its own angle.
-        angle = float(np.angle(zb.sum() * np.conj(za.sum())))
+        angle = float(np.angle(ordered_sum(zb) * np.conj(ordered_sum(za))))
         turned = za * np.exp(1j * angle)
         image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
     distance, partner = (

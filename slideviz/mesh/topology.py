@@ -101,6 +101,10 @@ def find_boundary(mesh: Mesh) -> Boundary:
     owner = _find_owners(mesh, facets, marker_of)
     facets = _turn_outward(mesh, facets, owner)
     joints, joint_nodes = find_joints(facets, mesh.dim)
+    # The nodes of a joint by position, not by number.
+    nodes, local = np.unique(joint_nodes, return_inverse=True)
+    place = np.argsort(np.lexsort(mesh.points[nodes].T))[local.reshape(joint_nodes.shape)]
+    joint_nodes = np.take_along_axis(joint_nodes, np.argsort(place, axis=1), axis=1)
     return Boundary(
         frozen_array(facets, np.int64),
         frozen_array(marker_of, np.int64),
@@ -266,7 +270,13 @@ def find_fans(
         links.append(np.stack(ends))
     a, b = np.concatenate(links, axis=1) if links else np.empty((2, 0), np.int64)
     fan = components(len(node), a, b)
-    total = int(fan.max(initial=-1)) + 1
+    # By position, so that the fans of a node, and the normals of a fan, are added up in one order
+    # however facets are numbered.
+    order = np.lexsort(points[boundary.facets].mean(axis=1)[facet].T)
+    facet, node, fan = facet[order], node[order], fan[order]
+    _, first, fan = np.unique(fan, return_index=True, return_inverse=True)
+    fan = np.argsort(np.argsort(first))[fan]
+    total = len(first)
     fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
     fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.mesh.periodic import Pair, axis_basis, in_axis_frame
+from slideviz.mesh.periodic import Pair, along, axis_basis, in_axis_frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Frame:
         local[:, 1] = coords[:, 0] * np.sin(angle)
         if self.dim == 3:
             local[:, 2] = coords[:, 2]
-        return (local @ axis_basis(self.axis) + self.origin)[:, : self.dim]
+        return (along(axis_basis(self.axis).T, local) + self.origin)[:, : self.dim]
 
     def difference(self, points: FloatArray, vectors: FloatArray) -> FloatArray:
         """Return Cartesian displacements (n, d) of points (n, d) as frame components (n, d)."""
@@ -116,10 +116,10 @@ class Frame:
         x = self.points(coords)
         if self.direction is None:
             return np.ascontiguousarray(x.T)
-        along = x @ self.direction
-        turn = 2 * np.pi / self.period
-        rows = [np.cos(turn * along) / turn, np.sin(turn * along) / turn]
-        rows.extend(_across(self.direction) @ x.T)
+        angle = 2 * np.pi / self.period * along(self.direction[None], x)[:, 0]
+        size = self.period / (2 * np.pi)
+        rows = [size * np.cos(angle), size * np.sin(angle)]
+        rows.extend(along(_across(self.direction), x).T)
         return np.ascontiguousarray(np.stack(rows))
 
     def shift(self) -> FloatArray:
