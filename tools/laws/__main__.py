@@ -8,12 +8,19 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
+from slideviz.errors import SlidevizError
 from slideviz.mesh.files import write
+from slideviz.staircase import deform
 from tools.laws.cases import random_run
 from tools.laws.check import Outcome, check
 from tools.laws.simplify import simplified
+
+EVERY_LOOP = (58, 6, 34, 25, 38, 76, 99, 1, 95, 35, 59, 60)
+"""Seeds that together use all methods, frames and types of cells."""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -63,7 +70,20 @@ def outcomes(seeds: Sequence[int], jobs: int = 1) -> Iterator[Outcome]:
 
 def of_seed(seed: int) -> Outcome:
     """Return what became of a seed."""
+    _compile()
     return check(random_run(seed))
+
+
+@cache
+def _compile() -> None:
+    """Let Numba compile all loops, once in a process.
+
+    That could take longer than a run may, and an alarm that rings while it compiles can crash it.
+    """
+    for seed in EVERY_LOOP:
+        run = random_run(seed)
+        with suppress(SlidevizError):
+            list(deform(run.case, run.mesh))
 
 
 def save(seed: int, folder: Path, simplify: bool = False) -> Path:
