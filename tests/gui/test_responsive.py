@@ -132,9 +132,9 @@ def test_a_window_that_saves_closes_when_the_mesh_is_written(
     go, target = threading.Event(), tmp_path / "out.su2"
     write = jobs.save_mesh
 
-    def slow(*values):
+    def slow(*values, **named):
         assert go.wait(20)
-        return write(*values)
+        return write(*values, **named)
 
     monkeypatch.setattr(jobs, "save_mesh", slow)
     answers("ask_save", target)
