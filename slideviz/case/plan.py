@@ -21,6 +21,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import AGREE as SAME
 from slideviz.case.motion import displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
+from slideviz.mesh.check import check_size
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -152,12 +153,13 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
         The case does not fit the mesh.
     MeshError
         Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
-        not finite.
+        not finite, or too large to compute with.
     DeformError
         Nothing is known: no node has a prescribed displacement.
     """
     require_valid(case, mesh)
     _require_finite(mesh)
+    check_size(mesh)
     asked, (case, notes) = case, _roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
