@@ -52,7 +52,10 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
         gap = distance(after[nodes], sides)
         beyond = gap > (rounding if flat else CURVED * mesh.extent)
         if beyond.any():
-            gap[beyond] = np.minimum(gap[beyond], _beyond(run, near, before, after[nodes[beyond]]))
+            # Also where the boundary moves that is one period further.
+            for turn in (-1, 0, 1) if free else (0,):
+                at = after[nodes[beyond]] + turn * _shift(run, frame)
+                gap[beyond] = np.minimum(gap[beyond], _beyond(run, near, before, at))
         # A flat surface that ends: its plane to rounding, its rim to what a curve may be off.
         allowed = rounding if flat else CURVED * mesh.extent
         if gap.max() > allowed:
