@@ -17,7 +17,7 @@ from slideviz.baselines.shapes import blocks
 from slideviz.case.check import idle_settings
 from slideviz.case.clash import clash, jump
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case
+from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import AGREE as SAME
 from slideviz.case.motion import displacements, require_valid
 from slideviz.errors import CaseError, DeformError, MeshError
@@ -39,6 +39,9 @@ from slideviz.rbf.projection import Tracks, find_tracks
 
 ROUNDING = 1e-13
 """What displacements in a frame may be off, as a part of the largest coordinate."""
+
+APART = 100.0
+"""How much more images may differ in their displacement than in their place, both relative."""
 
 LOOSE = 0.1
 """A tolerance above this part of the largest displacement leaves much to the correction."""
@@ -172,7 +175,9 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
     moved = _displaced(asked, mesh)
-    known, target, warnings = _prescribed(case, mesh, frame, (boundary, fans, classes), moved)
+    surfaces = boundary, fans, classes
+    alike = _alike(case, mesh, pairs)
+    known, target, warnings = _prescribed(case, mesh, frame, surfaces, moved, alike)
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     reduction = _reduction(case, mesh.extent)
     tracks = find_tracks(
@@ -287,14 +292,32 @@ def find_classes(
     )
 
 
+def _alike(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
+    """Return by which part of the largest displacement those of periodic images may differ.
+
+    Motions displace images alike but for what these are apart; files have few digits.
+    """
+    if any(isinstance(motion, FromFile) for motion in case.motions):
+        return TOLERANCE
+    mismatch = max((pair.mismatch for pair in pairs), default=0.0)
+    return min(TOLERANCE, APART * mismatch / mesh.extent)
+
+
 def _prescribed(
     case: Case,
     mesh: Mesh,
     frame: Frame,
     surfaces: tuple[Boundary, Fans, Classes],
     moved: Displacements,
+    alike: float,
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
-    """Return the known nodes, their displacement in the frame, and warnings."""
+    """Return the known nodes, their displacement in the frame, and warnings.
+
+    Parameters
+    ----------
+    alike
+        By which part of the largest displacement those of images may differ.
+    """
     problem = clash(case, mesh, moved.nodes, moved.vectors)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
@@ -307,9 +330,8 @@ def _prescribed(
         )
     values = np.zeros(mesh.points.shape)
     values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    # Images match to a part of the mesh, and so what a motion makes of them to that part of it.
     largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
-    allowed = TOLERANCE * largest + ROUNDING * float(np.abs(mesh.points).max())
+    allowed = alike * largest + ROUNDING * float(np.abs(mesh.points).max())
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from slideviz.mesh.model import FloatArray, Marker
 from tools.laws.cases import Run
@@ -44,7 +45,10 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
             nodes = np.intersect1d(nodes, not_internal)
         if not len(nodes):
             continue
-        near = [marker, *(m for m in slide if m is not marker and _smooth(run, marker, m, before))]
+        turns = [turn * _shift(run, frame) for turn in ((0, -1, 1) if free else (0,))]
+        rest = [m for m in slide if m is not marker]
+        near = [m for m in rest if any(_smooth(run, marker, m, before, by) for by in turns)]
+        near.insert(0, marker)
         sides = frame.opened(simplices(mesh, near, before))
         flat = _flat(sides, rounding)
         if free:
@@ -70,15 +74,17 @@ def _shift(run: Run, frame: Frame) -> FloatArray:
     return frame.turn if run.period.angle_deg else run.period.vector
 
 
-def _smooth(run: Run, one: Marker, other: Marker, coords: FloatArray) -> bool:
-    """Tell whether two markers share nodes and go on smoothly there."""
-    shared = np.intersect1d(one.nodes, other.nodes)
+def _smooth(run: Run, one: Marker, other: Marker, coords: FloatArray, by: FloatArray) -> bool:
+    """Tell whether a marker and another, shifted ``by`` (d,), share nodes and go on smoothly."""
+    same = 1e-9 * run.mesh.extent
+    gap, _ = cKDTree(coords[other.nodes] + by).query(coords[one.nodes])
+    shared = coords[one.nodes[gap < same]]
     if not len(shared):
         return False
     normals = []
-    for marker in (one, other):
-        sides = simplices(run.mesh, [marker], coords)
-        near = distance_to_any(sides, coords[shared]) < 1e-12 * run.mesh.extent
+    for marker, shift in ((one, 0.0), (other, by)):
+        sides = simplices(run.mesh, [marker], coords) + shift
+        near = distance_to_any(sides, shared) < same
         normals.append(planes(sides[near])[1])
     along = np.abs(normals[0] @ normals[1].T)
     return bool(along.max(initial=0.0) > np.cos(np.radians(SMOOTH_DEG)))
