@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from slideviz.case.bounds import overshoot, unsoundness
+from slideviz.case.bounds import unsoundness
 from slideviz.case.model import Case
 from slideviz.case.plan import Plan
 from slideviz.errors import DeformError, Note, UnsoundError
@@ -150,7 +150,7 @@ class Climb:
         coords, done, index, folded = plan.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *plan.warnings]
         told: list[str] = []
-        worst, beyond = 0.0, False
+        worst = 0.0
         seconds = dict(self.seconds)
         before: Solution | None = None
         while ahead:
@@ -183,9 +183,6 @@ class Climb:
                 told, worst = [_short_warning(plan, solution, index)], solution.max_error
             elif not told:
                 told = _dropped_warning(solution, index, mesh)
-            far = overshoot(plan, mesh, moved, part)
-            warnings += [f"step {index}: {far}"] if far and not beyond else []
-            beyond = beyond or bool(far)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             yield self._made(index, total, points, solution, watch, [*warnings, *told])
             seconds = {}

@@ -32,23 +32,6 @@ def _padded(points: FloatArray) -> FloatArray:
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 
-def ways(
-    period: Period | None, before: FloatArray, after: FloatArray, mesh: FloatArray
-) -> FloatArray:
-    """Return how far points (k, d) go, (k,); turns about an axis count at the mesh's outside.
-
-    So a passage that turns as a whole goes as far as its hub that is asked to turn.
-    """
-    if period is None or not period.angle_deg:
-        return np.linalg.norm(after - before, axis=1)
-    basis = axis_basis(period.axis)
-    a, b, whole = ((_padded(x) - np.array(period.origin)) @ basis.T for x in (before, after, mesh))
-    out = np.hypot(whole[:, 0], whole[:, 1]).max()
-    turn = np.angle((b[:, 0] + 1j * b[:, 1]) * (a[:, 0] - 1j * a[:, 1]))
-    radial = np.hypot(b[:, 0], b[:, 1]) - np.hypot(a[:, 0], a[:, 1])
-    return np.sqrt(radial**2 + (out * turn) ** 2 + (b[:, 2] - a[:, 2]) ** 2)
-
-
 def goals(case: Case, mesh: Mesh) -> dict[int, FloatArray]:
     """Return where each moving node must be in the end, motion by motion."""
     found: dict[int, FloatArray] = {}
@@ -115,6 +98,14 @@ class Frame:
         angle = np.mod(angle + np.pi, 2 * np.pi) - np.pi
         columns = [np.hypot(local[:, 0], local[:, 1]), self._rho * angle, local[:, 2]]
         return np.stack(columns[: self._dim], axis=1)
+
+    def way(self, before: FloatArray, after: FloatArray) -> FloatArray:
+        """Return how far points (n, d) go in these coordinates, by less than half a turn."""
+        step = self.coords(after) - self.coords(before)
+        if self._about is not None:
+            turn = 2 * np.pi * self._rho
+            step[:, 1] -= turn * np.round(step[:, 1] / turn)
+        return step
 
     def on_axis(self, coords: FloatArray) -> np.ndarray:
         """Tell which coordinates (n, d) are on the axis, where the angle means nothing."""
