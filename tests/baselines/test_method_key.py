@@ -30,7 +30,7 @@ def test_the_method_is_read_written_and_rbf_by_default(tmp_path):
         set_key(Case(), "METHOD", "spring")
     with pytest.raises(CaseError, match="above 0"):
         set_key(Case(), "IDW_POWER", "0")
-    with pytest.raises(CaseError, match="above 0"):
+    with pytest.raises(CaseError, match="above 1e-12"):
         set_key(Case(), "IDW_FIXED_WEIGHT", "-1")
 
 

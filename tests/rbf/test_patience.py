@@ -9,6 +9,7 @@ import slideviz as sv
 from slideviz.case.model import Case, Reduction, Translate
 from slideviz.case.samples import write_sample
 from slideviz.cli import run
+from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.patience import LOSSES, Patience
 from tests import builders
@@ -94,22 +95,17 @@ def twice(mesh, shift):
     return Mesh(np.concatenate([mesh.points, mesh.points + shift]), cells, mesh.markers + second)
 
 
-@pytest.mark.parametrize("selection", ["block", "double", "one"])
-@pytest.mark.parametrize("multilevel", [True, False])
-def test_nodes_a_period_apart_that_contradict_each_other_end_the_selection(selection, multilevel):
-    """They are one node for the periodic distance, of which only one can be a control node."""
+def test_nodes_a_period_apart_that_contradict_each_other_are_refused():
+    """They are one node for the periodic distance: no selection could ever meet both."""
     mesh = twice(builders.square(6), (0.0, 1.0))
     case = Case(
         roles={"y_m": "periodic", "y_p": "periodic", "BLOCK_2": "moving"},
         motions=(Translate("BLOCK_2", (0.02, 0.01)),),
         periodic="periodic",
-        reduction=Reduction(relative=1e-4, multilevel=multilevel, selection=selection),
+        reduction=Reduction(relative=1e-4, multilevel=True),
     )
-    (step,) = limited(case, mesh)
-    (told,) = [text for text in step.warnings if re.match(TOLD, text)]
-    assert "the nodes that are left add nothing but rounding to those chosen" in told
-    block = mesh.marker("BLOCK_2").nodes
-    np.testing.assert_allclose(step.mesh.points[block], mesh.points[block] + (0.02, 0.01))
+    with pytest.raises(DeformError, match=r"coincide .* asked to move differently, by 0\.02"):
+        limited(case, mesh)
 
 
 def test_a_limited_number_of_nodes_is_told_once_with_the_largest_error(tmp_path):
