@@ -17,6 +17,10 @@ GROWTH = 5.0
 """How many times as far as the motion reaches no node may go. Interpolation with sliding nodes gets
 to 2 on the thesis's cases, and to 4 around a thin sharp profile that slides."""
 
+TAKEN = 1.5
+"""Sliding boundaries that go farther than so many times the largest displacement have overshot
+themselves: what they do to others is no reason for anything."""
+
 STEEP = 100.0
 """A slope between neighbours explains an overshoot when it is so many times that of the largest
 displacement over the whole mesh."""
@@ -49,7 +53,9 @@ def unsoundness(
     shift = moved - plan.coords
     length = np.linalg.norm(shift, axis=1)
     # Sliding nodes first, for what they do is data to all others.
-    limit = np.full(len(length), GROWTH * _reach(plan, shift, largest, ("moving", "sliding")))
+    limit = np.full(
+        len(length), GROWTH * _reach(plan, shift, largest, ("moving", "fixed", "sliding"))
+    )
     slid = plan.classes.sliding
     limit[slid] = GROWTH * _reach(plan, shift, largest, ("moving",))
     beyond = length > limit
@@ -69,7 +75,8 @@ def _reach(plan: Plan, shift: FloatArray, largest: float, kinds: tuple[str, ...]
     """Return how far the displacement of boundaries of some kinds may carry nodes.
 
     A body that turns or is stretched takes what is smooth around it along, the farther the more:
-    a small profile turned in a large far field, all of it, up to its edge.
+    a small profile turned in a large far field, all of it, up to its edge. So does what slides
+    around a small body.
     """
     chosen = np.zeros(len(shift), bool)
     for kind in kinds:
@@ -78,7 +85,8 @@ def _reach(plan: Plan, shift: FloatArray, largest: float, kinds: tuple[str, ...]
     for index in range(len(plan.boundary.names)):
         nodes = np.unique(plan.boundary.facets[plan.boundary.marker == index])
         nodes = nodes[chosen[nodes]]
-        if len(nodes) > 1:
+        farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
+        if len(nodes) > 1 and farthest <= TAKEN * largest:
             at, moved = plan.coords[nodes], shift[nodes]
             size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
             strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)

@@ -40,13 +40,28 @@ def clash(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str |
     after = np.array(mesh.points)
     after[nodes] += vectors
     for name in case.markers_with("moving"):
-        hit = first_crossing(after, mesh.marker(name).cells, _others(case, mesh, name))
+        hit = _new_crossing(mesh, after, mesh.marker(name).cells, _others(case, mesh, name))
         if hit is not None:
             return (
                 f"the motion puts {name} through {hit.marker} near {_place(hit)}; move {name} "
                 f"less, or let {hit.marker} move with it (role moving, internal or periodic)"
             )
     return _outside(case, mesh, nodes, after)
+
+
+def _new_crossing(
+    mesh: Mesh, after: FloatArray, moved: Cells, others: list[tuple[str, Cells]]
+) -> Crossing | None:
+    """Return where a moved boundary goes through one that it did not cross before.
+
+    Twisted quadrilaterals close to each other do, for each is taken for two triangles.
+    """
+    while (hit := first_crossing(after, moved, others)) is not None:
+        wall = [(name, cells) for name, cells in others if name == hit.marker]
+        if first_crossing(mesh.points, moved, wall) is None:
+            return hit
+        others = [(name, cells) for name, cells in others if name != hit.marker]
+    return None
 
 
 def jump(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
@@ -97,7 +112,9 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     # A surface with holes has no inside.
     if abs(winding(mesh.points, whole, before[:1])[0] - 1.0) > OPEN:
         whole = shell_of(mesh)
-    if not _is_out(whole, after, there):
+    # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
+    there = there[[not _is_out(whole, mesh.points, point[None]) for point in before]]
+    if not len(there) or not _is_out(whole, after, there):
         return False
     far = float(np.linalg.norm(after[facets] - mesh.points[facets], axis=-1).max())
     return all(_is_out(whole, after, image) for image in _images(case, mesh, there, far))
