@@ -26,6 +26,9 @@ round off true corners of the domain."""
 RANK_TOLERANCE = 0.02
 """Sine of the angle (about one degree) from which a further normal counts as independent."""
 
+IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
+"""Cosine of that angle: fans whose normals differ by less are in one plane."""
+
 
 @dataclass(frozen=True, eq=False)
 class Classes:
@@ -216,15 +219,23 @@ def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
 def _cluster(around: _Around, local: IntArray) -> IntArray:
     """Return labels (m,) that join fans of one role whose normals differ by a small angle.
 
-    Also over others between them, so that the order of the fans does not matter.
+    Also over others between them, so that the order of the fans does not matter. Fans in one
+    plane are one whatever their roles: no edge is between them.
     """
-    normals, roles, own = around.normals[local], around.role[local], around.own[local]
-    labels = np.arange(len(normals))
-    for i in range(1, len(normals)):
-        for j in range(i):
-            limit = around.merge if own[i] == own[j] else around.smooth
-            if roles[i] == roles[j] and normals[i] @ normals[j] > limit:
-                labels[labels == labels[i]] = labels[j]
+    roles, own = around.role[local], around.own[local]
+    along = around.normals[local] @ around.normals[local].T
+    alike = roles[:, None] == roles
+    here = own[:, None] == own
+    # Of an image, a fan goes on in the one that is most like it, and no other.
+    there = np.where(alike & ~here, along, -2.0)
+    best = np.zeros_like(here)
+    for image in np.unique(own):
+        column = np.where(own == image, there, -2.0)
+        best[np.arange(len(own)), column.argmax(axis=1)] |= column.max(axis=1) > around.smooth
+    joined = (alike & here & (along > around.merge)) | (best & best.T) | (along > IN_PLANE)
+    labels = np.arange(len(local))
+    for i, j in np.argwhere(np.tril(joined, -1)):
+        labels[labels == labels[i]] = labels[j]
     return np.unique(labels, return_inverse=True)[1]
 
 

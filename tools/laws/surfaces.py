@@ -59,7 +59,7 @@ def off_surface(run: Run, points: FloatArray, rounding: float) -> Iterator[str]:
             # Also where the boundary moves that is one period further.
             for turn in (-1, 0, 1) if free else (0,):
                 at = after[nodes[beyond]] + turn * _shift(run, frame)
-                gap[beyond] = np.minimum(gap[beyond], _beyond(run, near, before, at))
+                gap[beyond] = np.minimum(gap[beyond], _beyond(run, near, frame, at))
         # A flat surface that ends: its plane to rounding, its rim to what a curve may be off.
         allowed = rounding if flat else CURVED * mesh.extent
         if gap.max() > allowed:
@@ -104,20 +104,18 @@ def _flat(sides: FloatArray, rounding: float) -> bool:
     return bool(np.abs(middle @ normal).max() <= rounding)
 
 
-def _beyond(run: Run, near: list[Marker], coords: FloatArray, x: FloatArray) -> FloatArray:
+def _beyond(run: Run, near: list[Marker], frame: Frame, x: FloatArray) -> FloatArray:
     """Return how far points (m, d) are from the planes at rims of moving boundaries."""
     moving = nodes_with(run.case, run.mesh, "moving")
     rim = np.intersect1d(np.concatenate([m.nodes for m in near]), moving)
     if not len(rim):
         return np.full(len(x), np.inf)
-    where = goals(run.case, run.mesh)
-    nodes = np.array(list(where))
-    reach = np.linalg.norm(np.array(list(where.values())) - run.mesh.points[nodes], axis=1).max()
+    coords, where = frame.coords(run.mesh.points), goals(run.case, run.mesh)
+    ways = frame.way(run.mesh.points[list(where)], np.array(list(where.values())))
+    reach = np.linalg.norm(ways, axis=1).max()
     sides = simplices(run.mesh, near, coords)
     sides = sides[distance_to_any(sides, coords[rim]) == 0.0]
     foot, normal = planes(sides)
     height = np.abs(np.einsum("smd,sd->sm", x[None] - foot[:, None], normal))
     to_rim = distance(x, sides)
-    # In the frame of a rotation displacements are longer, by the reference radius over r.
-    stretch = float(np.ptp(coords, axis=0).max()) / run.mesh.extent
-    return np.where(to_rim <= REACH * max(1.0, stretch) * reach, height.min(axis=0), np.inf)
+    return np.where(to_rim <= REACH * reach, height.min(axis=0), np.inf)
