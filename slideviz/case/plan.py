@@ -15,33 +15,26 @@ from slideviz.baselines.elastic import deform_elastic
 from slideviz.baselines.idw import Weights, deform_idw
 from slideviz.baselines.shapes import blocks
 from slideviz.case.check import idle_settings
-from slideviz.case.clash import clash, jump
-from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile
-from slideviz.case.motion import AGREE as SAME
-from slideviz.case.motion import displacements, require_valid
-from slideviz.errors import CaseError, DeformError, MeshError
+from slideviz.case.classes import find_classes, find_period, roles_of_copies
+from slideviz.case.model import Case
+from slideviz.case.motion import require_valid
+from slideviz.case.prescribed import alikeness, displaced, prescribed
+from slideviz.errors import MeshError
 from slideviz.mesh.check import check_size
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import TOLERANCE, Pair, pair_up
+from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
-from slideviz.rbf.classify import Classes, classify, directions, fan_roles
+from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
-from slideviz.rbf.frames import Frame, make_frame
-from slideviz.rbf.images import COINCIDENT, find_images, require_free, spread
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.images import COINCIDENT
 from slideviz.rbf.methods import METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
-
-ROUNDING = 1e-13
-"""What displacements in a frame may be off, as a part of the largest coordinate."""
-
-APART = 100.0
-"""How much more images may differ in their displacement than in their place, both relative."""
 
 LOOSE = 0.1
 """A tolerance above this part of the largest displacement leaves much to the correction."""
@@ -163,7 +156,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     require_valid(case, mesh)
     _require_finite(mesh)
     check_size(mesh)
-    asked, (case, notes) = case, _roles_of_copies(case, mesh)
+    asked, (case, notes) = case, roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
     pairs, frame, stands = find_period(case, mesh, boundary)
@@ -174,10 +167,10 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     classes = replace(classes, beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    moved = _displaced(asked, mesh)
+    moved = displaced(asked, mesh)
     surfaces = boundary, fans, classes
-    alike = _alike(case, mesh, pairs)
-    known, target, warnings = _prescribed(case, mesh, frame, surfaces, moved, alike)
+    alike = alikeness(case, mesh, pairs)
+    known, target, warnings = prescribed(case, mesh, frame, surfaces, moved, alike)
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     reduction = _reduction(case, mesh.extent)
     tracks = find_tracks(
@@ -243,147 +236,6 @@ def _require_finite(mesh: Mesh) -> None:
             f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
             f"({len(bad)} nodes are not), so correct the mesh"
         )
-
-
-def find_period(
-    case: Case, mesh: Mesh, boundary: Boundary
-) -> tuple[tuple[Pair, ...], Frame, IntArray]:
-    """Return the periodic pairs, the frame, and which of its images stands for each node (n,).
-
-    Raises
-    ------
-    MeshError
-        Periodic markers do not match.
-    """
-    pairs = _pairs(case, without_halo(mesh)[0])
-    alike = case.periodic != "none"
-    inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
-    frame = make_frame(inside, pairs, periodic_distance=alike)
-    coords = frame.coords(mesh.points)
-    stands = find_images(pairs if alike else (), frame, coords, boundary.nodes, mesh.extent)
-    return pairs, frame, stands
-
-
-def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
-    """Return the periodic pairs; none are looked for when periodicity is not asked for.
-
-    With PERIODIC_MODE= none a rotational case still works in the cylindrical frame, which its
-    pairs give; there markers that do not match are no mistake.
-    """
-    names = case.markers_with("periodic")
-    if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
-        return ()
-    return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
-
-
-def find_classes(
-    case: Case, mesh: Mesh, surfaces: tuple[Boundary, Fans], frame: Frame, stands: IntArray
-) -> Classes:
-    """Return the classes of all nodes, given which of its images stands for each (n,)."""
-    boundary, fans = surfaces
-    normals = fan_normals(boundary, fans, mesh.points)
-    return classify(
-        fans,
-        fan_roles(boundary, fans, case.roles),
-        frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
-        stands,
-        (case.sliding, case.periodic),
-        case.feature_angle_deg,
-    )
-
-
-def _alike(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
-    """Return by which part of the largest displacement those of periodic images may differ.
-
-    Motions displace images alike but for what these are apart; files have few digits.
-    """
-    if any(isinstance(motion, FromFile) for motion in case.motions):
-        return TOLERANCE
-    mismatch = max((pair.mismatch for pair in pairs), default=0.0)
-    return min(TOLERANCE, APART * mismatch / mesh.extent)
-
-
-def _prescribed(
-    case: Case,
-    mesh: Mesh,
-    frame: Frame,
-    surfaces: tuple[Boundary, Fans, Classes],
-    moved: Displacements,
-    alike: float,
-) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
-    """Return the known nodes, their displacement in the frame, and warnings.
-
-    Parameters
-    ----------
-    alike
-        By which part of the largest displacement those of images may differ.
-    """
-    problem = clash(case, mesh, moved.nodes, moved.vectors)
-    if problem:
-        raise CaseError(f"{mesh.name}: {problem}")
-    remark = jump(case, mesh, moved.nodes, moved.vectors)
-    boundary, fans, classes = surfaces
-    known = np.concatenate([classes.moving, classes.fixed])
-    if not len(known):
-        raise DeformError(
-            f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
-        )
-    values = np.zeros(mesh.points.shape)
-    values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
-    allowed = alike * largest + ROUNDING * float(np.abs(mesh.points).max())
-    values, source = spread(values, moved.nodes, classes.stands, allowed)
-    follow = np.setdiff1d(classes.moving, moved.nodes)
-    if len(follow):
-        alone = find_classes(case, mesh, (boundary, fans), frame, np.arange(len(values)))
-        coords = frame.coords(mesh.points)
-        corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
-        normals = fan_normals(boundary, fans, coords, corners)
-        require_free(values, source, follow, (alone, normals), allowed)
-    return known, values[known], (*moved.warnings, *((remark,) if remark else ()))
-
-
-def _roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
-    """Return the case with the role of its donors for each side that only follows, and notes."""
-    roles, notes = dict(case.roles), []
-    for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
-        own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
-        roles[copy] = other
-        if own != other:
-            notes.append(
-                f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
-                f"its own role ({own}) has no effect"
-            )
-    return case.change(roles=roles), tuple(notes)
-
-
-def _displaced(case: Case, mesh: Mesh) -> Displacements:
-    """Return what moving nodes are asked for, with copies in the domain, and none beyond its sides.
-
-    Raises
-    ------
-    CaseError
-        A copy is asked to move otherwise than the node that it is a copy of.
-    """
-    moved, halo = displacements(case, mesh), mesh.halo
-    if halo is None:
-        return moved
-    asked = np.zeros_like(mesh.points)
-    asked[moved.nodes] = moved.vectors
-    follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
-    gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
-    gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
-    if gap.max(initial=0.0) > SAME * mesh.extent:
-        k = int(np.argmax(gap))
-        raise CaseError(
-            f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "
-            f"{halo.donors[k]}, whose copy it is by the mesh's halo, by {gap[k]:.3g}; a boundary "
-            "that moves must move alike on both periodic sides"
-        )
-    asked[halo.receivers] = follows
-    with_copies = np.union1d(moved.nodes, halo.receivers[np.isin(halo.donors, moved.nodes)])
-    nodes = np.setdiff1d(with_copies, halo.outer)
-    return replace(moved, nodes=nodes, vectors=asked[nodes])
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:

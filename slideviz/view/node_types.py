@@ -104,7 +104,7 @@ class NodeTypes:
         return self._types[1]
 
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
-        from slideviz.case.plan import find_classes, find_period
+        from slideviz.case.classes import find_classes, find_period
 
         if not mesh.markers:
             return NOTHING

@@ -1,0 +1,75 @@
+"""Which nodes of a mesh may do what, by the roles of a case: period, frame and classes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.mesh.halo import without_halo
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.periodic import Pair, pair_up
+from slideviz.mesh.topology import Boundary, Fans, fan_normals
+from slideviz.rbf.classify import Classes, classify, fan_roles
+from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.images import find_images
+
+
+def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
+    """Return the case with the role of its donors for each side that only follows, and notes."""
+    roles, notes = dict(case.roles), []
+    for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
+        own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
+        roles[copy] = other
+        if own != other:
+            notes.append(
+                f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "
+                f"its own role ({own}) has no effect"
+            )
+    return case.change(roles=roles), tuple(notes)
+
+
+def find_period(
+    case: Case, mesh: Mesh, boundary: Boundary
+) -> tuple[tuple[Pair, ...], Frame, IntArray]:
+    """Return the periodic pairs, the frame, and which of its images stands for each node (n,).
+
+    Raises
+    ------
+    MeshError
+        Periodic markers do not match.
+    """
+    pairs = _pairs(case, without_halo(mesh)[0])
+    alike = case.periodic != "none"
+    inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
+    frame = make_frame(inside, pairs, periodic_distance=alike)
+    coords = frame.coords(mesh.points)
+    stands = find_images(pairs if alike else (), frame, coords, boundary.nodes, mesh.extent)
+    return pairs, frame, stands
+
+
+def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
+    """Return the periodic pairs; none are looked for when periodicity is not asked for.
+
+    With PERIODIC_MODE= none a rotational case still works in the cylindrical frame, which its
+    pairs give; there markers that do not match are no mistake.
+    """
+    names = case.markers_with("periodic")
+    if not names or (case.periodic == "none" and case.periodic_type != "rotational"):
+        return ()
+    return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)
+
+
+def find_classes(
+    case: Case, mesh: Mesh, surfaces: tuple[Boundary, Fans], frame: Frame, stands: IntArray
+) -> Classes:
+    """Return the classes of all nodes, given which of its images stands for each (n,)."""
+    boundary, fans = surfaces
+    normals = fan_normals(boundary, fans, mesh.points)
+    return classify(
+        fans,
+        fan_roles(boundary, fans, case.roles),
+        frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
+        stands,
+        (case.sliding, case.periodic),
+        case.feature_angle_deg,
+    )
