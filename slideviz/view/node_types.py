@@ -104,10 +104,11 @@ class NodeTypes:
         return self._types[1]
 
     def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
-        from slideviz.case.classes import find_classes, find_period
+        from slideviz.case.classes import find_classes, find_period, roles_of_copies
 
         if not mesh.markers:
             return NOTHING
+        case, _ = roles_of_copies(case, mesh)
         boundary, angle = boundary_of(mesh), case.feature_angle_deg
         if self._fans is None or self._fans[:2] != (mesh, angle):
             self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
