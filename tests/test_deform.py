@@ -269,7 +269,7 @@ def test_an_odd_number_of_periodic_markers_is_told():
 def test_pairs_of_different_periods_are_told():
     mesh = builders.square(6)
     sides = dict.fromkeys(("x_m", "x_p", "y_m", "y_p"), "periodic")
-    with pytest.raises(MeshError, match="differ; one period is possible"):
+    with pytest.raises(MeshError, match="differ; only one period is possible"):
         next(sv.deform(periodic_case(mesh).change(roles=roles(mesh, **sides)), mesh))
 
 

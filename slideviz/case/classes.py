@@ -20,6 +20,11 @@ def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
     for copy, origin in mesh.halo.sides if mesh.halo is not None else ():
         own, other = (case.roles.get(name, "fixed") for name in (copy, origin))
         roles[copy] = other
+        if own == other == "periodic" and case.periodic == "none":
+            notes.append(
+                f"{copy} follows {origin} all the same, whose copy it is by the mesh's "
+                "SEND_RECEIVE markers"
+            )
         if own != other:
             notes.append(
                 f"{copy} follows {origin}, whose copy it is by the mesh's SEND_RECEIVE markers; "

@@ -281,15 +281,15 @@ def _loose(case: Case, reduction: Reduction | None, largest: float, extent: floa
         return []
     assert case.reduction is not None
     whole, part = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
-    remedy = f"use DATA_RED_RELATIVE= {part}"
+    remedy = f"use DATA_RED_RELATIVE= {part} or less"
     if not case.reduction.relative:
-        remedy = f"use DATA_RED_TOLERANCE= {whole}, or DATA_RED_RELATIVE= {part},"
+        remedy = f"use DATA_RED_TOLERANCE= {whole} or less (or DATA_RED_RELATIVE= {part})"
     is_, so = "not below", "no control node is needed to meet it, and only the cells"
     if reduction.tolerance < largest:
         is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"
     sentence = (
         f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
         f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
-        f"invert them; {remedy} (a hundredth of the displacement) or less"
+        f"invert them; {remedy}, a hundredth of the displacement"
     )
     return [sentence]

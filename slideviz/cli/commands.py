@@ -61,7 +61,7 @@ def info(arguments: argparse.Namespace) -> int:
     if report["unused_points"]:
         print(f"  {report['unused_points']} points belong to no cell")
     if mesh.halo is not None:
-        print(f"  {mesh.halo.describe()}; they follow the cells that they are copies of")
+        print(f"  {mesh.halo.describe()}")
     for remark in mesh.remarks:
         print(f"  {remark}")
     print("markers:" if mesh.markers else "no markers")

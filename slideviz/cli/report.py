@@ -44,6 +44,8 @@ def run_report(
     return {
         "case": str(case.source or ""),
         "mesh": str(case.mesh_file or ""),
+        "zone": mesh.zone,
+        "zones": mesh.zones,
         "method": case.method,
         "sliding": case.sliding,
         "periodic": case.periodic,

@@ -86,8 +86,10 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
     from slideviz.cli.places import Output, require_places
+    from slideviz.mesh.inputs import same_file
 
     assert case.mesh_file is not None
+    may_force = not arguments.force and same_file(output, case.mesh_file)
     mesh = Output(
         output,
         "-o" if arguments.output else "MESH_OUT_FILENAME" if case.mesh_out else "without -o",
@@ -95,7 +97,7 @@ def _require_places(
         is_mesh=True,
         replaces=case.mesh_file if arguments.force else None,
         remedy="choose another name with -o or MESH_OUT_FILENAME"
-        + ("" if arguments.force else ", or say --force to write over it"),
+        + (", or say --force to write over it" if may_force else ""),
     )
     if arguments.picture:
         from slideviz.view.pictures.offscreen import check_png, check_size
@@ -198,7 +200,8 @@ def _print_run(report: dict, found: tuple[Quality, Quality], files: dict[str, Pa
     counts, spent = report["node_counts"], report["seconds"]
     method = "" if report["method"] == "rbf" else f"method {report['method']}, "
     print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
-    print(f"sliding {report['sliding']}, periodic {report['periodic']}")
+    zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
+    print(f"sliding {report['sliding']}, periodic {report['periodic']}{zone}")
     print(quality_lines(*found))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from qtpy.QtCore import QByteArray, QEvent, QObject, Qt, QTimer
-from qtpy.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
+from qtpy.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.dock_tabs import DockTabs
 from slideviz.gui.panels.boundaries import BoundariesPanel
@@ -117,6 +117,8 @@ class Docks(QObject):
         # A window once made small must not leave names and fields cut off for ever.
         if row.area != BOTTOM:
             dock.setMinimumWidth(self.least[row.area])
+        # What is typed must not end in a field that is hidden behind another tab.
+        dock.visibilityChanged.connect(lambda shown: None if shown else _leave(dock))
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
 
@@ -226,3 +228,10 @@ class Docks(QObject):
         at = self.window.focusWidget()
         if at is None or not dock.isAncestorOf(at):
             dock.widget().setFocus()
+
+
+def _leave(dock: QDockWidget) -> None:
+    """Take the keyboard from a dock that is not seen."""
+    field = QApplication.focusWidget()
+    if field is not None and dock.isAncestorOf(field):
+        field.clearFocus()

@@ -259,6 +259,8 @@ class Files(QObject):
             return False
         source = session.case.source
         default = source or self.folder() / f"{self.stem()}.cfg"
+        if sample_folder() in default.parents:
+            default = self.folder() / default.name
         path = dialogs.ask_save(self.window, "Save case", default, dialogs.CASE_FILTERS)
         if path is None:
             return False

@@ -241,7 +241,7 @@ class MainWindow(QMainWindow):
             cells = f"{len(mesh.cells):,} cells{halo}"
             size, box = box_words(mesh)
             self.mesh_text.setText(f"{mesh.dim}D   {cells}   {len(mesh.points):,} points   {size} ")
-            about = "" if mesh.halo is None else f"{mesh.halo.describe().capitalize()}.\n"
+            about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
             self.mesh_text.setToolTip(about + box)
 
     def show_opened(self, opened: jobs.Opened) -> None:

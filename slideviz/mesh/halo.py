@@ -80,9 +80,11 @@ class Halo:
 
     def describe(self) -> str:
         """Return the size of the halo in words."""
+        sides = ", ".join(f"{copy} of {origin}" for copy, origin in self.sides)
+        more = f"; of the boundaries, {sides} is a copy" if sides else ""
         return (
             f"a halo of {np.count_nonzero(self.cells)} cells and {len(self.outer)} nodes beyond "
-            "the periodic sides"
+            f"the periodic sides{more}"
         )
 
 

@@ -310,7 +310,8 @@ def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
     """Return the error for two pairs that have different transformations."""
     return MeshError(
         f"{mesh.name}: the periodic pairs {one.first!r}, {one.second!r} ({one.describe()}) and "
-        f"{other.first!r}, {other.second!r} ({other.describe()}) differ; one period is possible"
+        f"{other.first!r}, {other.second!r} ({other.describe()}) differ; only one period is "
+        "possible, so give the others another role"
     )
 
 

@@ -183,10 +183,11 @@ class _Walk:
         except UnicodeDecodeError:
             name = ""
         if not name or not name.isprintable():
+            what = "has control characters" if name else "is empty or not UTF-8 text"
+            remedy = "" if name else ", or save the file as UTF-8"
             raise self.lines.error(
                 section.line,
-                f"the marker name '{show(section.value)}' is empty or not UTF-8 text; rename the "
-                "marker, or save the file as UTF-8",
+                f"the marker name '{show(section.value)}' {what}; rename the marker{remedy}",
             )
         return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
 

@@ -30,6 +30,7 @@ FIELDS: dict[str, tuple[str, Mapping[str, str]]] = {
     "STEPS": ("Steps", {"auto": "automatic"}),
     "DATA_REDUCTION": ("Data reduction", SWITCH_WORDS),
     "DATA_RED_TOLERANCE": ("Tolerance", {}),
+    "DATA_RED_RELATIVE": ("a relative tolerance of a case file,", {}),
     "INFLUENCE_FACTOR": ("Support radius ×", {}),
     "RBF_KERNEL": ("Kernel", {}),
     "FEATURE_ANGLE": ("Feature angle", {}),
@@ -44,7 +45,9 @@ FIELDS: dict[str, tuple[str, Mapping[str, str]]] = {
 """By key: what the window calls it, and its values."""
 
 # A key, and its value where one follows; of a file, "DATA_REDUCTION= YES" is one thing.
-_KEY = re.compile(rf"\b({'|'.join(sorted(FIELDS, key=len, reverse=True))})\b(?:=(?:\s?([\w-]+))?)?")
+_KEY = re.compile(
+    rf"\b({'|'.join(sorted(FIELDS, key=len, reverse=True))})\b(?:=(?:\s?([\w.+-]*\w))?)?"
+)
 
 
 def in_window_words(text: str) -> str:

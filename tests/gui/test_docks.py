@@ -312,3 +312,15 @@ def test_no_tab_is_left_over_the_panels(tmp_path):
     every.append(["Runs", "Sections", "Display"])
     said = done.stdout.strip().splitlines()
     assert said == [str(every)] * 4, "twice at the start, and after the layout was put back"
+
+
+def test_a_field_behind_another_tab_gets_no_keys(method, driver, qtbot):
+    # What was typed after a click on the tab Motion went into the tolerance, which nobody saw.
+    docks = driver.window.docks_.by_name
+    field = method.findChild(NumberField)
+    field.setFocus()
+    assert docks["method"].isAncestorOf(QApplication.focusWidget())
+    docks["motion"].raise_()
+    qtbot.waitUntil(
+        lambda: not docks["method"].isAncestorOf(QApplication.focusWidget() or driver.window)
+    )

@@ -91,8 +91,13 @@ def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
             replace(m, path=moved.get(m.path, m.path)) if isinstance(m, FromFile) else m
             for m in case.motions
         )
-        file = case.mesh_file
-        return case.change(motions=motions, mesh_file=moved.get(file, file) if file else None)
+        file, out = case.mesh_file, case.mesh_out
+        if file is None or file not in moved:
+            return case.change(motions=motions)
+        new = moved[file]
+        if out is not None and out.parent == file.parent:
+            out = new.with_name(f"{new.stem}_deformed{out.suffix}")
+        return case.change(motions=motions, mesh_file=new, mesh_out=out)
 
     return replace(
         session,
