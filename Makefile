@@ -10,7 +10,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format bench laws shots study clean
+.PHONY: help setup demo test test-all lint format golden bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -38,6 +38,9 @@ format: setup ## let ruff put right what it can
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+golden: setup ## record what users get, which test-all compares (PARTS="films window")
+	$(BIN)/python -m tests.golden.record $(PARTS)
+
 bench: setup ## measure the speed (needs a quiet machine)
 	$(PYTEST) tests/benchmarks -o python_files="bench_*.py test_*.py" --benchmark-only $(ARGS)
 
@@ -52,5 +55,5 @@ study: setup ## the thesis's cases into study/: tables, plots, pictures (ARGS=--
 
 clean: ## remove what was built, the virtual environment and demo/ included
 	rm -rf .venv demo study build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
-		.import_linter_cache
+		.import_linter_cache tests/golden/new
 	find slideviz tests -name __pycache__ -prune -exec rm -rf {} +
