@@ -20,10 +20,11 @@ ROUGH = {"condition": 0.5}
 SHORT = 6
 """Significant digits from which on the last one of a printed number may be another by one."""
 
-BLUR, LEVELS, SPOT = 2, 22, 6
-"""Pictures are blurred by so many pixels; then so many pixels may differ by more than so many of
-255 levels. Edges and letters that are smoothed in another way stay below, a number that is missing
-on an axis does not."""
+BLUR, NEAR, LEVELS, SPOT = 1.5, 3, 22, 6
+"""Pictures are blurred by so many pixels; then a pixel differs that is darker or brighter than all
+of the other picture in a square so wide around it, by more than so many of 255 levels; and so many
+may. Edges and letters that are smoothed or placed in another way stay below, a number on an axis
+that is missing or another does not."""
 
 LISTED = 12
 """Lines of a difference that are told."""
@@ -72,7 +73,7 @@ def lines_alike(old: str, now: str) -> bool:
     if old == now:
         return True
     first, second = _NUMBER.findall(old), _NUMBER.findall(now)
-    if len(first) != len(second):
+    if len(first) != len(second) or not first:
         return False
     # Columns are as wide as their numbers are.
     words = (" ".join(_NUMBER.sub("#", line).split()) for line in (old, now))
@@ -98,11 +99,22 @@ def numbers_alike(old: str, now: str, relative: float = RELATIVE) -> bool:
 
 def pixels_apart(kept: Image.Image, new: Image.Image) -> np.ndarray:
     """Return where two pictures of one size differ to the eye, (height, width) of bool."""
-    blurred = (
-        np.asarray(image.convert("RGB").filter(ImageFilter.BoxBlur(BLUR)), dtype=np.int16)
-        for image in (kept, new)
+    first, second = (
+        image.convert("RGB").filter(ImageFilter.BoxBlur(BLUR)) for image in (kept, new)
     )
-    return np.abs(next(blurred) - next(blurred)).max(axis=2) > LEVELS
+    return np.maximum(_beyond(first, second), _beyond(second, first)) > LEVELS
+
+
+def _beyond(image: Image.Image, other: Image.Image) -> np.ndarray:
+    """Return how far a picture leaves what the other one has near by, (height, width)."""
+    low, here, high = (
+        np.asarray(shown, dtype=np.int16)
+        for shown in (
+            *(other.filter(ImageFilter.MinFilter(NEAR)), image),
+            other.filter(ImageFilter.MaxFilter(NEAR)),
+        )
+    )
+    return np.maximum(low - here, here - high).max(axis=2)
 
 
 def picture_difference(kept: Image.Image, new: Image.Image) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shlex
@@ -25,6 +26,9 @@ DIGITS = 12
 
 BLOCKS = 8
 """Parts of a mesh whose coordinates are summed up for themselves."""
+
+CHANCE = ("second", "condition")
+"""Words in the heads of columns whose numbers are others in every run."""
 
 _LONG = re.compile(r"-?\d+\.\d+(?:e[-+]\d+)?")
 _SECONDS = re.compile(r"\b\d+\.\d+ s\b( \(.*\))?")
@@ -69,20 +73,17 @@ class Desk:
         elif path.suffix in (".svg", ".pdf"):
             lines = facts(path)
         elif path.suffix == ".csv":
-            lines = without_seconds(path.read_text())
+            lines = steady(path.read_text())
         elif path.suffix == ".json":
             lines = list(flat(json.loads(path.read_text())))
         else:
             lines = path.read_text().splitlines()
         self.lines += [f"  {tidy(line)}".rstrip() for line in lines]
 
-    def picture(
-        self, path: Path | str, name: str = "", part: float = 1.0, width: float = 1.0
-    ) -> None:
-        """Keep a picture, made smaller to a part of its size, or the left part of its width."""
+    def picture(self, path: Path | str, name: str = "", part: float = 1.0) -> None:
+        """Keep a picture; ``part`` is the size that it gets."""
         with Image.open(path) as image:
-            left = image.crop((0, 0, round(width * image.width), image.height))
-            keep_picture(left, self.folder / f"{name or Path(path).stem}.png", part)
+            keep_picture(image, self.folder / f"{name or Path(path).stem}.png", part)
 
     def close(self, name: str) -> None:
         """Put what was written down into a file."""
@@ -125,11 +126,11 @@ def flat(value: Any, name: str = "") -> Iterator[str]:
         yield tidy(f"{name} = {json.dumps(value)}")
 
 
-def without_seconds(table: str) -> list[str]:
-    """Return the rows of a table with commas, without those columns that have seconds."""
-    rows = [line.split(",") for line in table.splitlines()]
-    left = [at for at, head in enumerate(rows[0]) if "second" not in head]
-    return [",".join(row[at] for at in left if at < len(row)) for row in rows]
+def steady(table: str) -> list[str]:
+    """Return the rows of a table with commas, without those columns that no two runs share."""
+    rows = list(csv.reader(table.splitlines()))
+    left = [at for at, head in enumerate(rows[0]) if not any(word in head for word in CHANCE)]
+    return [" , ".join(row[at] for at in left) for row in rows]
 
 
 def untimed(lines: list[str]) -> list[str]:
@@ -162,7 +163,7 @@ def mesh_lines(text: str) -> Iterator[str]:
     yield f"{count} nodes, {len(lines)} lines; all but coordinates has the checksum {checksum}"
     yield f"from {words(low)} to {words(high)}"
     weights = 1.0 + np.arange(count) * 0.6180339887498949 % 1.0
-    for part in np.array_split(np.arange(count), BLOCKS):
+    for part in np.array_split(np.arange(count), min(count, BLOCKS)):
         sums = (weights[part, None] * points[part] / extent).mean(axis=0)
         yield f"nodes {part[0]} to {part[-1]}: {words(sums)}"
 

@@ -61,6 +61,7 @@ def main(folder: Path) -> None:
 
 def photograph(desk: Desk, window, name: str) -> None:
     """Keep a small picture of the window as the screen shows it."""
+    window.statusBar().clearMessage()  # it goes by itself after a while
     path = desk.folder / "large.png"
     with Image.open(shots.photograph(window, path)) as image:
         keep_picture(image, desk.folder / f"{name}.png", SMALL)
