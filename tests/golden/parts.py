@@ -54,9 +54,9 @@ MORE_METHODS: tuple[tuple[str, ...], ...] = (
     *((f"RBF_KERNEL={name}",) for name in ("wendland-c0", "wendland-c4", "wendland-c6")),
     *((f"RBF_KERNEL={name}",) for name in ("ctps-c0", "ctps-c1", "ctps-c2a", "ctps-c2b")),
     ("RBF_KERNEL=thin-plate",),
-    # Wide ones make systems that amplify rounding.
+    # Wide ones make systems that amplify rounding; that of `quadric` is singular.
     *((f"RBF_KERNEL={name}", "INFLUENCE_FACTOR=0.2") for name in ("gaussian", "multiquadric")),
-    *((f"RBF_KERNEL={name}", "INFLUENCE_FACTOR=0.2") for name in ("quadric", "inverse-quadric")),
+    ("RBF_KERNEL=inverse-quadric", "INFLUENCE_FACTOR=0.2"),
     ("RBF_KERNEL=inverse-multiquadric", "INFLUENCE_FACTOR=0.2"),
 )
 """These on one sample in 2D only."""
@@ -374,5 +374,5 @@ PARTS: dict[str, Callable[[Desk], None]] = {
 }
 """By name, which is that of the folder in ``kept/``."""
 
-QUICK = ("texts", "mistakes", "reports")
+QUICK = ("texts", "reports")
 """Parts that the fast tests compare, too."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from io import BytesIO
 
 import numpy as np
@@ -29,6 +30,7 @@ def painted(image, box, colour):
     return changed
 
 
+@cache
 def plot(labels="0.0 0.2 0.4 0.6 0.8 1.0", **rules):
     """Return a small plot with letters, lines and cells."""
     with rc_context(rules):
