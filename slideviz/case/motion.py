@@ -53,6 +53,12 @@ __all__ = [
 AGREE = 1e-9
 """Largest difference, as a part of the mesh's extent, of two displacements of one node."""
 
+ALIKE = 1e-6
+"""The same as a part of the largest displacement."""
+
+ROUNDING = 1e-13
+"""What displacements may be off, as a part of the largest coordinate."""
+
 Files = Mapping[tuple[Path, Target], Displacements]
 
 
@@ -79,7 +85,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     owner = np.repeat(np.arange(len(names)), [len(on[name]) for name in names])[order]
     nodes = nodes[order]
     first = np.searchsorted(nodes, nodes)
-    apart = np.abs(stacked - stacked[first]).max(axis=1, initial=0.0) > AGREE * mesh.extent
+    apart = np.abs(stacked - stacked[first]).max(axis=1, initial=0.0) > same(stacked, mesh)
     if apart.any():
         rows = np.flatnonzero(apart)
         pairs = np.stack([owner[first[rows]], owner[rows]], axis=1)
@@ -121,6 +127,13 @@ def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, I
     _, first = np.unique(np.concatenate([on[name] for name in points]), return_index=True)
     centre = np.concatenate(list(points.values()))[first].mean(axis=0)
     return replace(motion, point=tuple(centre.tolist()))
+
+
+def same(vectors: FloatArray, mesh: Mesh) -> float:
+    """Return by how much two displacements of one node may differ, given all of them (k, d)."""
+    largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+    rounding = ROUNDING * float(np.abs(mesh.points).max())
+    return min(AGREE * mesh.extent, ALIKE * largest) + rounding
 
 
 def moved_points(

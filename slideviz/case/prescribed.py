@@ -10,7 +10,7 @@ from slideviz.case.clash import clash, jump
 from slideviz.case.classes import find_classes
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
-from slideviz.case.motion import AGREE, displacements
+from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import TOLERANCE, Pair
@@ -20,9 +20,6 @@ from slideviz.rbf.axis import on_axis
 from slideviz.rbf.classify import Classes
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import require_free, spread
-
-ROUNDING = 1e-13
-"""What displacements in a frame may be off, as a part of the largest coordinate."""
 
 APART = 100.0
 """How much more images may differ in their displacement than in their place, both relative."""
@@ -44,7 +41,7 @@ def displaced(case: Case, mesh: Mesh) -> Displacements:
     follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
     gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
     gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
-    if gap.max(initial=0.0) > AGREE * mesh.extent:
+    if gap.max(initial=0.0) > same(moved.vectors, mesh):
         k = int(np.argmax(gap))
         raise CaseError(
             f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "
