@@ -188,6 +188,8 @@ def test_interrupted_it_leaves_nothing_and_says_so(case, tmp_path):
         stdout=subprocess.DEVNULL,
         stderr=terminal,
         start_new_session=True,
+        # A shell lets what it starts in the background ignore Ctrl+C, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
         os.close(terminal)
         told = b""

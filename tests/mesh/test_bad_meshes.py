@@ -78,7 +78,12 @@ FAULTS = {
     "elements too many": ("MARKER_ELEMS= 2", "MARKER_ELEMS= 3", 18, "only 2 elements of marker lo"),
     "elements too few": ("MARKER_ELEMS= 2", "MARKER_ELEMS= 1", 17, "more elements of marker lower"),
     "no name": ("MARKER_TAG= lower", "MARKER_TAG=", 14, "the marker name '' is empty or not UTF-8"),
-    "unprintable": ("TAG= lower", "TAG= a\x01b", 14, r"the marker name 'a\\x01b' is empty or not"),
+    "unprintable": (
+        "TAG= lower",
+        "TAG= a\x01b",
+        14,
+        r"the marker name 'a\\x01b' has control characters",
+    ),
     "same name": ("TAG= lower", "TAG= upper", 18, r"marker upper stands a second time .*line 14"),
     "no TAG": ("MARKER_TAG= lower\n", "", 14, "MARKER_ELEMS= has no MARKER_TAG= before it"),
     "no ELEMS": ("MARKER_ELEMS= 1\n3 3 4\n", "", 18, "marker upper is not followed by MARKER_ELEM"),

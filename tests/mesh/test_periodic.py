@@ -194,7 +194,7 @@ def test_two_pairs_of_one_period(order):
 
 
 def test_two_pairs_of_different_periods_are_refused():
-    with pytest.raises(MeshError, match=r"'left1', 'right1' \(1 along .* differ; one period"):
+    with pytest.raises(MeshError, match=r"'left1', 'right1' \(1 along .* differ; only one period"):
         pair_up(two_pairs(2.0), ("left1", "right1", "left2", "right2", "low", "top"))
 
 

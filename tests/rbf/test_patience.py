@@ -131,7 +131,7 @@ def test_what_fails_goes_back_to_its_lowest_error(tmp_path):
     ("settings", "said"),
     [
         ({}, "is 0.001, not below the largest displacement, 0.0006: no control node"),
-        ({}, "use DATA_RED_TOLERANCE= 6e-06 or less (or DATA_RED_RELATIVE= 6e-06), a hundredth"),
+        ({}, r"use DATA_RED_TOLERANCE= 6e-06 or less (or DATA_RED_RELATIVE= 6e-06\), a hundredth"),
         ({"relative": 2e-3}, "is 0.002, not below .*; use DATA_RED_RELATIVE= 6e-06 "),
         ({"tolerance": 1e-4}, "is 0.0001, more than a tenth of the largest displacement, 0.0006"),
         ({"tolerance": 5e-5}, None),
