@@ -25,7 +25,6 @@ STEEP = 100.0
 """A slope between neighbours explains an overshoot when it is so many times that of the largest
 displacement over the whole mesh."""
 
-
 HOPELESS = 0.1
 """A system whose solution misses its own data by this part of the largest was not solved."""
 
@@ -52,6 +51,8 @@ def unsoundness(
         )
     shift = moved - plan.coords
     length = np.linalg.norm(shift, axis=1)
+    if length.max() <= GROWTH * largest:
+        return None  # as nearly always: the motion reaches that far at least
     # Sliding nodes first, for what they do is data to all others.
     limit = np.full(
         len(length), GROWTH * _reach(plan, shift, largest, ("moving", "fixed", "sliding"))
