@@ -8,10 +8,10 @@ from functools import partial
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMainWindow, QMenu
 
-from slideviz.gui.canvas.beside import fill_compare
 from slideviz.gui.theme import THEMES
 from slideviz.gui.tool_bar import ToolBar
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.gui.widgets.tips import tip_of, wrapped
 from slideviz.view.session import changes
 from slideviz.view.session.colours import usual_range

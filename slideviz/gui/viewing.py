@@ -7,10 +7,11 @@ from __future__ import annotations
 from qtpy.QtCore import QPoint, Qt, Signal
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from slideviz.gui.canvas.beside import CameraLink, TitleBar, fill_pane
+from slideviz.gui.canvas.beside import CameraLink, TitleBar
 from slideviz.gui.canvas.canvas import View3D
 from slideviz.gui.canvas.hover import CellHover
 from slideviz.gui.panels.boundaries import boundary_menu
+from slideviz.gui.widgets.runs_menu import fill_pane
 from slideviz.view import jobs
 from slideviz.view.drawing.look import Look
 from slideviz.view.drawing.panes import choices, close_pane, panes

@@ -24,9 +24,6 @@ from slideviz.view.session.state import ColourBy, Frame
 WORST = 100
 """Cells in the list of the worst."""
 
-ONLY_INVERTED = (-1.0, -0.5)
-"""A range that no value is in: it chooses the inverted cells alone."""
-
 
 @dataclass(frozen=True, eq=False)
 class CellInfo:
@@ -93,22 +90,6 @@ class WorstCells:
 def measure(colour_by: ColourBy) -> ColourBy:
     """Return the quality that the view is coloured by, or size-skew."""
     return colour_by if colour_by in ("size", "skew") else "size_skew"
-
-
-def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
-    """Return the cells whose value is in a closed range, in rising order.
-
-    Parameters
-    ----------
-    values : (m,) float64
-        As `slideviz.view.drawing.actors.shown_values` gives them: not a number for an inverted
-        cell.
-    threshold : (float, float)
-        Lowest and highest value. From 0 or below, inverted cells are chosen too.
-    """
-    low, high = threshold
-    chosen = (values >= low) & (values <= high)
-    return np.flatnonzero(chosen | np.isnan(values) if low <= 0.0 else chosen)
 
 
 def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:

@@ -11,7 +11,7 @@ from slideviz.gui.panels.histogram import HistogramPanel
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.view.drawing.look import DARK
-from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.sections.choice import ONLY_INVERTED
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 

@@ -13,10 +13,11 @@ from slideviz.view.drawing.actors import VALUES
 from slideviz.view.drawing.look import INVERTED_COLOUR, SELECTED_COLOUR
 from slideviz.view.drawing.pick import to_display
 from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.inspect import ONLY_INVERTED, nodes_of
+from slideviz.view.inspect import nodes_of
 from slideviz.view.layers.chosen import part_shape
 from slideviz.view.layers.mark import DOT, FACES, OUTLINE
 from slideviz.view.scene import Scene
+from slideviz.view.sections.choice import ONLY_INVERTED
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 

@@ -9,7 +9,7 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.view import inspect
-from slideviz.view.drawing.actors import shown_values
+from slideviz.view.sections.choice import ONLY_INVERTED, chosen_cells
 from slideviz.view.session.state import Frame
 
 
@@ -30,17 +30,17 @@ def frames(square):
 
 def test_a_range_chooses_its_ends_and_what_is_between():
     values = np.array([0.2, 0.5, 0.8, 0.1])
-    assert inspect.chosen_cells(values, (0.2, 0.5)).tolist() == [0, 1]
+    assert chosen_cells(values, (0.2, 0.5)).tolist() == [0, 1]
 
 
 def test_inverted_cells_are_chosen_from_0_alone(frames):
     frame = frames[-1]
-    values = shown_values(frame, "size_skew")
+    values = frame.shown_values("size_skew")
     inverted = np.flatnonzero(np.isnan(values))
     assert len(inverted) == frame.quality.inverted > 0
-    assert set(inverted) <= set(inspect.chosen_cells(values, (0.0, 0.3)))
-    assert not set(inverted) & set(inspect.chosen_cells(values, (1e-9, 1.0)))
-    assert inspect.chosen_cells(values, inspect.ONLY_INVERTED).tolist() == inverted.tolist()
+    assert set(inverted) <= set(chosen_cells(values, (0.0, 0.3)))
+    assert not set(inverted) & set(chosen_cells(values, (1e-9, 1.0)))
+    assert chosen_cells(values, ONLY_INVERTED).tolist() == inverted.tolist()
 
 
 @pytest.mark.parametrize("what", ["size_skew", "size", "skew"])

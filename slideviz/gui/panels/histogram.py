@@ -22,15 +22,13 @@ from slideviz.gui.widgets.plot_canvas import (
     write_plot,
 )
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.view.drawing.actors import shown_values
-from slideviz.view.inspect import ONLY_INVERTED, chosen_cells
 from slideviz.view.plots.session_histogram import (
     Counts,
     draw_histogram,
     first_value,
-    range_words,
     shown_measure,
 )
+from slideviz.view.sections.choice import ONLY_INVERTED, chosen_cells, range_words
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame, Session
 from slideviz.view.session.store import Store
@@ -152,7 +150,7 @@ class HistogramPanel(QWidget):
         threshold = session.view.threshold
         self.range_text.setVisible(threshold is not None)
         if threshold is not None:
-            values = shown_values(session.frame, what, session.mesh)[counted]
+            values = session.frame.shown_values(what, session.mesh)[counted]
             count = len(chosen_cells(values, threshold))
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"

@@ -10,9 +10,9 @@ from qtpy.QtWidgets import QApplication, QHBoxLayout, QMenu, QToolButton, QWidge
 
 from slideviz.errors import SlidevizError
 from slideviz.gui import dialogs
-from slideviz.gui.canvas.beside import fill_compare
 from slideviz.gui.panels.runs_tree import RunTree
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.view.session import changes
 from slideviz.view.session.runs_table import table_text, write_table

@@ -9,10 +9,8 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import INVERTED
 from slideviz.view.drawing.look import COLOUR_MAP, INVERTED_COLOUR
 from slideviz.view.drawing.surfaces import Surface, facet_connectivity, lifted, padded
-from slideviz.view.session.state import ColourBy, Frame
 
 VALUES = "values"
 LIFT = 1e-4
@@ -86,14 +84,6 @@ def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
     """Move the points of a shape, in place."""
     shape.points[:] = lifted(points, lift)
     shape.GetPoints().Modified()
-
-
-def shown_values(frame: Frame, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
-    """Return the numbers to colour the cells by, (m,); not a number where a cell is inverted.
-
-    For displacements, ``undeformed`` says where the nodes were.
-    """
-    return np.where(frame.quality.status == INVERTED, np.nan, frame.values(what, undeformed))
 
 
 def lookup_table() -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.view.drawing.actors import LIFT, VALUES, lookup_table, shown_values
+from slideviz.view.drawing.actors import LIFT, VALUES, lookup_table
 from slideviz.view.drawing.look import LIGHT, VALUE_EDGE, Look
 from slideviz.view.drawing.shaders import draw_fine_edges
 from slideviz.view.drawing.surfaces import Surface
@@ -116,7 +116,7 @@ class Stage:
         assert frame is not None
         key = (frame, what)
         if self._values is None or self._values[0] != key:
-            self._values = key, shown_values(frame, what, session.mesh)
+            self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
 
     def chosen(self, session: Session) -> Choice | None:

@@ -15,8 +15,8 @@ from slideviz.view.drawing.actors import VALUES
 from slideviz.view.drawing.shaders import see_through
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface, lifted
-from slideviz.view.inspect import chosen_cells
 from slideviz.view.layers.mesh import CellLayer, looks_inside, recoloured
+from slideviz.view.sections.choice import chosen_cells
 from slideviz.view.session.state import Session
 
 NAME = "chosen"

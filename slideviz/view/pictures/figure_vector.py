@@ -14,7 +14,6 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED
 from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER, ROLE_COLOURS
 from slideviz.view.drawing.plate import OPACITY
-from slideviz.view.inspect import chosen_cells
 from slideviz.view.layers.mesh import FADED, is_faded
 from slideviz.view.legend import STRIP
 from slideviz.view.pictures.figure import GAP, Figure, panes, title_of, titles_of
@@ -24,6 +23,7 @@ from slideviz.view.pictures.offscreen import CAPTION_AT, TITLE
 from slideviz.view.pictures.studio import Studio, ordered
 from slideviz.view.plots.bar import number_bar
 from slideviz.view.plots.written import figure_bytes
+from slideviz.view.sections.choice import chosen_cells
 from slideviz.view.session.state import COLOUR_BY, Session
 
 SUFFIXES = (".svg", ".pdf")

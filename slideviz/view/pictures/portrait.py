@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.view.drawing.actors import VALUES, lookup_table, shown_values, volume
+from slideviz.view.drawing.actors import VALUES, lookup_table, volume
 from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.surfaces import padded
 from slideviz.view.legend import STRIP, add_colour_bar, place_bar
@@ -86,7 +86,7 @@ class Portrait:
 
     def show(self, frame: Frame) -> None:
         """Draw another step of the mesh."""
-        values = shown_values(frame, self.colour_by, self._base)
+        values = frame.shown_values(self.colour_by, self._base)
         self._shape.points[:] = padded(frame.mesh.points)[self._nodes]
         self._shape.GetPoints().Modified()
         self._shape.cell_data[VALUES] = values[self._owners]

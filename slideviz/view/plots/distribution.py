@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.view.drawing.actors import shown_values
 from slideviz.view.plots.series import Distribution
 from slideviz.view.session.state import ColourBy, Frame
 
@@ -35,4 +34,4 @@ def spread(
 
 def _values(frame: Frame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
     """Return the values of the cells of a frame without those of a halo."""
-    return np.asarray(shown_values(frame, what, undeformed)[frame.quality.counted])
+    return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])

@@ -127,13 +127,6 @@ def shown_measure(session: Session) -> ColourBy:
     return "size_skew" if by == "role" else by
 
 
-def range_words(threshold: Range) -> str:
-    """Return a range in words."""
-    if threshold[1] < 0.0:
-        return "inverted cells"
-    return f"{threshold[0]:.3g} to {threshold[1]:.3g}"
-
-
 def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
     """Return the colours of the bars: those of their values in the view."""
     import matplotlib as mpl

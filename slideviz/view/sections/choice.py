@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.view.drawing.polygons import Polygons
-from slideviz.view.inspect import chosen_cells
-from slideviz.view.plots.session_histogram import range_words
+
+ONLY_INVERTED = (-1.0, -0.5)
+"""A range that no value is in: it chooses the inverted cells alone."""
 
 
 @dataclass(frozen=True)
@@ -41,3 +42,25 @@ class Choice:
     def among(self, polygons: Polygons) -> Polygons:
         """Return those polygons whose cells are chosen; their points stay."""
         return polygons.take(np.flatnonzero(self.mask[polygons.cells]))
+
+
+def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
+    """Return the cells whose value is in a closed range, in rising order.
+
+    Parameters
+    ----------
+    values : (m,) float64
+        As ``Frame.shown_values`` gives them: not a number for an inverted cell.
+    threshold : (float, float)
+        Lowest and highest value. From 0 or below, inverted cells are chosen too.
+    """
+    low, high = threshold
+    chosen = (values >= low) & (values <= high)
+    return np.flatnonzero(chosen | np.isnan(values) if low <= 0.0 else chosen)
+
+
+def range_words(threshold: tuple[float, float]) -> str:
+    """Return a range in words."""
+    if threshold[1] < 0.0:
+        return "inverted cells"
+    return f"{threshold[0]:.3g} to {threshold[1]:.3g}"

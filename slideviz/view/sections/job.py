@@ -9,7 +9,6 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.view.copies import show_passages
-from slideviz.view.drawing.actors import shown_values
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layers.copies import Period, matrices
 from slideviz.view.pictures.titles import pair_names
@@ -123,7 +122,7 @@ def _choice(session: Session, section: Section) -> Choice | None:
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
     if frame is None or threshold is None or curve:
         return None
-    return Choice.of(shown_values(frame, session.view.colour_by, session.mesh), threshold)
+    return Choice.of(frame.shown_values(session.view.colour_by, session.mesh), threshold)
 
 
 def state_words(session: Session) -> str:

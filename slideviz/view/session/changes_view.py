@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.sections.choice import ONLY_INVERTED
 from slideviz.view.session.rows import replaced, without
 from slideviz.view.session.state import ColourBy, Session, ViewState
 

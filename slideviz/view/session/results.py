@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import Quality
+from slideviz.mesh.quality import INVERTED, Quality
 from slideviz.view.session.view_state import ColourBy
 
 if TYPE_CHECKING:
@@ -39,6 +39,10 @@ class Frame:
         if what == "size":
             return self.quality.size
         return self.quality.skew if what == "skew" else self.quality.values
+
+    def shown_values(self, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
+        """Return `values` as cells are coloured by them: not a number where one is inverted."""
+        return np.where(self.quality.status == INVERTED, np.nan, self.values(what, undeformed))
 
 
 @dataclass(frozen=True, eq=False)

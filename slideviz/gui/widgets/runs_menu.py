@@ -1,0 +1,47 @@
+"""Menus of runs: which of them a view shows, and which the shown one is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qtpy.QtGui import QActionGroup
+from qtpy.QtWidgets import QMenu
+
+from slideviz.view.drawing.panes import choices, panes, show_in
+from slideviz.view.session import changes
+from slideviz.view.session.store import Store
+
+
+def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
+    """Put into a menu what one of two views can show: the undeformed mesh and the runs."""
+    _fill(menu, store, panes(store.session)[pane], lambda n: store.change(show_in, pane, n))
+
+
+def fill_compare(menu: QMenu, store: Store) -> None:
+    """Put into a menu with what the run that is shown can be compared, and the end of that."""
+    beside, shown = store.session.view.beside, store.session.shown
+    _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
+    menu.addSeparator()
+    end = menu.addAction("End the comparison")
+    end.setEnabled(beside is not None)
+    end.triggered.connect(lambda: store.change(changes.show_beside, None))
+
+
+def _fill(
+    menu: QMenu,
+    store: Store,
+    now: int | None,
+    choose: Callable[[int], None],
+    leave: int | None = None,
+) -> None:
+    menu.clear()
+    group = QActionGroup(menu)
+    for number, text in choices(store.session).items():
+        if number == leave:
+            continue
+        act = menu.addAction(text)
+        act.setCheckable(True)
+        act.setChecked(number == now)
+        act.setData(number)
+        group.addAction(act)
+        act.triggered.connect(lambda _=False, number=number: choose(number))
