@@ -12,10 +12,9 @@ import sys
 import traceback
 from collections.abc import Sequence
 
+from slideviz.cli.exit_codes import CANCELLED, DONE, WRONG_INPUT
 from slideviz.cli.terminal import terminal
 from slideviz.errors import Cancelled, SlidevizError
-
-DONE, WRONG_INPUT, WRONG_USAGE, INVERTED, CANCELLED = 0, 1, 2, 3, 130
 
 
 def run(argv: Sequence[str]) -> int:

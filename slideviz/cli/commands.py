@@ -12,6 +12,8 @@ from slideviz.cli.run_command import cell_data, run
 if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
+COMMANDS = ("run", "info", "quality", "section", "film", "compare", "sample", "keys", "shots")
+
 __all__ = ["info", "keys", "quality", "run", "sample", "shots", "window"]
 
 
@@ -21,8 +23,6 @@ def window(arguments: argparse.Namespace) -> int:
     from slideviz.view.screen import missing_screen
 
     if arguments.file is not None and not arguments.file.exists():
-        from slideviz.cli.parser import COMMANDS
-
         raise CaseError(
             f"{arguments.file}: there is no such file, and no such command "
             f"(commands: {', '.join(COMMANDS)})"
@@ -38,7 +38,7 @@ def window(arguments: argparse.Namespace) -> int:
 def info(arguments: argparse.Namespace) -> int:
     """Tell what is in a mesh file."""
     from slideviz import quality, read
-    from slideviz.cli import DONE
+    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, require_places
     from slideviz.cli.report import info_report, save_json, table
     from slideviz.mesh.check import unused_nodes
@@ -77,7 +77,7 @@ def quality(arguments: argparse.Namespace) -> int:
     """Tell the quality of a mesh, compared with the undeformed one if it is given."""
     from slideviz import Case, read, write
     from slideviz import quality as rate
-    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, note_case, require_places
     from slideviz.cli.reference import reference_of, words_of
     from slideviz.cli.report import (
@@ -138,7 +138,7 @@ def _write_csv(path: Path, found: Quality) -> None:
 def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples."""
     from slideviz.case.samples import SAMPLES, VARIANTS, write_sample
-    from slideviz.cli import DONE
+    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
 
     if arguments.name is None:
@@ -158,7 +158,7 @@ def sample(arguments: argparse.Namespace) -> int:
 
 def shots(arguments: argparse.Namespace) -> int:
     """Draw the window in typical states."""
-    from slideviz.cli import DONE
+    from slideviz.cli.exit_codes import DONE
     from slideviz.gui.shots import shots as draw
 
     folder = arguments.output
@@ -186,7 +186,7 @@ def _is_checkout(folder: Path) -> bool:
 def keys(_: argparse.Namespace) -> int:
     """Print the reference of all case keys."""
     from slideviz.case.cfg import describe_keys
-    from slideviz.cli import DONE
+    from slideviz.cli.exit_codes import DONE
 
     print(describe_keys())
     return DONE

@@ -70,7 +70,7 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
 def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
-    from slideviz.cli import DONE
+    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, make_folder, require_places
     from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError

@@ -23,7 +23,7 @@ SMOOTH = 4
 
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film."""
-    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.run_command import read_case

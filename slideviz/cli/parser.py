@@ -14,8 +14,6 @@ from slideviz.cli.film_command import add_film, add_zoom, size
 from slideviz.cli.reference import add_reference
 from slideviz.cli.section_options import add_section, glued
 
-COMMANDS = ("run", "info", "quality", "section", "film", "compare", "sample", "keys", "shots")
-
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
 
@@ -40,7 +38,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     SystemExit
         Wrong usage (code 2), or help was asked for (code 0).
     """
-    if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
+    if not any(word in commands.COMMANDS for word in argv[:1]) and not _asks_help(argv):
         return _window_parser().parse_args(argv)
     return _parser().parse_args(glued(argv))
 
@@ -71,7 +69,7 @@ def _base(**options: object) -> _Parser:
 
 
 def _window_parser() -> argparse.ArgumentParser:
-    parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
+    parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(commands.COMMANDS))  # noqa: UP031
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
     parser.add_argument("--run", action="store_true", help="deform the case at once")

@@ -25,7 +25,7 @@ KEPT_BYTES = 1_000_000_000
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write mesh, report, steps and picture."""
     from slideviz import quality, read, write
-    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import run_report, save_history, save_json
     from slideviz.errors import CaseError
     from slideviz.view.motions.moved import require_detail

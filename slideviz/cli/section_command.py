@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
     from slideviz import Case, quality, read
-    from slideviz.cli import DONE, INVERTED
+    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, note_case, require_places
     from slideviz.cli.reference import NONE, reference_of, words_of
     from slideviz.cli.report import save_json

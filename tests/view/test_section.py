@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+import pyvista as pv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.view.drawing.polygons import CELL, joined
+from slideviz.view.drawing.polygons import joined
 from slideviz.view.sections.cases import cut_cases
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
@@ -179,7 +180,6 @@ def test_a_plane_cuts_a_2d_mesh_in_lines():
     ends = found.points[found.connectivity].reshape(-1, 2, 3)
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    assert found.polydata().n_lines == len(found)
     whole = Cutter.of(mesh).crinkle(mesh.points, section)
     assert whole.cells.tolist() == cut_cells(mesh, section)
     assert set(whole.sizes) <= {3, 4}
@@ -215,7 +215,6 @@ def test_a_section_beside_the_mesh_cuts_nothing():
         cutter = Cutter.of(mesh)
         assert len(cutter.cut(mesh.points, section)) == 0
         assert len(cutter.crinkle(mesh.points, section)) == 0
-        assert cutter.cut(mesh.points, section).polydata().n_cells == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -234,21 +233,20 @@ def test_whole_cells_have_a_closed_surface_that_looks_outwards(kind):
         centre = x.mean(axis=0)
         for a, b in zip(x, np.roll(x, -1, axis=0), strict=True):
             volume += np.dot(centre, np.cross(a, b)) / 6
-    import pyvista as pv
-
     flat = np.insert(mesh.cells.connectivity, mesh.cells.offsets[:-1], np.diff(mesh.cells.offsets))
     cells = pv.UnstructuredGrid(flat, mesh.cells.types, mesh.points)
     sizes = cells.extract_cells(ids).compute_cell_sizes()["Volume"]
     assert volume == pytest.approx(sizes.sum(), rel=0.02)
 
 
-def test_polydata_names_the_cell_of_each_polygon():
+def test_the_polygons_of_a_plane_fill_it():
     mesh = cube(4, "prism", block=False)
     section = Section("plane", (0, 0, 0.4), (0, 0, 1))
     found = Cutter.of(mesh).cut(mesh.points, section)
-    shape = found.polydata()
-    assert shape.cell_data[CELL].tolist() == found.cells.tolist()
-    assert shape.n_cells == len(found)
+    shape = pv.PolyData(
+        found.points, faces=np.insert(found.connectivity, found.offsets[:-1], found.sizes)
+    )
+    assert shape.n_cells == len(found) == len(found.cells)
     assert shape.area == pytest.approx(1.0)
 
 

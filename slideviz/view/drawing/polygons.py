@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-
-CELL = "cell"
-"""Name of the cell data that holds the owner of a polygon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +57,6 @@ class Polygons:
         """Return the polygons in the order of their middle's z, which may be towards an eye."""
         depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
         return self.take(np.argsort(depth, kind="stable"))
-
-    def polydata(self) -> Any:
-        """Return them as pyvista.PolyData, the owners in the cell data ``CELL``."""
-        import pyvista as pv
-
-        flat = np.insert(self.connectivity, self.offsets[:-1], self.sizes)
-        lines = len(self) and self.sizes.max() == 2
-        shape = pv.PolyData(self.points, **{"lines" if lines else "faces": flat})
-        shape.cell_data[CELL] = self.cells
-        return shape
 
 
 def joined(pieces: Sequence[Polygons]) -> Polygons:
