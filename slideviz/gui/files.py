@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
@@ -330,8 +329,6 @@ def sample_folder() -> Path:
 
 def known_samples() -> dict[str, str]:
     """Return the sample cases: name and description."""
-    if find_spec("slideviz.case.samples") is None:
-        return {}
-    from slideviz.case import samples
+    from slideviz.case.samples import SAMPLES
 
-    return dict(samples.SAMPLES)
+    return dict(SAMPLES)

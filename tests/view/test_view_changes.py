@@ -6,7 +6,7 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.inspect import ONLY_INVERTED
+from slideviz.view.sections.choice import ONLY_INVERTED
 from slideviz.view.sections.model import Section
 from slideviz.view.session import changes, opening
 from slideviz.view.session.state import Frame, Session, essence
