@@ -1,0 +1,330 @@
+"""Every enumeration once: its values, and what each is called, means and is drawn in.
+
+The values are those of a case file and of the command line. A type (``Sliding``) says which there
+are; the table beside it (``SLIDING``) has the words, and every list, check, option, legend and tip
+reads the table. This module imports nothing of slideviz and nothing heavy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeVar, get_args
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Term:
+    """The words for one value of an enumeration.
+
+    Attributes
+    ----------
+    label : str
+        What it is called in a list whose heading says what the list is of.
+    tip : str
+        What it means, for who is about to choose it.
+    colour : str
+        What it is drawn in, ``#rrggbb``.
+    alone : str
+        What it is called where no heading stands above it; the label if empty.
+    """
+
+    label: str
+    tip: str = ""
+    colour: str = ""
+    alone: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return what it is called where no heading stands above it."""
+        return self.alone or self.label
+
+
+def labels(terms: Mapping[Value, Term]) -> dict[Value, str]:
+    """Return the label of each value."""
+    return {value: term.label for value, term in terms.items()}
+
+
+def names(terms: Mapping[Value, Term]) -> dict[Value, str]:
+    """Return the name of each value, where no heading stands above it."""
+    return {value: term.name for value, term in terms.items()}
+
+
+def tips(terms: Mapping[Value, Term]) -> dict[Value, str]:
+    """Return the tip of each value that has one."""
+    return {value: term.tip for value, term in terms.items() if term.tip}
+
+
+# Boundaries --------------------------------------------------------------------------------
+
+Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
+
+
+@dataclass(frozen=True)
+class RoleTerm(Term):
+    """A role; ``key`` is the one of a case file that lists the boundaries which have it."""
+
+    key: str = ""
+
+
+ROLES: dict[Role, RoleTerm] = {
+    "moving": RoleTerm(
+        "moving", "is moved by the motions you list", "#d55e00", key="MARKER_MOVING"
+    ),
+    "fixed": RoleTerm("fixed", "stays where it is", "#7d8793", key="MARKER_FIXED"),
+    "sliding": RoleTerm(
+        "sliding", "its nodes slide along the surface", "#0072b2", key="MARKER_SLIDING"
+    ),
+    "periodic": RoleTerm("periodic", "repeats another boundary", "#009e73", key="MARKER_PERIODIC"),
+    "internal": RoleTerm(
+        "internal", "its nodes move freely with the cells inside", "#cc79a7", key="MARKER_INTERNAL"
+    ),
+}
+"""Colours: Okabe and Ito's palette (2008), told apart by colour-blind people, and a grey for what
+does nothing."""
+
+NodeType = Literal[
+    "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
+]
+NODE_TYPES: dict[NodeType, Term] = {
+    "moving": Term("moving", colour=ROLES["moving"].colour),
+    "fixed": Term("fixed", colour=ROLES["fixed"].colour),
+    "sliding_surface": Term("sliding face", colour=ROLES["sliding"].colour),
+    "sliding_edge": Term("sliding edge", colour="#56b4e9"),
+    "periodic": Term("periodic", colour=ROLES["periodic"].colour),
+    "internal": Term("internal", colour=ROLES["internal"].colour),
+    "control": Term("control", colour="#d81b60"),
+}
+"""What boundary nodes may do; the colours of the roles, and two more that differ from them."""
+
+MotionKind = Literal["translate", "rotate", "scale", "radial", "file"]
+MOTION_KINDS: dict[MotionKind, Term] = {
+    "translate": Term("translate"),
+    "rotate": Term("rotate"),
+    "scale": Term("scale"),
+    "radial": Term("push radially"),
+    "file": Term("displacement file"),
+}
+
+# Method ------------------------------------------------------------------------------------
+
+Sliding = Literal["none", "ps", "ds"]
+SLIDING: dict[Sliding, Term] = {
+    "none": Term("none", "Nodes of sliding boundaries stay where they are.", alone="no sliding"),
+    "ps": Term(
+        "pseudo sliding",
+        "Sliding nodes follow as inner nodes do and are put back on their boundary, in stages: "
+        "edges first, then surfaces.",
+    ),
+    "ds": Term(
+        "direct sliding",
+        "That nodes stay on their boundary is part of the system, which has all components of "
+        "the displacement at once: takes longer.",
+    ),
+}
+
+Method = Literal["rbf", "idw", "elastic"]
+
+
+@dataclass(frozen=True)
+class MethodTerm(Term):
+    """A method; ``slides_by`` is the value of SLIDING_MODE that it is compared with others by."""
+
+    slides_by: Sliding = "ps"
+
+
+METHODS: dict[Method, MethodTerm] = {
+    "rbf": MethodTerm("RBF interpolation"),
+    "idw": MethodTerm("Inverse distance weighting", alone="inverse distance"),
+    "elastic": MethodTerm("Linear elasticity", alone="linear elasticity", slides_by="ds"),
+}
+
+
+@dataclass(frozen=True)
+class KernelTerm(Term):
+    """A radial function: its reach is ``compact`` or global; it may need a linear polynomial."""
+
+    compact: bool = True
+    polynomial: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return its label and its reach."""
+        return f"{self.label} ({'compact' if self.compact else 'global'})"
+
+
+KERNELS: dict[str, KernelTerm] = {
+    "wendland-c2": KernelTerm("CP C2"),
+    "wendland-c0": KernelTerm("CP C0"),
+    "wendland-c4": KernelTerm("CP C4"),
+    "wendland-c6": KernelTerm("CP C6"),
+    "ctps-c0": KernelTerm("CTPS C0"),
+    "ctps-c1": KernelTerm("CTPS C1"),
+    "ctps-c2a": KernelTerm("CTPS C2a"),
+    "ctps-c2b": KernelTerm("CTPS C2b"),
+    "thin-plate": KernelTerm("thin plate spline", compact=False, polynomial=True),
+    "multiquadric": KernelTerm("multiquadric", compact=False, polynomial=True),
+    "inverse-multiquadric": KernelTerm("inverse multiquadric", compact=False),
+    "quadric": KernelTerm("quadric", compact=False, polynomial=True),
+    "inverse-quadric": KernelTerm("inverse quadric", compact=False),
+    "gaussian": KernelTerm("Gaussian", compact=False),
+}
+"""Those of thesis Tables 2.1 and 2.2; their functions are in `slideviz.rbf.kernels`."""
+
+Selection = Literal["block", "double", "one"]
+SELECTIONS: dict[Selection, Term] = {
+    "block": Term("growing blocks"),
+    "double": Term("two at a time"),
+    "one": Term("one"),
+}
+"""How many control nodes data reduction takes in a cycle."""
+
+LevelCriterion = Literal["size", "tol"]
+LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
+    "size": Term("by size"),
+    "tol": Term("by fall of the error"),
+}
+"""What ends a level of data reduction."""
+
+# Periodicity -------------------------------------------------------------------------------
+
+PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
+
+
+@dataclass(frozen=True)
+class PeriodicTerm(Term):
+    """A way to repeat; ``figure`` is what it is called in figures, which have little room."""
+
+    figure: str = ""
+
+
+PERIODIC_MODES: dict[PeriodicMode, PeriodicTerm] = {
+    "none": PeriodicTerm(
+        "none",
+        "Periodic boundaries are treated as sliding ones; distances do not repeat.",
+        alone="not periodic",
+        figure="not periodic",
+    ),
+    "periodic": PeriodicTerm(
+        "periodic distance",
+        "Periodic boundaries are treated as sliding ones, and distances repeat: what moves near "
+        "one side is felt at the other.",
+        figure="periodic distance",
+    ),
+    "fixed": PeriodicTerm(
+        "periodic, fixed vertices",
+        "Periodic boundaries move freely, both sides alike; the corners of the domain are held.",
+        figure="periodic, ends fixed",
+    ),
+    "moving": PeriodicTerm(
+        "periodic, moving vertices",
+        "Periodic boundaries move freely, both sides alike; the corners of the domain slide in "
+        "the periodic direction. Needs a sliding method.",
+        figure="periodic, ends moving",
+    ),
+}
+
+PeriodicKind = Literal["translational", "rotational"]
+PeriodicType = Literal["auto", "translational", "rotational"]
+PERIODIC_TYPES: dict[PeriodicType, Term] = {
+    "auto": Term("automatic"),
+    "translational": Term("translational"),
+    "rotational": Term("rotational"),
+}
+
+PERIODIC_DIRECTIONS: dict[str, tuple[int, PeriodicKind | None]] = {
+    "0": (0, None),
+    "1": (1, None),
+    "2": (2, None),
+    "x": (0, "translational"),
+    "y": (1, "translational"),
+    "z": (2, None),
+    "r": (0, "rotational"),
+    "theta": (1, "rotational"),
+}
+"""Words for a direction: its number, and the type of periodicity that the word implies."""
+
+# Quality -----------------------------------------------------------------------------------
+
+Metric = Literal["knupp", "rbf-slide"]
+METRICS: dict[Metric, Term] = {
+    "knupp": Term("Knupp"),
+    "rbf-slide": Term("as RBF-SliDe"),
+}
+
+CellState = Literal["valid", "inverted", "unproven"]
+CELL_STATES: tuple[CellState, ...] = ("valid", "inverted", "unproven")
+"""By their codes in `slideviz.mesh.quality.Quality.status`."""
+
+# View --------------------------------------------------------------------------------------
+
+Quantity = Literal["size-skew", "size", "skew", "displacement"]
+ColourBy = Literal["role", "size-skew", "size", "skew", "displacement"]
+
+
+@dataclass(frozen=True)
+class ColourByTerm(Term):
+    """What colours can show; ``unit`` is empty where it is a number without one."""
+
+    unit: str = ""
+
+
+COLOUR_BY: dict[ColourBy, ColourByTerm] = {
+    "role": ColourByTerm("role"),
+    "size-skew": ColourByTerm("size-skew"),
+    "size": ColourByTerm("size"),
+    "skew": ColourByTerm("skew"),
+    "displacement": ColourByTerm("displacement", unit="[mesh units]"),
+}
+"""The first is that of a mesh just opened."""
+
+QUANTITIES: dict[Quantity, ColourByTerm] = {value: COLOUR_BY[value] for value in get_args(Quantity)}
+"""Those that are numbers of a cell; the first is the usual one."""
+
+ColourMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
+COLOUR_MAPS: dict[ColourMap, Term] = {
+    "viridis": Term("viridis"),
+    "cividis": Term("cividis"),
+    "plasma": Term("plasma"),
+    "inferno": Term("inferno"),
+    "gray": Term("gray"),
+}
+"""Maps of matplotlib that colour-blind people can read; the first is the usual one."""
+
+PointsShown = Literal["none", "types", "control"]
+POINTS_SHOWN: dict[PointsShown, Term] = {
+    "none": Term("none"),
+    "types": Term("boundary nodes by type"),
+    "control": Term("control nodes"),
+}
+
+Shown = Literal["edges", "undeformed", "motion_ghost", "legend", "triad", "perspective"]
+SHOWN: dict[Shown, Term] = {
+    "edges": Term("Mesh edges", "Draw the edges of the cells."),
+    "undeformed": Term(
+        "Undeformed",
+        "Draw the undeformed boundaries as a ghost.",
+        alone="Undeformed boundaries",
+    ),
+    "motion_ghost": Term("Motion ghost", "Draw where the motions take the moving boundaries."),
+    "legend": Term("Legend", "Draw the legend of roles or the colour bar."),
+    "triad": Term("Axes", "Draw the directions of the axes in a corner."),
+    "perspective": Term("Perspective", "Perspective instead of parallel projection."),
+}
+"""What is drawn or not; a case file writes them with hyphens."""
+
+SectionKind = Literal["plane", "cylinder"]
+
+
+@dataclass(frozen=True)
+class SectionTerm(Term):
+    """A shape of sections; ``in_2d`` is what it is called in a mesh of two dimensions."""
+
+    in_2d: str = ""
+
+
+SECTION_KINDS: dict[SectionKind, SectionTerm] = {
+    "plane": SectionTerm("Plane", in_2d="Line"),
+    "cylinder": SectionTerm("Cylinder", in_2d="Circle"),
+}

@@ -1,0 +1,65 @@
+"""The tables of all enumerations: complete, in words, and loaded without anything else."""
+
+import subprocess
+import sys
+from typing import get_args
+
+import pytest
+
+from slideviz import terms
+
+TABLES = {
+    terms.Role: terms.ROLES,
+    terms.NodeType: terms.NODE_TYPES,
+    terms.MotionKind: terms.MOTION_KINDS,
+    terms.Sliding: terms.SLIDING,
+    terms.Method: terms.METHODS,
+    terms.Selection: terms.SELECTIONS,
+    terms.LevelCriterion: terms.LEVEL_CRITERIA,
+    terms.PeriodicMode: terms.PERIODIC_MODES,
+    terms.PeriodicType: terms.PERIODIC_TYPES,
+    terms.Metric: terms.METRICS,
+    terms.CellState: dict.fromkeys(terms.CELL_STATES, terms.Term("state")),
+    terms.Quantity: terms.QUANTITIES,
+    terms.ColourBy: terms.COLOUR_BY,
+    terms.ColourMap: terms.COLOUR_MAPS,
+    terms.PointsShown: terms.POINTS_SHOWN,
+    terms.Shown: terms.SHOWN,
+    terms.SectionKind: terms.SECTION_KINDS,
+}
+
+
+@pytest.mark.parametrize("kind", TABLES, ids=str)
+def test_the_type_has_the_values_of_the_table_in_its_order(kind):
+    table = TABLES[kind]
+    assert get_args(kind) == tuple(table)
+    assert all(term.label and term.name for term in table.values())
+
+
+def test_what_is_drawn_in_colours_has_one_of_its_own_for_each_value():
+    for table in (terms.ROLES, terms.NODE_TYPES):
+        colours = [term.colour for term in table.values()]
+        assert all(len(bytes.fromhex(colour.removeprefix("#"))) == 3 for colour in colours)
+        assert len(set(colours)) == len(colours)
+
+
+def test_each_list_in_which_one_chooses_has_words_that_differ():
+    for table in TABLES.values():
+        if table is not TABLES[terms.CellState]:
+            assert len(set(terms.labels(table).values())) == len(table)
+            assert len(set(terms.names(table).values())) == len(table)
+
+
+def test_only_what_has_a_tip_is_explained():
+    assert set(terms.tips(terms.SLIDING)) == set(terms.SLIDING)
+    assert not terms.tips(terms.PERIODIC_TYPES)
+
+
+def test_it_loads_nothing_of_slideviz_and_no_numpy():
+    code = "import sys, slideviz.terms; print(*sys.modules)"
+    call = [sys.executable, "-c", code]
+    found = subprocess.run(call, capture_output=True, text=True, check=True).stdout.split()
+    assert [name for name in found if name.startswith(("slideviz", "numpy"))] == [
+        "slideviz",
+        "slideviz.terms",
+    ]
