@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeVar, get_args
-
-Value = TypeVar("Value")
+from typing import Any, Literal, get_args
 
 
 @dataclass(frozen=True)
@@ -41,17 +39,17 @@ class Term:
         return self.alone or self.label
 
 
-def labels(terms: Mapping[Value, Term]) -> dict[Value, str]:
+def labels(terms: Mapping[Any, Term]) -> dict[str, str]:
     """Return the label of each value."""
     return {value: term.label for value, term in terms.items()}
 
 
-def names(terms: Mapping[Value, Term]) -> dict[Value, str]:
+def names(terms: Mapping[Any, Term]) -> dict[str, str]:
     """Return the name of each value, where no heading stands above it."""
     return {value: term.name for value, term in terms.items()}
 
 
-def tips(terms: Mapping[Value, Term]) -> dict[Value, str]:
+def tips(terms: Mapping[Any, Term]) -> dict[str, str]:
     """Return the tip of each value that has one."""
     return {value: term.tip for value, term in terms.items() if term.tip}
 
@@ -269,6 +267,11 @@ class ColourByTerm(Term):
 
     unit: str = ""
 
+    @property
+    def axis(self) -> str:
+        """Return what an axis of a plot is called."""
+        return f"{self.label} {self.unit or '[-]'}"
+
 
 COLOUR_BY: dict[ColourBy, ColourByTerm] = {
     "role": ColourByTerm("role"),
@@ -281,6 +284,12 @@ COLOUR_BY: dict[ColourBy, ColourByTerm] = {
 
 QUANTITIES: dict[Quantity, ColourByTerm] = {value: COLOUR_BY[value] for value in get_args(Quantity)}
 """Those that are numbers of a cell; the first is the usual one."""
+
+
+def quantity_of(colour_by: ColourBy) -> Quantity:
+    """Return the number of a cell that colours show, or size-skew where they show roles."""
+    return "size-skew" if colour_by == "role" else colour_by
+
 
 ColourMap = Literal["viridis", "cividis", "plasma", "inferno", "gray"]
 COLOUR_MAPS: dict[ColourMap, Term] = {
@@ -310,7 +319,7 @@ SHOWN: dict[Shown, Term] = {
     "motion_ghost": Term("Motion ghost", "Draw where the motions take the moving boundaries."),
     "legend": Term("Legend", "Draw the legend of roles or the colour bar."),
     "triad": Term("Axes", "Draw the directions of the axes in a corner."),
-    "perspective": Term("Perspective", "Perspective instead of parallel projection."),
+    "perspective": Term("Perspective", "Perspective instead of parallel projection (3D meshes)."),
 }
 """What is drawn or not; a case file writes them with hyphens."""
 

@@ -174,7 +174,7 @@ def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_pa
 
 
 def test_the_help_names_every_method(capsys):
-    from slideviz.case.model import PERIODIC_MODES
+    from slideviz.terms import PERIODIC_MODES
     from slideviz.view.compare.combinations import METHODS
 
     assert run(["compare", "--help"]) == 0

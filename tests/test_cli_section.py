@@ -9,10 +9,10 @@ from PIL import Image
 
 import slideviz as sv
 from slideviz.case.samples import sample, write_sample
-from slideviz.case.view_keys import MAPS as WINDOW_MAPS
 from slideviz.cli import run
-from slideviz.cli.section_options import COLOURS, MAPS, cylinder, glued, plane
-from slideviz.view.sections.paint import PAINT_BY
+from slideviz.cli.parser import parse
+from slideviz.cli.section_options import cylinder, glued, plane
+from slideviz.terms import COLOUR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
 
 
@@ -69,8 +69,12 @@ def test_cylinders(text, origin, direction, given):
     assert (section.origin, section.direction) == (origin, direction)
 
 
-def test_the_colours_of_the_parser_are_those_of_the_picture():
-    assert COLOURS == PAINT_BY
+def test_the_command_takes_every_colour_and_map_that_there_is():
+    words = ["section", "cube.su2", "--plane", "z=0.4", "-o", "out.png"]
+    for colour in QUANTITIES:
+        assert parse([*words, "--color", colour]).color == colour
+    for name in COLOUR_MAPS:
+        assert parse([*words, "--map", name]).map == name
 
 
 def test_a_plane_section_tells_the_numbers_of_its_cells(folder, capsys):
@@ -299,7 +303,6 @@ def test_the_help_has_an_example(capsys):
 
 
 def test_another_colour_map(folder):
-    assert MAPS == WINDOW_MAPS
     for name in ("viridis", "gray"):
         assert call(folder, "cube.su2", "--plane", "z=0.4", "--map", name, out=f"{name}.png") == 0
     viridis, gray = (

@@ -20,7 +20,8 @@ from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
 from slideviz.rbf.images import misfits
 from slideviz.rbf.problem import Solution
-from slideviz.view.node_types import NODE_WORDS, NodeTypes
+from slideviz.terms import NODE_TYPES
+from slideviz.view.node_types import NodeTypes
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 from tests import builders
@@ -335,7 +336,7 @@ def test_the_view_has_the_same_types_as_a_run():
     session = changes.open_mesh(Frame(plain, sv.quality(plain)), None, (), case)
     types = NodeTypes()
     found = types.of(changes.set_view(session, points="types"))
-    fixed = found.nodes[found.kinds == list(NODE_WORDS).index("fixed")]
+    fixed = found.nodes[found.kinds == list(NODE_TYPES).index("fixed")]
     np.testing.assert_array_equal(fixed, make_plan(case, mesh).classes.fixed)
     # Markers that do not match are told beside the Run button; the types are there all the same.
     points = mesh.points.copy()
@@ -343,7 +344,7 @@ def test_the_view_has_the_same_types_as_a_run():
     wrong = plain.with_points(points)
     session = changes.open_mesh(Frame(wrong, sv.quality(wrong)), None, (), case)
     found = types.of(changes.set_view(session, points="types"))
-    assert np.sum(found.kinds == list(NODE_WORDS).index("fixed")) == len(fixed) - 1
+    assert np.sum(found.kinds == list(NODE_TYPES).index("fixed")) == len(fixed) - 1
 
 
 # Real meshes

@@ -69,7 +69,7 @@ def shift_of(mesh, numbers, marker="BLOCK"):
 
 @QUIET
 @given(
-    method=st.sampled_from(METHODS),
+    method=st.sampled_from(list(METHODS)),
     shift=st.tuples(SMALL, SMALL, SMALL),
     steps=st.integers(1, 3),
     case=st.sampled_from([(2, "plain"), (2, "mixed"), (3, "plain")]),
@@ -103,7 +103,7 @@ def test_a_zero_displacement_changes_no_bit(frame, dim, method):
 
 @QUIET
 @given(
-    method=st.sampled_from(METHODS),
+    method=st.sampled_from(list(METHODS)),
     dim=st.sampled_from([2, 3]),
     a=st.tuples(SMALL, SMALL, SMALL),
     b=st.tuples(SMALL, SMALL, SMALL),
@@ -121,7 +121,7 @@ def test_one_step_is_linear_in_the_displacement_when_boundaries_are_flat(method,
 
 @QUIET
 @given(
-    method=st.sampled_from(METHODS),
+    method=st.sampled_from(list(METHODS)),
     seed=st.integers(0, 99),
     kind=st.sampled_from(["square", "mixed", "cube", "sector", "passage"]),
 )
@@ -166,7 +166,7 @@ def test_thread_count_changes_nothing():
 
 @QUIET
 @given(
-    method=st.sampled_from(METHODS),
+    method=st.sampled_from(list(METHODS)),
     dim=st.sampled_from([2, 3]),
     seed=st.integers(0, 99),
     scale=st.sampled_from([1e-3, 1.0, 40.0]),
@@ -194,7 +194,7 @@ def test_the_result_moves_turns_mirrors_and_scales_with_the_problem(method, dim,
 
 
 @QUIET
-@given(method=st.sampled_from(METHODS), seed=st.integers(0, 99))
+@given(method=st.sampled_from(list(METHODS)), seed=st.integers(0, 99))
 def test_rotational_periodicity_about_any_axis_through_any_point(method, seed):
     rng = np.random.default_rng(seed)
     axis, origin = rng.normal(size=3), rng.normal(size=3)
@@ -217,7 +217,7 @@ def test_rotational_periodicity_about_any_axis_through_any_point(method, seed):
 
 
 @QUIET
-@given(method=st.sampled_from(METHODS), seed=st.integers(0, 9), angle=st.floats(-170, 170))
+@given(method=st.sampled_from(list(METHODS)), seed=st.integers(0, 9), angle=st.floats(-170, 170))
 def test_a_sector_anywhere_around_its_axis(method, seed, angle):
     """The result does not care where theta is counted from, nor about the cut of arctan2."""
     here, there = builders.sector(6), builders.sector(6, start_deg=angle)

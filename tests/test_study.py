@@ -8,8 +8,9 @@ import pytest
 from PIL import Image
 
 from slideviz.case.cfg import set_key
-from slideviz.case.model import PERIODIC_MODES, Case
+from slideviz.case.model import Case
 from slideviz.case.samples import SAMPLES, VARIANTS
+from slideviz.terms import PERIODIC_MODES
 from slideviz.view.compare.combinations import METHODS
 from tools.study import __main__ as study
 from tools.study.cases import CALLS, GREEDY

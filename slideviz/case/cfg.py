@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.case.check import contradictions
-from slideviz.case.key import GROUPS, REDUCTION, ROLE_KEYS, Key
+from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
 from slideviz.case.model import Case, FromFile
@@ -20,10 +20,11 @@ from slideviz.case.reference import describe_keys
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
+from slideviz.terms import ROLES
 
 __all__ = ["describe_keys", "read_case", "set_key", "write_case"]
 
-_ROLE_OF = {key: role for role, key in ROLE_KEYS.items()}
+_ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
 
 def read_case(path: Path) -> Case:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from slideviz.case.key import BOUNDARIES, FILES, MOTION, ROLE_KEYS
+from slideviz.case.key import BOUNDARIES, FILES, MOTION
 from slideviz.case.keys import KEYS
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, moves, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
+from slideviz.terms import ROLES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -92,7 +93,7 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"
     found = [
-        f"{ROLE_KEYS[role]}: {mesh.name} has no marker {marker!r}"
+        f"{ROLES[role].key}: {mesh.name} has no marker {marker!r}"
         f"{nearest(marker, known) or f'; {has}'}"
         for marker, role in case.roles.items()
         if marker not in known

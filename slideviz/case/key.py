@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case, FromFile, Motion, PeriodicType, Reduction, Role
+from slideviz.case.model import Case, FromFile, Motion, Reduction
 from slideviz.case.values import Kind
 from slideviz.errors import CaseError
+from slideviz.terms import PERIODIC_DIRECTIONS, Role
 
 Put = Callable[[Case, Any], Case]
 Get = Callable[[Case], Any]
@@ -18,25 +19,6 @@ FILES, BOUNDARIES, MOTION = "Files", "Boundaries", "Motion"
 PERIODICITY, METHOD, REDUCTION, QUALITY = "Periodicity", "Method", "Data reduction", "Quality"
 VIEW = "View"
 GROUPS = (FILES, BOUNDARIES, MOTION, PERIODICITY, METHOD, REDUCTION, QUALITY, VIEW)
-
-ROLE_KEYS: dict[Role, str] = {
-    "moving": "MARKER_MOVING",
-    "fixed": "MARKER_FIXED",
-    "sliding": "MARKER_SLIDING",
-    "periodic": "MARKER_PERIODIC",
-    "internal": "MARKER_INTERNAL",
-}
-
-DIRECTIONS: dict[str, tuple[int, PeriodicType | None]] = {
-    "0": (0, None),
-    "1": (1, None),
-    "2": (2, None),
-    "x": (0, "translational"),
-    "y": (1, "translational"),
-    "z": (2, None),
-    "r": (0, "rotational"),
-    "theta": (1, "rotational"),
-}
 
 
 @dataclass(frozen=True)
@@ -152,7 +134,7 @@ def get_motions(case: Case) -> tuple[Motion, ...] | None:
 
 def put_direction(case: Case, word: str) -> Case:
     """Return the case with that direction, and the type of periodicity that it implies."""
-    direction, implied = DIRECTIONS[word]
+    direction, implied = PERIODIC_DIRECTIONS[word]
     if implied is not None and case.periodic_type not in ("auto", implied):
         raise CaseError(
             f"{word} is a direction of {implied} periodicity, and PERIODIC_TYPE= "

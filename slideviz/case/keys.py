@@ -9,7 +9,6 @@ from dataclasses import replace
 
 from slideviz.case.key import (
     BOUNDARIES,
-    DIRECTIONS,
     FILES,
     METHOD,
     MOTION,
@@ -30,7 +29,6 @@ from slideviz.case.key import (
     role,
     setting,
 )
-from slideviz.case.model import METHODS, PERIODIC_MODES, SLIDING
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.values import (
     AXIS,
@@ -45,7 +43,17 @@ from slideviz.case.values import (
     whole,
 )
 from slideviz.case.view_keys import VIEW_ROWS
-from slideviz.rbf.kernels import KERNELS
+from slideviz.terms import (
+    KERNELS,
+    LEVEL_CRITERIA,
+    METHODS,
+    METRICS,
+    PERIODIC_DIRECTIONS,
+    PERIODIC_MODES,
+    PERIODIC_TYPES,
+    SELECTIONS,
+    SLIDING,
+)
 
 _ROWS = (
     setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
@@ -96,22 +104,14 @@ _ROWS = (
     setting(
         "PERIODIC_TYPE",
         PERIODICITY,
-        choice(
-            {
-                "auto": "auto",
-                "translational": "translational",
-                "rotational": "rotational",
-                "0": "translational",
-                "1": "rotational",
-            }
-        ),
+        choice({word: word for word in PERIODIC_TYPES} | {"0": "translational", "1": "rotational"}),
         "periodic_type",
         "Shift (0) or rotation (1); auto finds out by matching the markers.",
     ),
     Key(
         "PERIODIC_DIRECTION",
         PERIODICITY,
-        choice({word: word for word in DIRECTIONS}),
+        choice({word: word for word in PERIODIC_DIRECTIONS}),
         "Direction of the repetition, found by matching the markers if not given: 0, 1, 2 are "
         "x, y, z or r, theta, z.",
         put_direction,
@@ -164,7 +164,7 @@ _ROWS = (
         replace(
             choice({name: name for name in KERNELS}),
             allowed="one of the names below",
-            details=tuple(f"{kernel.name:<22}{kernel.title}" for kernel in KERNELS.values()),
+            details=tuple(f"{name:<22}{term.label}" for name, term in KERNELS.items()),
         ),
         "kernel",
         "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
@@ -222,7 +222,7 @@ _ROWS = (
     greedy("MULTILEVEL", YES_NO, "multilevel", "Select the control nodes in levels."),
     greedy(
         "MULTI_CRIT",
-        choice({"size": "size", "tol": "tol"}),
+        choice({word: word for word in LEVEL_CRITERIA}),
         "criterion",
         "What ends a level: its number of nodes, or the fall of its error.",
     ),
@@ -241,7 +241,7 @@ _ROWS = (
     ),
     greedy(
         "SELECTION",
-        choice({word: word for word in ("block", "double", "one")}),
+        choice({word: word for word in SELECTIONS}),
         "selection",
         "Nodes taken in a cycle: a growing block (fastest), two with opposite errors, or one.",
     ),
@@ -259,7 +259,7 @@ _ROWS = (
     setting(
         "QUALITY_METRIC",
         QUALITY,
-        choice({"knupp": "knupp", "rbf-slide": "rbf-slide"}),
+        choice({word: word for word in METRICS}),
         "quality_metric",
         "Size-skew as published, or as RBF-SliDe computes it (differs for hexahedra).",
     ),

@@ -7,19 +7,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
-Method = Literal["rbf", "idw", "elastic"]
-Sliding = Literal["none", "ps", "ds"]
-PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
-PeriodicType = Literal["auto", "translational", "rotational"]
+from slideviz.terms import (
+    LevelCriterion,
+    Method,
+    Metric,
+    PeriodicMode,
+    PeriodicType,
+    Role,
+    Selection,
+    Sliding,
+)
+
 Point = tuple[float, ...] | Literal["centroid"]
 Target = str | tuple[str, ...]
 """What a motion moves: a marker, several as one body, or all that move where it is empty."""
-
-ROLES: tuple[Role, ...] = ("moving", "fixed", "sliding", "periodic", "internal")
-METHODS: tuple[Method, ...] = ("rbf", "idw", "elastic")
-SLIDING: tuple[Sliding, ...] = ("none", "ps", "ds")
-PERIODIC_MODES: tuple[PeriodicMode, ...] = ("none", "periodic", "fixed", "moving")
 
 
 @dataclass(frozen=True)
@@ -118,10 +119,10 @@ class Reduction:
 
     tolerance: float = 1e-3
     multilevel: bool = False
-    criterion: Literal["size", "tol"] = "size"
+    criterion: LevelCriterion = "size"
     level_tolerance: float = 0.5
     level_size: int = 16
-    selection: Literal["block", "double", "one"] = "block"
+    selection: Selection = "block"
     relative: float | None = None
     max_nodes: int | None = None
     gamma: float = 25.0
@@ -161,7 +162,7 @@ class Case:
     reduction: Reduction | None = None
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
-    quality_metric: Literal["knupp", "rbf-slide"] = "knupp"
+    quality_metric: Metric = "knupp"
     generate_quality: bool = True
     source: Path | None = None
     view: Mapping[str, Any] = field(default_factory=dict)

@@ -21,8 +21,9 @@ from slideviz.case.model import (
 from slideviz.case.values import Kind, axis_text, path_text, read_axis, read_vector, vector_text
 from slideviz.case.words import Word, is_none, name_text, nearest, number, shown, words_of
 from slideviz.errors import CaseError
+from slideviz.terms import MOTION_KINDS
 
-VERBS = ("translate", "rotate", "scale", "radial", "file")
+VERBS = tuple(MOTION_KINDS)
 ALL_MOVING = "*"
 
 

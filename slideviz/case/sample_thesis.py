@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile, Motion, Role, Rotate, Translate
+from slideviz.case.model import Case, FromFile, Motion, Rotate, Translate
 from slideviz.case.motion import displacement_of
 from slideviz.case.sample_grid import grid_mesh, layout, polar_points, square_points
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.terms import Role
 
 DIMENSIONS = {"square": 2, "polar": 2, "hexahedron": 3, "cylindrical": 3}
 PERIODIC = ("LOWER", "UPPER")

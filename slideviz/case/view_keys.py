@@ -15,11 +15,8 @@ from slideviz.case.model import Case
 from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
 from slideviz.case.words import list_of, number, shown
 from slideviz.errors import CaseError
+from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
 
-COLOURS = ("role", "size-skew", "size", "skew", "displacement")
-POINTS = ("none", "types", "control")
-MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
-SHOWN = ("edges", "undeformed", "motion-ghost", "legend", "triad", "perspective")
 FORMS = {"plane": 6, "cylinder": 7}
 """Numbers of a section: normal and point of a plane; radius, axis and point of a cylinder."""
 
@@ -122,6 +119,11 @@ SECTIONS = Kind(
 )
 
 
+def hyphened(shown: str) -> str:
+    """Return what a case file calls something that is drawn or not."""
+    return shown.replace("_", "-")
+
+
 def _row(name: str, kind: Kind, meaning: str) -> Key:
     def put(case: Case, value: Any) -> Case:
         return case.change(view={**case.view, name: value})
@@ -130,12 +132,12 @@ def _row(name: str, kind: Kind, meaning: str) -> Key:
 
 
 VIEW_ROWS = (
-    _row("VIEW_COLOR", choice({w: w for w in COLOURS}), "What the colours say."),
+    _row("VIEW_COLOR", choice({w: w for w in COLOUR_BY}), "What the colours say."),
     _row("VIEW_RANGE", numbers(2, "two rising numbers", True), "Ends of the colour bar."),
-    _row("VIEW_MAP", choice({w: w for w in MAPS}), "The colour map."),
+    _row("VIEW_MAP", choice({w: w for w in COLOUR_MAPS}), "The colour map."),
     _row("VIEW_THRESHOLD", numbers(2, "two rising numbers", True), "Only cells between them."),
-    _row("VIEW_POINTS", choice({w: w for w in POINTS}), "Nodes drawn as points."),
-    _row("VIEW_SHOW", words(SHOWN), "What is drawn beside the boundaries."),
+    _row("VIEW_POINTS", choice({w: w for w in POINTS_SHOWN}), "Nodes drawn as points."),
+    _row("VIEW_SHOW", words(tuple(map(hyphened, SHOWN))), "What is drawn beside the boundaries."),
     _row("VIEW_COPIES", whole(-1), "Passages drawn on each side; -1 draws all."),
     _row("VIEW_HIDDEN", NAMES, "Boundaries that are not drawn."),
     _row("VIEW_SECTIONS", SECTIONS, "Planes and cylinders that cut the mesh."),

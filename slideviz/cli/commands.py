@@ -123,14 +123,13 @@ def _write_csv(path: Path, found: Quality) -> None:
     """Write id, size-skew, size, skew and status of each cell."""
     from slideviz.errors import CaseError
     from slideviz.mesh.atomic import atomic_write
-    from slideviz.mesh.quality import INVERTED, UNPROVEN
+    from slideviz.terms import CELL_STATES
 
-    words = {INVERTED: "inverted", UNPROVEN: "unproven"}
     columns = zip(found.values, found.size, found.skew, found.status, strict=True)
     lines = ["cell,size_skew,size,skew,status"]
     for cell, (value, size, skew, status) in enumerate(columns):
-        word = words.get(int(status), "valid")
-        lines.append(f"{cell},{float(value)!r},{float(size)!r},{float(skew)!r},{word}")
+        numbers = f"{float(value)!r},{float(size)!r},{float(skew)!r}"
+        lines.append(f"{cell},{numbers},{CELL_STATES[status]}")
     with atomic_write(path, CaseError) as file:
         file.write(("\n".join(lines) + "\n").encode())
 

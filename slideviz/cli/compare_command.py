@@ -115,8 +115,8 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
     CaseError
         A name is unknown, or a number of steps is none.
     """
-    from slideviz.case.model import PERIODIC_MODES
     from slideviz.errors import CaseError
+    from slideviz.terms import PERIODIC_MODES
     from slideviz.view.compare.combinations import AUTO, METHODS
     from slideviz.view.compare.wanted import combinations, wanted_methods, wanted_modes
 
@@ -133,7 +133,7 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
         return found
 
     methods = names("methods", tuple(METHODS), wanted_methods(case))
-    modes = names("periodic", PERIODIC_MODES, wanted_modes(case))
+    modes = names("periodic", tuple(PERIODIC_MODES), wanted_modes(case))
     steps = list(STEPS)
     if arguments.steps is not None:
         steps = []

@@ -9,6 +9,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.terms import QUANTITIES
+
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
@@ -41,7 +43,7 @@ def film(arguments: argparse.Namespace) -> int:
     if kind_of(file) != ".png":  # of pictures it is not known yet how many there will be
         require_places(arguments, Output(file, "-o"))
     runs = _runs(arguments, case)
-    look = {"colour_by": arguments.color.replace("-", "_"), "zoom": arguments.zoom}
+    look = {"colour_by": arguments.color, "zoom": arguments.zoom}
     look["overwrite"] = arguments.force
     if len(runs) == 2:
         drawing = film_pair((runs[0], runs[1]), file, reel, **look)
@@ -167,7 +169,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
     )
     call.add_argument(
         "--color",
-        choices=("size-skew", "size", "skew", "displacement"),
+        choices=tuple(QUANTITIES),
         default="size-skew",
         help="what the colours say (size-skew)",
     )

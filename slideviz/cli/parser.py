@@ -13,6 +13,7 @@ from slideviz.cli.compare_command import add_compare
 from slideviz.cli.film_command import add_film, add_zoom, size
 from slideviz.cli.reference import add_reference
 from slideviz.cli.section_options import add_section, glued
+from slideviz.terms import METRICS
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -147,7 +148,7 @@ def _add_quality(calls: argparse._SubParsersAction) -> None:
     add_reference(quality, "case that made it: its MESH_FILENAME is the reference")
     quality.add_argument(
         "--metric",
-        choices=("knupp", "rbf-slide"),
+        choices=tuple(METRICS),
         default="knupp",
         help="rbf-slide: hexahedra as that program rates them (default: knupp)",
     )

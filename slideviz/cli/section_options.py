@@ -10,14 +10,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES, SectionKind
+
 if TYPE_CHECKING:
     from slideviz.view.sections.model import Section
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-MAPS = ("viridis", "cividis", "plasma", "inferno", "gray")
-COLOURS = ("size-skew", "size", "skew", "displacement")
-"""As of `slideviz.case.view_keys` and `slideviz.view.sections.paint`, which load too much here."""
 
 MOST_COPIES = 100
 """On each side: more could neither be told apart nor be drawn in reasonable time."""
@@ -65,9 +63,10 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         "case that names periodic boundaries and axis; its MESH_FILENAME is the reference "
         "where it has the same cells",
     )
-    add("--color", choices=COLOURS, default="size-skew", help="(default: size-skew)")
+    add("--color", choices=tuple(QUANTITIES), default="size-skew", help="(default: size-skew)")
     add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
-    add("--map", choices=MAPS, default="viridis", help="colour map (default: viridis)")
+    maps = tuple(COLOUR_MAPS)
+    add("--map", choices=maps, default=maps[0], help=f"colour map (default: {maps[0]})")
     cells = section.add_mutually_exclusive_group()
     cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
     cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
@@ -90,7 +89,7 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         help="pixels (default: 1600 wide, and as high as the section needs)",
     )
     add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
-    add("--metric", choices=("knupp", "rbf-slide"), default="knupp", help="as for quality")
+    add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
     add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
     add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
     section.set_defaults(command=command, wrong_usage=section.error)
@@ -179,7 +178,7 @@ def neighbours(text: str) -> int | Literal["wheel"]:
 
 
 def _section(
-    kind: Literal["plane", "cylinder"],
+    kind: SectionKind,
     origin: Sequence[float],
     direction: Sequence[float],
     radius: float = 0.0,

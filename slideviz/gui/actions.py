@@ -13,6 +13,7 @@ from slideviz.gui.tool_bar import ToolBar
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.gui.widgets.tips import tip_of, wrapped
+from slideviz.terms import SHOWN, Shown
 from slideviz.view.session import changes
 from slideviz.view.session.colours import usual_range
 from slideviz.view.session.state import Session
@@ -23,14 +24,15 @@ CUTS = {
 }
 """What the actions that add a section are called, by the dimensions of the mesh."""
 
-TOGGLES = (
-    ("edges", "Mesh edges", "E", "Draw the edges of the cells."),
-    ("undeformed", "Undeformed boundaries", "U", "Draw the undeformed boundaries as a ghost."),
-    ("motion_ghost", "Motion ghost", "G", "Draw where the motions take the moving boundaries."),
-    ("legend", "Legend", "L", "Draw the legend of roles or the colour bar."),
-    ("triad", "Axes", "T", "Draw the directions of the axes in a corner."),
-    ("perspective", "Perspective", "P", "Perspective instead of parallel projection (3D meshes)."),
-)
+TOGGLES: dict[Shown, str] = {
+    "edges": "E",
+    "undeformed": "U",
+    "motion_ghost": "G",
+    "legend": "L",
+    "triad": "T",
+    "perspective": "P",
+}
+"""Keys of what is shown or not."""
 SIDE_KEYS = {"+x": "1", "-x": "Shift+1", "+y": "2", "-y": "Shift+2", "+z": "3", "-z": "Shift+3"}
 STEPS = ("step_first", "step_previous", "step_play", "step_next", "step_last")
 _ICONS = {"motion_ghost": "ghost"}
@@ -155,11 +157,12 @@ class Actions:
     def _make_view(self) -> None:
         window = self.window
         menu = window.menuBar().addMenu("&View")
-        for name, text, keys, tip in TOGGLES:
-            act = self._add(name, text, None, keys, _ICONS.get(name, name))
+        for name, keys in TOGGLES.items():
+            term = SHOWN[name]
+            act = self._add(name, term.name, None, keys, _ICONS.get(name, name))
             act.setCheckable(True)
-            act.setToolTip(wrapped(f"{tip} ({keys})"))
-            act.setStatusTip(tip)
+            act.setToolTip(wrapped(f"{term.tip} ({keys})"))
+            act.setStatusTip(term.tip)
             act.toggled.connect(partial(self._toggle, name))
             menu.addAction(act)
         menu.addSeparator()
@@ -273,7 +276,7 @@ class Actions:
     def sync(self, session: Session, busy: bool, ready: bool) -> None:
         """Show the session: what is checked, what can be done."""
         opened = session.mesh is not None
-        for name, *_ in TOGGLES:
+        for name in TOGGLES:
             act = self.by_name[name]
             act.blockSignals(True)
             act.setChecked(getattr(session.view, name))

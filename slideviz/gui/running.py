@@ -76,7 +76,7 @@ class Running(QObject):
         self.banner.hide()
         self.store.change(changes.start_run)
         if session.view.colour_by == "role":
-            self.store.change(changes.set_view, colour_by="size_skew")
+            self.store.change(changes.set_view, colour_by="size-skew")
         case = session.case
         steps = case.steps or "automatic"
         log.info("run: sliding %s, periodic %s, %s steps", case.sliding, case.periodic, steps)

@@ -11,8 +11,9 @@ from qtpy.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QW
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import TIPS, wrapped
+from slideviz.terms import COLOUR_BY, labels
 from slideviz.view.session import changes
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 
 FIRST = ("open", "save_mesh", "save_case", "save_picture")
 SHOWN = ("edges", "undeformed", "motion_ghost", "legend", "perspective")
@@ -55,7 +56,7 @@ class ToolBar(QToolBar):
 
     def _add_colour(self, store) -> None:
         self.addWidget(QLabel(" Colour by "))
-        self.colour = Choice(dict(COLOUR_BY))
+        self.colour = Choice(labels(COLOUR_BY))
         self.colour.setObjectName("colour_by")
         self.colour.setToolTip(
             "What the colours of the view say; the panel Display has their range."

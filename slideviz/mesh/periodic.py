@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,7 @@ from scipy.spatial import cKDTree
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_size
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-
-Kind = Literal["auto", "translational", "rotational"]
+from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
 """Largest mismatch of a node and its image, as a fraction of the mesh's largest extent."""
@@ -48,7 +46,7 @@ class Pair:
 
     first: str
     second: str
-    kind: Literal["translational", "rotational"]
+    kind: PeriodicKind
     vector: FloatArray
     angle: float
     axis: tuple[float, float, float]
@@ -126,7 +124,7 @@ def match(
     mesh: Mesh,
     first: str,
     second: str,
-    kind: Kind = "auto",
+    kind: PeriodicType = "auto",
     axis: Sequence[float] = _Z,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Pair:
@@ -216,7 +214,7 @@ def _match_kind(
 def pair_up(
     mesh: Mesh,
     names: Sequence[str],
-    kind: Kind = "auto",
+    kind: PeriodicType = "auto",
     axis: Sequence[float] = _Z,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> tuple[Pair, ...]:
@@ -265,7 +263,7 @@ def pair_up(
 def _left_over(
     mesh: Mesh,
     names: Sequence[str],
-    how: tuple[Kind, Sequence[float], Sequence[float]],
+    how: tuple[PeriodicType, Sequence[float], Sequence[float]],
     first: MeshError,
 ) -> MeshError:
     """Return the error for markers that have no partner; it names the pairs that match, too.
@@ -273,7 +271,7 @@ def _left_over(
     ``how`` has kind, axis and origin of `pair_up`; without any pair, the error is ``first``.
     """
     kind, axis, origin = how
-    kinds: tuple[Kind, ...] = ("translational", "rotational") if kind == "auto" else (kind,)
+    kinds: tuple[PeriodicType, ...] = ("translational", "rotational") if kind == "auto" else (kind,)
     good: list[Pair] = []
     alone, why = list(names), "they are no images of each other; choose other markers"
     for each in kinds:
@@ -335,7 +333,7 @@ def find_pairs(
     chosen = list(names or mesh.marker_names)
     count = {name: len(mesh.marker(name).nodes) for name in chosen}
     axes = _AXES[:1] if mesh.dim == 2 else _AXES
-    tries: list[tuple[Kind, tuple[float, float, float]]] = [("translational", _Z)]
+    tries: list[tuple[PeriodicType, tuple[float, float, float]]] = [("translational", _Z)]
     tries += [("rotational", axis) for axis in axes]
     found: list[Pair] = []
     allowed = TOLERANCE * mesh.extent

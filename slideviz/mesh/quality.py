@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,13 +28,12 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.orientation import corner_sums, orientation
 from slideviz.mesh.skew import METRICS
 from slideviz.mesh.validity import INVERTED, UNPROVEN, VALID, prove
+from slideviz.terms import Metric
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = ["INVERTED", "UNPROVEN", "VALID", "Quality", "corner_jacobians", "quality"]
-
-Metric = Literal["knupp", "rbf-slide"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ import numpy as np
 
 from slideviz.mesh.jacobians import dot, total
 from slideviz.mesh.model import FloatArray
+from slideviz.terms import Metric
 
 Skew = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -75,7 +76,7 @@ KNUPP: dict[int, Skew] = {
     13: _prism,
     14: _pyramid,
 }
-METRICS: Mapping[str, Mapping[int, Skew]] = {
+METRICS: Mapping[Metric, Mapping[int, Skew]] = {
     "knupp": KNUPP,
     "rbf-slide": {**KNUPP, 12: _hexahedron_rbf_slide},
 }

@@ -22,12 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.jacobians import hexahedron_coefficients, prism_coefficients
+from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray
 
-VALID, INVERTED, UNPROVEN = 0, 1, 2
-"""Codes of a cell's status."""
+VALID, INVERTED, UNPROVEN = range(len(CELL_STATES))
+"""Codes of a cell's status: its place in `slideviz.terms.CELL_STATES`."""
 
 LEVELS = 6
 """How often a hexahedron is cut before it is called unproven."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz import terms
 from slideviz.mesh.model import FloatArray
 
 SHAPE = 0.05
@@ -28,8 +29,6 @@ class Kernel:
     ----------
     name : str
         The value of RBF_KERNEL.
-    title : str
-        The name in words.
     code : int
         Its number in the compiled loops.
     compact : bool
@@ -41,7 +40,6 @@ class Kernel:
     """
 
     name: str
-    title: str
     code: int
     compact: bool
     polynomial: bool
@@ -67,46 +65,29 @@ def _ctps_c2b(x: FloatArray) -> FloatArray:
     return 1 - 20 * x**2 + 80 * x**3 - 45 * x**4 - 16 * x**5 + 60 * x**4 * np.log(x)
 
 
-_ROWS: tuple[tuple[str, str, bool, bool, Callable[[FloatArray], FloatArray]], ...] = (
-    ("wendland-c2", "CP C2", True, False, lambda x: (1 - x) ** 4 * (4 * x + 1)),
-    ("wendland-c0", "CP C0", True, False, lambda x: (1 - x) ** 2),
-    (
-        "wendland-c4",
-        "CP C4",
-        True,
-        False,
-        lambda x: (1 - x) ** 6 * (35 / 3 * x**2 + 6 * x + 1),
-    ),
-    (
-        "wendland-c6",
-        "CP C6",
-        True,
-        False,
-        lambda x: (1 - x) ** 8 * (32 * x**3 + 25 * x**2 + 8 * x + 1),
-    ),
-    ("ctps-c0", "CTPS C0", True, False, lambda x: (1 - x) ** 5),
-    ("ctps-c1", "CTPS C1", True, False, _ctps_c1),
-    ("ctps-c2a", "CTPS C2a", True, False, _ctps_c2a),
-    ("ctps-c2b", "CTPS C2b", True, False, _ctps_c2b),
-    ("thin-plate", "thin plate spline", False, True, lambda x: x**2 * np.log(x)),
-    ("multiquadric", "multiquadric", False, True, lambda x: np.sqrt(SHAPE**2 + x**2)),
-    (
-        "inverse-multiquadric",
-        "inverse multiquadric",
-        False,
-        False,
-        lambda x: SHAPE / np.sqrt(SHAPE**2 + x**2),
-    ),
-    ("quadric", "quadric", False, True, lambda x: 1 + x**2),
-    ("inverse-quadric", "inverse quadric", False, False, lambda x: 1 / (1 + x**2)),
-    ("gaussian", "Gaussian", False, False, lambda x: np.exp(-(x**2))),
-)
+_FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "wendland-c2": lambda x: (1 - x) ** 4 * (4 * x + 1),
+    "wendland-c0": lambda x: (1 - x) ** 2,
+    "wendland-c4": lambda x: (1 - x) ** 6 * (35 / 3 * x**2 + 6 * x + 1),
+    "wendland-c6": lambda x: (1 - x) ** 8 * (32 * x**3 + 25 * x**2 + 8 * x + 1),
+    "ctps-c0": lambda x: (1 - x) ** 5,
+    "ctps-c1": _ctps_c1,
+    "ctps-c2a": _ctps_c2a,
+    "ctps-c2b": _ctps_c2b,
+    "thin-plate": lambda x: x**2 * np.log(x),
+    "multiquadric": lambda x: np.sqrt(SHAPE**2 + x**2),
+    "inverse-multiquadric": lambda x: SHAPE / np.sqrt(SHAPE**2 + x**2),
+    "quadric": lambda x: 1 + x**2,
+    "inverse-quadric": lambda x: 1 / (1 + x**2),
+    "gaussian": lambda x: np.exp(-(x**2)),
+}
+"""phi(xi) by the value of RBF_KERNEL; the order gives the numbers in the compiled loops."""
 
 PLAIN = "wendland-c2"
 """The default."""
 
 KERNELS: dict[str, Kernel] = {
-    name: Kernel(name, title, code, compact, polynomial, function)
-    for code, (name, title, compact, polynomial, function) in enumerate(_ROWS)
+    name: Kernel(name, code, terms.KERNELS[name].compact, terms.KERNELS[name].polynomial, function)
+    for code, (name, function) in enumerate(_FUNCTIONS.items())
 }
 """Radial function by the value of RBF_KERNEL."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
+from slideviz.terms import Selection
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
 
@@ -56,7 +57,7 @@ class Reduction:
     """
 
     tolerance: float
-    pick: Literal["block", "double", "one"] = "block"
+    pick: Selection = "block"
     level: Literal["none", "size", "ratio"] = "none"
     level_size: int = 16
     level_ratio: float = 0.5

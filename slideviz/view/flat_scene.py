@@ -9,6 +9,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
+from slideviz.terms import quantity_of
 from slideviz.view.copies import keeps, moved
 from slideviz.view.drawing import pick_cell
 from slideviz.view.drawing.look import LIGHT, SELECTED_COLOUR, Look
@@ -23,7 +24,7 @@ from slideviz.view.sections.cuts import Cuts
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
 from slideviz.view.sections.unroll import Label, flat_labels, flatten, middle_angle, plane_axes
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 
 FILL = 0.94
 """How much of the height or width a section takes."""
@@ -158,10 +159,9 @@ class FlatScene:
             return f"none of {every:,} cells cut is shown: {only.words}"
         frame, mesh = self.session.frame, self.session.mesh
         assert frame is not None
-        what = self.session.view.colour_by
-        what = "size_skew" if what == "role" else what
+        what = quantity_of(self.session.view.colour_by)
         paint = Paint(
-            COLOUR_BY[what],  # type: ignore[arg-type]
+            what,
             frame.values(what, mesh),
             frame.quality.status == INVERTED,
             self.session.colour_range,

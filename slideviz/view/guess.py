@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from slideviz.case.model import Case, Role
+from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.terms import Role
 from slideviz.view.session.state import Guess
 
 NAMES: tuple[tuple[Role, str], ...] = (

@@ -17,9 +17,10 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.quality import INVERTED, UNPROVEN, corner_jacobians
+from slideviz.mesh.quality import INVERTED, corner_jacobians
+from slideviz.terms import CELL_STATES, CellState, ColourBy
 from slideviz.view.drawing.surfaces import padded
-from slideviz.view.session.state import ColourBy, Frame
+from slideviz.view.session.state import Frame
 
 WORST = 100
 """Cells in the list of the worst."""
@@ -35,7 +36,7 @@ class CellInfo:
         Its number in the mesh, from 0, as in an SU2 file.
     kind : str
         Its element type.
-    state : {"valid", "inverted", "unproven"}
+    state : CellState
     size_skew, size, skew : float
         Qualities.
     jacobians : (k,) float64
@@ -46,7 +47,7 @@ class CellInfo:
 
     cell: int
     kind: str
-    state: str
+    state: CellState
     size_skew: float
     size: float
     skew: float
@@ -89,7 +90,7 @@ class WorstCells:
 
 def measure(colour_by: ColourBy) -> ColourBy:
     """Return the quality that the view is coloured by, or size-skew."""
-    return colour_by if colour_by in ("size", "skew") else "size_skew"
+    return colour_by if colour_by in ("size", "skew") else "size-skew"
 
 
 def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:
@@ -152,7 +153,7 @@ def cell_info(frame: Frame, cell: int) -> CellInfo:
         cell,
         ELEMENTS[int(mesh.cells.types[cell])].name
         + (" of the halo" if quality.halo is not None and quality.halo[cell] else ""),
-        {INVERTED: "inverted", UNPROVEN: "unproven"}.get(int(status), "valid"),
+        CELL_STATES[status],
         float(quality.values[cell]),
         float(quality.size[cell]),
         float(quality.skew[cell]),
@@ -193,7 +194,8 @@ def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
 def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
     """Return the list as rows of texts, without loss of digits."""
     names = "xyz"[: worst.positions.shape[1]]
-    rows = [["cell", "type", worst.measure, "inverted", *names, "worst_at_step"]] if header else []
+    measured = worst.measure.replace("-", "_")
+    rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []
     for at, cell in enumerate(worst.cells):
         numbers = (worst.values[at], *worst.positions[at])
         texts = [repr(float(number)) for number in numbers]

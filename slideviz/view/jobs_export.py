@@ -11,11 +11,10 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.quality import INVERTED, UNPROVEN
+from slideviz.terms import CELL_STATES
 from slideviz.view.jobs import Doing, Report, Stopped, require_going, save_mesh
 from slideviz.view.session.state import Frame
 
-STATUS = {INVERTED: "inverted", UNPROVEN: "unproven"}
 _ROWS = 5_000
 """Cells written between two looks at whether to stop."""
 
@@ -48,7 +47,7 @@ def save_quality(path: Path, frame: Frame, report: Report, stopped: Stopped) -> 
                 strict=True,
             )
             lines = [
-                f"{cell},{names[kind]},{size!r},{skew!r},{value!r},{STATUS.get(status, 'valid')},"
+                f"{cell},{names[kind]},{size!r},{skew!r},{value!r},{CELL_STATES[status]},"
                 + ",".join(map(repr, middle))
                 for cell, (kind, size, skew, value, status, middle) in enumerate(rows, start)
             ]

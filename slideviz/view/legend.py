@@ -7,16 +7,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Role
-from slideviz.view.drawing.look import ROLE_COLOURS, Look
+from slideviz.terms import ROLES, ColourByTerm, Role
+from slideviz.view.drawing.look import Look
 from slideviz.view.drawing.plate import Rect
 from slideviz.view.plots.ticks import bar_ticks
 
 STRIP = 104
 """Pixels at the right edge that are kept free of the mesh, at normal letter size."""
-
-UNITS = {"displacement": "[mesh units]"}
-"""Units of what colour bars show, below its name; the others have none."""
 
 _VTK_FONT_FILE = 4
 _AIR = 12.0
@@ -51,10 +48,8 @@ def set_letters(text: Any, look: Look, size: float) -> None:
 def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
     """Write the roles in use into the upper right corner, each with its colour."""
     for row, role in enumerate(roles):
-        top = 14 + 24 * (row + 1)
-        _line(
-            plotter, ("\u25a0", ROLE_COLOURS[role], role), (top, STRIP - 28, 14), look, font_scale
-        )
+        top, term = 14 + 24 * (row + 1), ROLES[role]
+        _line(plotter, ("\u25a0", term.colour, term.label), (top, STRIP - 28, 14), look, font_scale)
 
 
 def add_point_legend(
@@ -108,10 +103,10 @@ def clear_legend(plotter: Any) -> None:
 
 
 def add_colour_bar(
-    plotter: Any, mapper: Any, title: str, inverted: bool, style: tuple[Look, float]
+    plotter: Any, mapper: Any, what: ColourByTerm, inverted: bool, style: tuple[Look, float]
 ) -> None:
     """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
-    look, font_scale = style
+    (look, font_scale), title, unit = style, what.label, what.unit
     bar = plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
@@ -121,7 +116,6 @@ def add_colour_bar(
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
-    unit = UNITS.get(title, "")
     bar.SetTitle(f"{title}\n{unit}" if unit else title)
     # Longer words would be cut off at the edge of the view.
     size = (14 if len(title) < _LONG else 13) if not unit else 12

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -12,36 +11,8 @@ from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.found import boundary_of
 from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.topology import Fans, find_fans
-from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.terms import NODE_TYPES, NodeType
 from slideviz.view.session.state import Session
-
-NodeType = Literal[
-    "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
-]
-
-NODE_WORDS: dict[NodeType, str] = {
-    "moving": "moving",
-    "fixed": "fixed",
-    "sliding_surface": "sliding face",
-    "sliding_edge": "sliding edge",
-    "periodic": "periodic",
-    "internal": "internal",
-    "control": "control",
-}
-"""The types of nodes, as the legend names them."""
-
-NODE_COLOURS: dict[NodeType, str] = {
-    "moving": ROLE_COLOURS["moving"],
-    "fixed": ROLE_COLOURS["fixed"],
-    "sliding_surface": ROLE_COLOURS["sliding"],
-    "sliding_edge": "#56b4e9",
-    "periodic": ROLE_COLOURS["periodic"],
-    "internal": ROLE_COLOURS["internal"],
-    "control": "#d81b60",
-}
-"""Those of the roles, and two more that colour-blind people tell from them."""
-
-CLASSES: tuple[NodeType, ...] = tuple(kind for kind in NODE_WORDS if kind != "control")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +24,7 @@ class TypedNodes:
     nodes : (k,) int64
         The nodes, rising.
     kinds : (k,) int64
-        The place of each node's type in ``NODE_WORDS``.
+        The place of each node's type in ``NODE_TYPES``.
     """
 
     nodes: IntArray
@@ -61,9 +32,9 @@ class TypedNodes:
 
     @property
     def present(self) -> tuple[NodeType, ...]:
-        """Return the types that occur, in the order of ``NODE_WORDS``."""
+        """Return the types that occur, in the order of ``NODE_TYPES``."""
         there = set(np.unique(self.kinds).tolist())
-        return tuple(kind for place, kind in enumerate(NODE_WORDS) if place in there)
+        return tuple(kind for place, kind in enumerate(NODE_TYPES) if place in there)
 
     def only(self, nodes: IntArray) -> TypedNodes:
         """Return those that are among ``nodes``."""
@@ -121,7 +92,7 @@ class NodeTypes:
             classes = find_classes(case, mesh, (boundary, self._fans[2]), frame, stands)
         except SlidevizError:
             return NOTHING  # what is wrong with the case is said beside the Run button
-        place = {kind: index for index, kind in enumerate(NODE_WORDS)}
+        place = {kind: index for index, kind in enumerate(NODE_TYPES)}
         kinds = np.full(len(mesh.points), place["internal"])
         for marker in mesh.markers:
             if case.roles.get(marker.name) == "periodic":
@@ -140,4 +111,4 @@ def control_nodes(session: Session) -> TypedNodes:
     if step is None:
         return NOTHING
     nodes = np.unique(step.control)
-    return TypedNodes(nodes, np.full(len(nodes), list(NODE_WORDS).index("control")))
+    return TypedNodes(nodes, np.full(len(nodes), list(NODE_TYPES).index("control")))

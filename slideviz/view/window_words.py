@@ -5,26 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-METHOD_WORDS = {
-    "rbf": "RBF interpolation",
-    "idw": "Inverse distance weighting",
-    "elastic": "Linear elasticity",
-}
-SLIDING_WORDS = {"none": "none", "ps": "pseudo sliding", "ds": "direct sliding"}
-PERIODIC_WORDS = {
-    "none": "none",
-    "periodic": "periodic distance",
-    "fixed": "periodic, fixed vertices",
-    "moving": "periodic, moving vertices",
-}
-TYPE_WORDS = {"auto": "automatic", "translational": "translational", "rotational": "rotational"}
+from slideviz.terms import METHODS, PERIODIC_MODES, PERIODIC_TYPES, ROLES, SLIDING, labels
+
 SWITCH_WORDS = {"YES": "on", "NO": "off"}
 
 FIELDS: dict[str, tuple[str, Mapping[str, str]]] = {
-    "METHOD": ("Method", METHOD_WORDS),
-    "SLIDING_MODE": ("Sliding", SLIDING_WORDS),
-    "PERIODIC_MODE": ("Periodicity", PERIODIC_WORDS),
-    "PERIODIC_TYPE": ("Type", TYPE_WORDS),
+    "METHOD": ("Method", labels(METHODS)),
+    "SLIDING_MODE": ("Sliding", labels(SLIDING)),
+    "PERIODIC_MODE": ("Periodicity", labels(PERIODIC_MODES)),
+    "PERIODIC_TYPE": ("Type", labels(PERIODIC_TYPES)),
     "PERIODIC_AXIS": ("Axis", {}),
     "PERIODIC_ORIGIN": ("Through", {}),
     "STEPS": ("Steps", {"auto": "automatic"}),
@@ -34,11 +23,7 @@ FIELDS: dict[str, tuple[str, Mapping[str, str]]] = {
     "INFLUENCE_FACTOR": ("Support radius ×", {}),
     "RBF_KERNEL": ("Kernel", {}),
     "FEATURE_ANGLE": ("Feature angle", {}),
-    "MARKER_MOVING": ("the role “moving”", {}),
-    "MARKER_FIXED": ("the role “fixed”", {}),
-    "MARKER_SLIDING": ("the role “sliding”", {}),
-    "MARKER_PERIODIC": ("the role “periodic”", {}),
-    "MARKER_INTERNAL": ("the role “internal”", {}),
+    **{term.key: (f"the role “{term.label}”", {}) for term in ROLES.values()},
     "DEFORMATION_FILENAME": ("a displacement file", {}),
     "MOTION": ("Motion", {}),
 }

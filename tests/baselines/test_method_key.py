@@ -11,10 +11,11 @@ import slideviz as sv
 from slideviz import staircase
 from slideviz.case.cfg import set_key
 from slideviz.case.check import idle_settings
-from slideviz.case.model import METHODS, Case, Reduction, Rotate
+from slideviz.case.model import Case, Reduction, Rotate
 from slideviz.case.samples import SAMPLES, write_sample
 from slideviz.cli import run
 from slideviz.errors import CaseError, DeformError
+from slideviz.terms import METHODS
 from tests import builders
 
 

@@ -9,21 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
-from slideviz.case.model import (
-    PERIODIC_MODES,
-    ROLES,
-    SLIDING,
-    Case,
-    FromFile,
-    Radial,
-    Reduction,
-    Rotate,
-    Scale,
-    Translate,
-)
+from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.case.motion import moved_points
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import CaseError
+from slideviz.terms import PERIODIC_MODES, ROLES, SLIDING
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -76,7 +66,7 @@ reductions = st.builds(
 @st.composite
 def cases(draw: st.DrawFn, folder: Path) -> Case:
     path = st.lists(names, min_size=1, max_size=2).map(lambda parts: folder.joinpath(*parts))
-    roles = draw(st.dictionaries(text, st.sampled_from(ROLES), max_size=5))
+    roles = draw(st.dictionaries(text, st.sampled_from(list(ROLES)), max_size=5))
     moving = [name for name, role in roles.items() if role == "moving"]
     motions = ()
     if moving:
@@ -93,8 +83,8 @@ def cases(draw: st.DrawFn, folder: Path) -> Case:
         zone=draw(st.none() | whole),
         roles=roles,
         motions=motions,
-        sliding=draw(st.sampled_from(SLIDING)),
-        periodic=draw(st.sampled_from(PERIODIC_MODES)),
+        sliding=draw(st.sampled_from(list(SLIDING))),
+        periodic=draw(st.sampled_from(list(PERIODIC_MODES))),
         periodic_type=kind,
         direction=direction,
         axis=draw(axis),

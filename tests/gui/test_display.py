@@ -49,7 +49,7 @@ def test_the_range_is_typed_checked_and_reset(shown):
     box = panel(shown)
     assert not box.range.isEnabled(), "roles have no range"
     assert box.range.low.toolTip() == box.map.toolTip() == ROLES_ONLY
-    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    shown.window.store.change(changes.set_view, colour_by="size-skew")
     assert box.range.isEnabled()
     assert (box.range.low.text(), box.range.high.text()) == ("0", "1")
     assert not box.reset_range.isEnabled()
@@ -215,7 +215,7 @@ def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):
     one, every, usual = (acts[f"{n}_colours"] for n in ("fit", "fit_all", "usual"))
     assert not one.isEnabled(), "roles have no range"
     assert not window.actions_.bar.range.isEnabled()
-    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    shown.window.store.change(changes.set_view, colour_by="size-skew")
     window.start_run()
     shown.settle()
     assert not usual.isEnabled()
@@ -235,7 +235,7 @@ def test_colours_fit_a_step_or_all_and_are_as_ever_again(shown):
 
 
 def test_the_range_fits_both_views_of_a_comparison(shown):
-    shown.window.store.change(changes.set_view, colour_by="size_skew")
+    shown.window.store.change(changes.set_view, colour_by="size-skew")
     shown.window.start_run()
     shown.settle()
     shown.window.store.change(changes.show_beside, changes.UNDEFORMED)

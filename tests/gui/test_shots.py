@@ -47,7 +47,7 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
     assert session.view.frame == 5
     assert session.frame.quality.inverted == 0
     assert session.view.copies == 1
-    assert session.view.colour_by == "size_skew"
+    assert session.view.colour_by == "size-skew"
 
 
 def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):

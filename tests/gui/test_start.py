@@ -34,7 +34,7 @@ def test_one_click_deforms_a_blade_passage(driver, small):
     )
     assert not start.isVisible()
     assert driver.session.deformed.quality.inverted == 0
-    assert driver.session.view.colour_by == "size_skew"
+    assert driver.session.view.colour_by == "size-skew"
     # A sample is no file of the user's.
     assert driver.window.files.recent() == []
 

@@ -302,7 +302,8 @@ def test_a_scaling(opened):
 
 
 def test_a_clash_is_told_while_the_motion_is_typed(opened):
-    from slideviz.view.drawing.look import CLASH_COLOUR, ROLE_COLOURS
+    from slideviz.terms import ROLES
+    from slideviz.view.drawing.look import CLASH_COLOUR
 
     window, panel = opened.window, opened.window.run_panel
     # Periodic sides that move along may be passed; others may not.
@@ -313,7 +314,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
     opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
     assert panel.run.isEnabled()
     ghost = window.scene.plotter.actors["motion:airfoil"]
-    assert ghost.prop.color == ROLE_COLOURS["moving"]
+    assert ghost.prop.color == ROLES["moving"].colour
     opened.type(field, "-0.4")
     opened.qtbot.waitUntil(lambda: not panel.run.isEnabled())
     assert "puts airfoil through periodic_1" in panel.text.text()
@@ -322,7 +323,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
     assert "href='motion'" in panel.text.text()
     opened.type(field, "0.02")
     opened.qtbot.waitUntil(panel.run.isEnabled)
-    assert ghost.prop.color == ROLE_COLOURS["moving"]
+    assert ghost.prop.color == ROLES["moving"].colour
     assert panel.text.text() == "Ready."
 
 
@@ -528,7 +529,7 @@ def test_a_run_shows_its_steps_and_the_quality(ready):
     session, window = ready.session, ready.window
     assert len(session.frames) == 4
     assert session.view.frame == 3
-    assert session.view.colour_by == "size_skew"
+    assert session.view.colour_by == "size-skew"
     assert window.player.step_text.text() == "Step 3 of 3"
     quality = session.deformed.quality
     window.resize(1920, 1080)

@@ -37,7 +37,7 @@ def with_runs(session):
         frames = [shaken(session.mesh, size, seed) for size in (0.004, 0.08)]
         session = changes.add_frames(changes.start_run(session), frames)
         session = changes.end_run(session, "done")
-    return changes.set_view(session, colour_by="size_skew")
+    return changes.set_view(session, colour_by="size-skew")
 
 
 def session_with_runs():
@@ -91,7 +91,7 @@ def test_without_a_mesh_it_says_what_to_do(panel):
 
 def test_it_lists_the_worst_hundred_of_the_step(full):
     session = full.store.session
-    wanted = worst_cells(session.frames, 2, "size_skew")
+    wanted = worst_cells(session.frames, 2, "size-skew")
     assert cells(full) == wanted.cells.tolist()
     assert len(cells(full)) == 100
     assert column(full, SINCE) == [str(step) for step in wanted.steps]
@@ -102,7 +102,7 @@ def test_it_lists_the_worst_hundred_of_the_step(full):
 def test_it_follows_the_step_and_the_colours(full):
     full.store.change(changes.show_frame, 1)
     session = full.store.session
-    assert cells(full) == worst_cells(session.frames, 1, "size_skew").cells.tolist()
+    assert cells(full) == worst_cells(session.frames, 1, "size-skew").cells.tolist()
     full.store.change(changes.set_view, colour_by="size")
     assert cells(full) == worst_cells(session.frames, 1, "size").cells.tolist()
 
@@ -113,7 +113,7 @@ def test_hidden_it_lists_nothing_and_catches_up(full, qtbot, monkeypatch):
         patch.setattr(worst, "worst_cells", None)
         full.store.change(changes.show_frame, 1)
     full.show()
-    wanted = worst_cells(full.store.session.frames, 1, "size_skew").cells.tolist()
+    wanted = worst_cells(full.store.session.frames, 1, "size-skew").cells.tolist()
     qtbot.waitUntil(lambda: cells(full) == wanted)
 
 
@@ -123,7 +123,7 @@ def test_while_steps_are_played_the_list_comes_when_there_is_time(full, qtbot, m
     full._last = worst.time.monotonic()
     full.store.change(changes.show_frame, 1)
     assert cells(full) == before
-    wanted = worst_cells(full.store.session.frames, 1, "size_skew").cells.tolist()
+    wanted = worst_cells(full.store.session.frames, 1, "size-skew").cells.tolist()
     qtbot.waitUntil(lambda: cells(full) == wanted)
 
 
@@ -355,7 +355,7 @@ def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, mo
     assert asked == []
     window.docks_.lead_to("worst")
     opened.qtbot.waitUntil(lambda: "worst_cells" in asked)
-    wanted = worst_cells(opened.session.frames, 1, "size_skew").cells.tolist()
+    wanted = worst_cells(opened.session.frames, 1, "size-skew").cells.tolist()
     assert cells(panel) == wanted
     window.docks_.lead_to("histogram")
     opened.qtbot.waitUntil(lambda: "distribution" in asked)

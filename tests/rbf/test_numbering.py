@@ -59,7 +59,7 @@ def case_on(mesh, way, motion, **others):
 @settings(max_examples=40, deadline=None)
 @given(
     name=st.sampled_from(list(MESHES)),
-    method=st.sampled_from(METHODS),
+    method=st.sampled_from(list(METHODS)),
     choice=st.sampled_from(list(CHOICES)),
     motion=st.sampled_from(["scale", "shift"]),
     seed=st.integers(0, 99),

@@ -46,7 +46,7 @@ def stepped(session, *sizes):
         moved = mesh.with_points(mesh.points + size * mesh.extent * shake)
         frames.append(Frame(moved, quality(moved, mesh)))
     session = changes.add_frames(changes.start_run(session), frames)
-    return changes.set_view(session, colour_by="size_skew", motion_ghost=False)
+    return changes.set_view(session, colour_by="size-skew", motion_ghost=False)
 
 
 def opened(scene, session):
@@ -173,7 +173,7 @@ def test_2d_the_other_cells_vanish(scene, session):
     session = changes.add_frames(
         changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
     )
-    session = opened(scene, changes.set_view(session, colour_by="size_skew", edges=True))
+    session = opened(scene, changes.set_view(session, colour_by="size-skew", edges=True))
     whole = image(scene)
     scene.update(changes.set_view(session, threshold=(0.0, 0.99)))
     assert scene._chosen.cells.tolist() == [5, 6, 9, 10]

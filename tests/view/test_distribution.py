@@ -25,7 +25,7 @@ def frames(square):
     return found
 
 
-@pytest.mark.parametrize("what", ["size_skew", "size", "skew"])
+@pytest.mark.parametrize("what", ["size-skew", "size", "skew"])
 @pytest.mark.parametrize("index", [0, 1, 2])
 def test_every_cell_is_counted_once_inverted_ones_apart(frames, what, index):
     frame = frames[index]

@@ -10,8 +10,9 @@ from matplotlib.colors import to_rgb
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
+from slideviz.terms import ROLES
 from slideviz.view import jobs_export
-from slideviz.view.drawing.look import ROLE_COLOURS, SELECTED_COLOUR
+from slideviz.view.drawing.look import SELECTED_COLOUR
 from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
 from slideviz.view.layers.mesh import FADED
@@ -41,7 +42,7 @@ def session(square):
     for scale in (1.02, 1.05):
         moved = square.with_points(square.points * [scale, 1.0])
         found = changes.add_frames(found, [Frame(moved, quality(moved, square))])
-    return changes.set_view(changes.end_run(found, "done"), colour_by="size_skew")
+    return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew")
 
 
 @pytest.fixture
@@ -301,7 +302,7 @@ def test_drawings_are_whole_and_always_the_same(studio, tmp_path):
     write_vector(studio, figure, tmp_path / "c.svg")
     roles = {studio.session.role(name) for name in studio.session.mesh.marker_names}
     text = (tmp_path / "c.svg").read_text()
-    assert all(ROLE_COLOURS[role] in text for role in roles)
+    assert all(ROLES[role].colour in text for role in roles)
     write_vector(studio, replace(figure, background="transparent"), tmp_path / "d.pdf")
     assert (tmp_path / "d.pdf").read_bytes().startswith(b"%PDF")
 

@@ -65,7 +65,7 @@ def frames(square):
 @pytest.fixture
 def ran(session, frames):
     run = Run(1, session.case, frames[1:], "done")
-    view = replace(session.view, colour_by="size_skew", frame=2)
+    view = replace(session.view, colour_by="size-skew", frame=2)
     return replace(session, first=frames[0], runs=(run,), shown=1, view=view)
 
 

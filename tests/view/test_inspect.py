@@ -35,7 +35,7 @@ def test_a_range_chooses_its_ends_and_what_is_between():
 
 def test_inverted_cells_are_chosen_from_0_alone(frames):
     frame = frames[-1]
-    values = frame.shown_values("size_skew")
+    values = frame.shown_values("size-skew")
     inverted = np.flatnonzero(np.isnan(values))
     assert len(inverted) == frame.quality.inverted > 0
     assert set(inverted) <= set(chosen_cells(values, (0.0, 0.3)))
@@ -43,7 +43,7 @@ def test_inverted_cells_are_chosen_from_0_alone(frames):
     assert chosen_cells(values, ONLY_INVERTED).tolist() == inverted.tolist()
 
 
-@pytest.mark.parametrize("what", ["size_skew", "size", "skew"])
+@pytest.mark.parametrize("what", ["size-skew", "size", "skew"])
 def test_the_worst_cells_are_those_of_a_full_sort(frames, what):
     found = inspect.worst_cells(frames, 2, what, 5)
     values = frames[2].values(what)
@@ -55,12 +55,12 @@ def test_the_worst_cells_are_those_of_a_full_sort(frames, what):
 
 
 def test_equal_cells_are_listed_by_number(frames):
-    assert inspect.worst_cells(frames, 0, "size_skew", 4).cells.tolist() == [0, 1, 2, 3]
-    assert len(inspect.worst_cells(frames, 0, "size_skew")) == 16
+    assert inspect.worst_cells(frames, 0, "size-skew", 4).cells.tolist() == [0, 1, 2, 3]
+    assert len(inspect.worst_cells(frames, 0, "size-skew")) == 16
 
 
 def test_each_worst_cell_tells_the_first_step_at_which_it_was_worst(frames):
-    found = inspect.worst_cells(frames, len(frames) - 1, "size_skew", 16)
+    found = inspect.worst_cells(frames, len(frames) - 1, "size-skew", 16)
     for cell, step in zip(found.cells, found.steps, strict=True):
         history = [frame.quality.values[cell] for frame in frames]
         assert step == history.index(min(history))
@@ -73,8 +73,8 @@ def test_each_worst_cell_tells_the_first_step_at_which_it_was_worst(frames):
 
 
 def test_displacements_and_roles_have_the_worst_of_size_skew(frames):
-    assert inspect.measure("role") == inspect.measure("displacement") == "size_skew"
-    a, b = (inspect.worst_cells(frames, 2, what, 3) for what in ("displacement", "size_skew"))
+    assert inspect.measure("role") == inspect.measure("displacement") == "size-skew"
+    a, b = (inspect.worst_cells(frames, 2, what, 3) for what in ("displacement", "size-skew"))
     assert a.cells.tolist() == b.cells.tolist()
 
 

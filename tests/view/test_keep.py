@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.model import Case
-from slideviz.case.view_keys import MAPS, read_sections, write_sections
+from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
+from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN
 from slideviz.view.sections.model import Section
 from slideviz.view.session import changes
 from slideviz.view.session.keep import keep_view, kept_camera, kept_view
-from slideviz.view.session.state import COLOUR_BY, POINTS, ViewState
+from slideviz.view.session.state import ViewState
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)
@@ -44,9 +45,9 @@ views = st.builds(
     ViewState,
     st.sampled_from(list(COLOUR_BY)),
     rising,
-    st.sampled_from(MAPS),
+    st.sampled_from(list(COLOUR_MAPS)),
     rising,
-    st.sampled_from(list(POINTS)),
+    st.sampled_from(list(POINTS_SHOWN)),
     *[st.booleans()] * 6,
     st.lists(sections, max_size=3).map(tuple),
     st.integers(-1, 5),

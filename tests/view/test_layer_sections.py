@@ -91,7 +91,7 @@ def count(plotter, colour, within=14):
 @pytest.mark.parametrize("whole", [False, True])
 def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
     section = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0), whole=whole)
-    opened(scene, cube, sections=(section,), colour_by="size_skew")
+    opened(scene, cube, sections=(section,), colour_by="size-skew")
     wanted = crossing(cube, 2, 0.46)
     assert 0 < len(wanted) < len(cube.cells)
     assert cells_of(scene).tolist() == wanted.tolist()
@@ -100,7 +100,7 @@ def test_exactly_the_cells_that_are_cut_are_drawn(scene, cube, whole):
 
 
 def test_a_section_has_the_values_of_its_cells(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
     one = scene.sections.drawn["section:0"]
     frame = changes.set_view(session, colour_by="skew")
     scene.update(frame)
@@ -113,7 +113,7 @@ def test_a_section_has_the_values_of_its_cells(scene, cube):
 
 
 def test_a_section_follows_the_step(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
     points = cube.points.copy()
     points[:, 2] = points[:, 2] ** 2
     later = stepped(session, points)
@@ -126,7 +126,7 @@ def test_a_section_follows_the_step(scene, cube):
 
 
 def test_nothing_is_cut_again_when_only_the_colours_change(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
     before = scene.sections.drawn["section:0"].polygons
     session = changes.set_view(session, colour_by="size", edges=False, colour_range=(0.2, 0.6))
     scene.update(session)
@@ -166,7 +166,7 @@ def test_a_section_beside_the_mesh_shows_nothing(scene, cube):
 def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, copies):
     """The shell is seen beside it, and is what it was when the section is gone."""
     mesh, section = stator.mesh, Section("cylinder", radius=0.27)
-    view = {"colour_by": "size_skew", "edges": False, "copies": copies}
+    view = {"colour_by": "size-skew", "edges": False, "copies": copies}
     session = opened(scene, mesh, stator.case, **view)
     before = colours(scene.plotter)
     scene.update(changes.add_section(session, section))
@@ -233,7 +233,7 @@ def halved(session):
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_range_leaves_its_cells_of_a_section_only(scene, cube, whole):
     section = replace(MIDDLE, whole=whole)
-    session = opened(scene, bent(cube), sections=(section,), colour_by="size_skew")
+    session = opened(scene, bent(cube), sections=(section,), colour_by="size-skew")
     cut, full = cells_of(scene), scene.sections.drawn["section:0"].polygons
     some, kept = halved(session)
     scene.update(some)
@@ -257,7 +257,7 @@ def bent(cube):
 
 
 def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
-    session = opened(scene, cube, colour_by="size_skew")
+    session = opened(scene, cube, colour_by="size-skew")
     scene.look_from("iso")
     on, beside = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46], [0.9, 0.9, 0.99]]))
     assert scene.pick(*on)
@@ -273,7 +273,7 @@ def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
 
 def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, copies=1, colour_by="size_skew")
+    session = opened(scene, stator.mesh, stator.case, copies=1, colour_by="size-skew")
     scene.update(changes.add_section(session, section))
     twin = scene.plotter.actors["section:0:1"]
     points = moved(middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix))
@@ -288,7 +288,7 @@ def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
 
 
 def test_inverted_cells_are_red_in_a_section(scene, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew", edges=False)
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew", edges=False)
     scene.look_from("+z")
     assert count(scene.plotter, INVERTED_COLOUR, 30) == 0
     points = cube.points.copy()
@@ -299,7 +299,7 @@ def test_inverted_cells_are_red_in_a_section(scene, cube):
 
 
 def test_the_cell_under_the_mouse_is_that_of_the_section(scene, cube):
-    opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew")
+    opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew")
     scene.look_from("+z")
     x, y = to_display(scene.plotter, np.array([[0.2, 0.2, 0.46]]))[0]
     assert scene.pick_cell(x, y) in crossing(cube, 2, 0.46)
@@ -310,7 +310,7 @@ WHOLE = replace(LINE, whole=True)
 
 
 def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
-    session = opened(scene, square, sections=(LINE,), colour_by="size_skew")
+    session = opened(scene, square, sections=(LINE,), colour_by="size-skew")
     one = scene.sections.drawn["section:0"]
     assert one.shown.shape.n_lines == 4
     assert one.shown.mapper.scalar_visibility
@@ -326,7 +326,7 @@ def test_in_2d_a_plane_is_a_line_or_the_cells_on_it(scene, square):
 
 
 def test_in_2d_the_other_cells_step_back_while_a_section_is_shown(scene, square):
-    session = opened(scene, square, sections=(WHOLE,), colour_by="size_skew")
+    session = opened(scene, square, sections=(WHOLE,), colour_by="size-skew")
     cells = scene.plotter.actors["cells"]
     assert cells.prop.opacity < 0.5
     scene.update(changes.replace_section(session, 0, replace(WHOLE, shown=False)))
@@ -339,7 +339,7 @@ def test_in_2d_the_other_cells_step_back_while_a_section_is_shown(scene, square)
 
 
 def test_the_cutting_line_goes_on_in_holes_and_beside_the_mesh(scene, square):
-    session = opened(scene, square, sections=(WHOLE,), colour_by="size_skew")
+    session = opened(scene, square, sections=(WHOLE,), colour_by="size-skew")
     left, right = scene.plotter.actors["line:0"].bounds[:2]
     assert left < 0.0
     assert right > 4.0
@@ -449,7 +449,7 @@ def test_a_turned_plane_still_cuts(cube):
 
 def test_a_flat_cylinder_has_z_and_r_theta(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, sections=(section,), colour_by="size_skew")
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), colour_by="size-skew")
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     flat.fit()
@@ -491,7 +491,7 @@ def test_a_flat_section_says_what_it_cuts_and_what_is_under_the_mouse(scene, fla
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plotter, cube, whole):
     section = replace(MIDDLE, whole=whole)
-    session = opened(scene, bent(cube), sections=(section,), colour_by="size_skew")
+    session = opened(scene, bent(cube), sections=(section,), colour_by="size-skew")
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     bounds, every = flat.bounds(), flat.polygons.cell_ids
@@ -559,7 +559,7 @@ def test_the_marked_cell_has_a_rim_in_the_flat_view(scene, flat_plotter, cube):
 
 
 def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
-    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size_skew", edges=False)
+    session = opened(scene, cube, sections=(MIDDLE,), colour_by="size-skew", edges=False)
     points = cube.points.copy()
     inside = ((points > 0.3) & (points < 0.7)).all(axis=1)
     points[inside] = 1.0 - points[inside]
@@ -636,7 +636,7 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
 def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, monkeypatch):
     mesh = bent(cube)
     session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
-    session = changes.set_view(session, colour_by="size_skew")
+    session = changes.set_view(session, colour_by="size-skew")
     some, kept = halved(session)
     drawn = []
     real = section_picture.draw_section
@@ -658,7 +658,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
 def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
     session = changes.open_mesh(Frame(square, quality(square)), None)
     session = changes.set_view(
-        session, colour_by="size_skew", sections=(replace(LINE, whole=whole),)
+        session, colour_by="size-skew", sections=(replace(LINE, whole=whole),)
     )
 
     def coloured():

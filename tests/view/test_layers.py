@@ -6,7 +6,8 @@ import pyvista as pv
 
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import DARK, LIGHT, ROLE_COLOURS
+from slideviz.terms import NODE_TYPES, ROLES
+from slideviz.view.drawing.look import DARK, LIGHT
 from slideviz.view.drawing.pick import to_display
 from slideviz.view.drawing.surfaces import find_surfaces
 from slideviz.view.inspect import middles
@@ -20,7 +21,6 @@ from slideviz.view.layers.copies import (
     outermost,
 )
 from slideviz.view.layers.triad import COLOURS, SIZE
-from slideviz.view.node_types import NODE_COLOURS
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 
@@ -80,34 +80,34 @@ def deformed(session, shift):
 
 
 def test_points_have_the_colour_of_their_type_where_the_nodes_are(scene, row):
-    session = opened(scene, row, points="types", colour_by="size_skew", edges=False, triad=False)
+    session = opened(scene, row, points="types", colour_by="size-skew", edges=False, triad=False)
     mesh = row.mesh
     blade = mesh.points[mesh.marker("BLADE").nodes]
     inflow = mesh.points[mesh.marker("INFLOW").nodes]
     # The line of the boundary has the colour of its role: a point is wider.
-    assert has(near(scene, blade[5]), NODE_COLOURS["moving"], least=22)
-    assert has(near(scene, inflow[len(inflow) // 2]), NODE_COLOURS["sliding_edge"])
+    assert has(near(scene, blade[5]), NODE_TYPES["moving"].colour, least=22)
+    assert has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].colour)
     scene.update(changes.set_view(session, points="none"))
-    assert not has(near(scene, blade[5]), NODE_COLOURS["moving"], least=22)
-    assert not has(near(scene, inflow[len(inflow) // 2]), NODE_COLOURS["sliding_edge"])
+    assert not has(near(scene, blade[5]), NODE_TYPES["moving"].colour, least=22)
+    assert not has(near(scene, inflow[len(inflow) // 2]), NODE_TYPES["sliding_edge"].colour)
 
 
 def test_points_follow_the_step_and_their_boundary(scene, row):
-    session = opened(scene, row, points="types", colour_by="size_skew", edges=False, triad=False)
+    session = opened(scene, row, points="types", colour_by="size-skew", edges=False, triad=False)
     at = row.mesh.points[row.mesh.marker("BLADE").nodes][5]
     moved = deformed(session, LEFT)
     scene.update(moved)
-    assert has(near(scene, at + LEFT), NODE_COLOURS["moving"])
-    assert not has(near(scene, at), NODE_COLOURS["moving"], 25)
+    assert has(near(scene, at + LEFT), NODE_TYPES["moving"].colour)
+    assert not has(near(scene, at), NODE_TYPES["moving"].colour, 25)
     hidden = changes.show(moved, ("BLADE",), False)
     scene.update(hidden)
-    assert not has(near(scene, at + LEFT), NODE_COLOURS["moving"])
+    assert not has(near(scene, at + LEFT), NODE_TYPES["moving"].colour)
     scene.update(changes.show_frame(changes.show(hidden, ("BLADE",)), 0))
-    assert has(near(scene, at), NODE_COLOURS["moving"])
+    assert has(near(scene, at), NODE_TYPES["moving"].colour)
 
 
 def test_the_legend_names_the_points(scene, row):
-    session = opened(scene, row, points="types", colour_by="size_skew")
+    session = opened(scene, row, points="types", colour_by="size-skew")
 
     def words():
         found = [name.split(":") for name in scene.plotter.actors if name.startswith("legend:")]
@@ -116,7 +116,7 @@ def test_the_legend_names_the_points(scene, row):
     assert words() == {"moving", "sliding edge", "periodic"}
     bar = scene.plotter.scalar_bars["size-skew"]
     with_points = bar.GetHeight()
-    scene.update(changes.set_view(session, points="none", colour_by="size_skew"))
+    scene.update(changes.set_view(session, points="none", colour_by="size-skew"))
     assert not words()
     assert scene.plotter.scalar_bars["size-skew"].GetHeight() > with_points
     scene.update(changes.set_view(session, colour_by="role"))
@@ -132,13 +132,13 @@ def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     session = opened(scene, row, copies=1, edges=False, triad=False)
-    orange = np.array(pv.Color(ROLE_COLOURS["moving"]).int_rgb)
+    orange = np.array(pv.Color(ROLES["moving"].colour).int_rgb)
     plain = np.array(pv.Color(LIGHT.cell).int_rgb)
     paler = pv.Color((orange + PALER * (plain - orange)).astype(int).tolist())
-    assert has(near(scene, at), ROLE_COLOURS["moving"], 20)
+    assert has(near(scene, at), ROLES["moving"].colour, 20)
     for side in (-1, 1):
         assert has(near(scene, at + side * pitch), paler, 20), side
-        assert not has(near(scene, at + side * pitch), ROLE_COLOURS["moving"], 20), "not paler"
+        assert not has(near(scene, at + side * pitch), ROLES["moving"].colour, 20), "not paler"
     assert scene.pick(*to_display(scene.plotter, [[*(at + pitch), 0.0]])[0]) != "BLADE"
     scene.update(changes.set_view(session, copies=0))
     assert not has(near(scene, at + pitch), paler, 20)
@@ -225,7 +225,7 @@ def test_neighbours_show_the_chosen_cells_only(scene, row):
 
 
 def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
-    session = opened(scene, stator, copies=1, colour_by="size_skew")
+    session = opened(scene, stator, copies=1, colour_by="size-skew")
     chosen = next(layer for layer in scene.layers if isinstance(layer, ChosenLayer))
     for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
         scene.update(changes.set_view(session, threshold=threshold))

@@ -9,8 +9,9 @@ from slideviz.case.model import Reduction, Translate
 from slideviz.case.samples import sample
 from slideviz.mesh.quality import quality
 from slideviz.staircase import deform
+from slideviz.terms import NODE_TYPES
 from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.node_types import NODE_WORDS, NOTHING, NodeTypes
+from slideviz.view.node_types import NOTHING, NodeTypes
 from slideviz.view.session import changes
 from slideviz.view.session.state import Frame
 
@@ -22,7 +23,7 @@ def session_of(one, **view):
 
 def named(typed):
     """Return the nodes of each type."""
-    words = list(NODE_WORDS)
+    words = list(NODE_TYPES)
     return {kind: set(typed.nodes[typed.kinds == words.index(kind)].tolist()) for kind in words}
 
 

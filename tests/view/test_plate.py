@@ -38,7 +38,7 @@ def image(scene):
 
 @pytest.mark.parametrize("look", [LIGHT, DARK])
 def test_beside_the_mesh_no_plate_is_seen(plotter, square, look):
-    scene, session = opened(plotter, square, look, colour_by="size_skew")
+    scene, session = opened(plotter, square, look, colour_by="size-skew")
     with_plate = image(scene)
     scene.stage.has_plate = False
     scene.update(session)
@@ -46,7 +46,7 @@ def test_beside_the_mesh_no_plate_is_seen(plotter, square, look):
 
 
 @pytest.mark.parametrize("look", [LIGHT, DARK])
-@pytest.mark.parametrize("by", ["size_skew", "role"])
+@pytest.mark.parametrize("by", ["size-skew", "role"])
 def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, look, by):
     scene, session = opened(plotter, square, look, colour_by=by)
     scene.eye.aim((2.0, 2.0, 0.0), 0.3)
@@ -55,8 +55,8 @@ def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, 
     scene.update(session)
     bare = image(scene)
     # Most of the strip is neither bar nor letter.
-    right = np.s_[90:300, -STRIP + 2 : -2] if by == "size_skew" else np.s_[4:50, -STRIP + 2 : -2]
-    colour = look.background if by == "size_skew" else look.background_top
+    right = np.s_[90:300, -STRIP + 2 : -2] if by == "size-skew" else np.s_[4:50, -STRIP + 2 : -2]
+    colour = look.background if by == "size-skew" else look.background_top
     background = np.array(pv.Color(colour).int_rgb, float)
 
     def away(picture):
@@ -68,7 +68,7 @@ def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, 
 
 
 def test_a_plate_follows_the_size_of_the_view(plotter, square):
-    scene, _ = opened(plotter, square, LIGHT, colour_by="size_skew")
+    scene, _ = opened(plotter, square, LIGHT, colour_by="size-skew")
     plate = plotter.actors["plate:legend"]
     before = np.array(plate.GetMapper().GetInput().GetBounds()[:4])
     assert before[:2] == pytest.approx((SIZE[0] - STRIP, SIZE[0]))
@@ -81,7 +81,7 @@ def test_a_plate_follows_the_size_of_the_view(plotter, square):
 
 def test_a_transparent_picture_has_no_plate(square):
     session = changes.open_mesh(Frame(square, quality(square)), None)
-    session = changes.set_view(session, colour_by="size_skew")
+    session = changes.set_view(session, colour_by="size-skew")
     with Studio(session, find_surfaces(square)) as studio:
         clear = studio.image(Figure(SIZE, background="transparent"))
         strip = round(STRIP * Figure(SIZE).scale)

@@ -5,7 +5,8 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT, ROLE_COLOURS
+from slideviz.terms import ROLES
+from slideviz.view.drawing.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
 from slideviz.view.drawing.pick import to_display
 from slideviz.view.drawing.surfaces import facet_connectivity, find_surfaces
 from slideviz.view.layers.mesh import GLASS, enclosed, is_closed
@@ -39,12 +40,12 @@ def opened(scene, session):
 
 def test_roles_have_their_colours(scene, session):
     session = opened(scene, changes.set_role(session, ("left",), "moving"))
-    before = count(image(scene), ROLE_COLOURS["moving"])
+    before = count(image(scene), ROLES["moving"].colour)
     assert before > 200
     scene.update(changes.set_role(session, ("left",), "sliding"))
     after = image(scene)
-    assert count(after, ROLE_COLOURS["moving"]) == 0
-    assert count(after, ROLE_COLOURS["sliding"]) > 200
+    assert count(after, ROLES["moving"].colour) == 0
+    assert count(after, ROLES["sliding"].colour) > 200
 
 
 def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
@@ -52,7 +53,7 @@ def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
     points[12] += 0.45
     mesh = session.mesh.with_points(points)
     frame = Frame(mesh, quality(mesh, session.mesh))
-    session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
+    session = changes.set_view(opened(scene, session), colour_by="size-skew", edges=False)
     session = changes.add_frames(changes.start_run(session), [frame])
     scene.update(session)
     table = pv.LookupTable(COLOUR_MAP, scalar_range=(0.0, 1.0))
@@ -95,7 +96,7 @@ def test_hidden_boundaries_are_not_drawn_and_not_picked(scene, session):
     assert scene.pick(x, y) == "left"
     scene.update(changes.show(session, ("left",), False))
     # The legend still names the role, so that some of its colour remains.
-    assert count(image(scene), ROLE_COLOURS["moving"]) < 250
+    assert count(image(scene), ROLES["moving"].colour) < 250
     assert scene.pick(x, y) is None
 
 
@@ -206,7 +207,7 @@ def test_the_legend_says_roles_or_shows_the_bar(scene, session):
 def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
     scene.plotter.window_size = 500, height
     session = opened(scene, session)
-    scene.update(changes.set_view(session, colour_by="size_skew", colour_range=(0.946, 0.967)))
+    scene.update(changes.set_view(session, colour_by="size-skew", colour_range=(0.946, 0.967)))
     bar = scene.plotter.scalar_bars["size-skew"]
     labels = bar.GetCustomLabels()
     values = [labels.GetValue(row) for row in range(labels.GetNumberOfTuples())]
@@ -218,7 +219,7 @@ def test_the_bar_has_the_numbers_of_its_ends(scene, session, height, count):
 
 def test_the_title_of_the_bar_keeps_away_from_the_edge_in_a_view_of_any_size(scene, session):
     session = opened(scene, session)
-    scene.update(changes.set_view(session, colour_by="size_skew"))
+    scene.update(changes.set_view(session, colour_by="size-skew"))
     for width in (900, 400, 900):
         scene.plotter.window_size = width, 600
         scene.resized()
@@ -286,7 +287,7 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
         (0, lambda s: changes.select(s, ["left"])),
         (1, lambda s: changes.set_role(s, ["left"], "internal")),
         (0, lambda s: changes.set_view(s, edges=False)),
-        (1, lambda s: changes.set_view(s, colour_by="size_skew")),
+        (1, lambda s: changes.set_view(s, colour_by="size-skew")),
         (0, lambda s: changes.set_role(s, ["left"], "fixed")),
         (0, lambda s: changes.set_view(s, legend=False)),
         (1, lambda s: changes.set_view(s, legend=True)),
@@ -305,7 +306,7 @@ def legend_actors(plotter):
     return {n: a.GetAddressAsString("") for n, a in plotter.actors.items() if "legend" in n}
 
 
-@pytest.mark.parametrize("by", ["role", "size_skew"])
+@pytest.mark.parametrize("by", ["role", "size-skew"])
 def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(cube, by):
     session = changes.open_mesh(Frame(cube, quality(cube)), None)
     session = changes.set_view(session, colour_by=by, points="types")
@@ -322,11 +323,11 @@ def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(c
         plotter.close()
     differs = np.abs(pictures[0] - pictures[1]).max(axis=2) > 40
     assert differs.sum() < 40
-    assert count(pictures[0], ROLE_COLOURS["fixed"]) > 20 or by != "role"
+    assert count(pictures[0], ROLES["fixed"].colour) > 20 or by != "role"
 
 
 def test_another_map_and_another_range_give_other_colours(scene, session):
-    session = changes.set_view(opened(scene, session), colour_by="size_skew", edges=False)
+    session = changes.set_view(opened(scene, session), colour_by="size-skew", edges=False)
     scene.update(session)
     highest = np.array(pv.LookupTable("viridis").map_value(1.0)[:3]) * 255
     assert np.abs(pixel(scene, (1.5, 1.5, 0))[:3] - highest).max() < 12
@@ -437,7 +438,7 @@ def test_a_moving_boundary_inside_is_seen_and_clicked_through_those_around_it(sc
     for picture, orange in ((image(scene)[patch], True), (hidden[patch], False)):
         assert ((picture[..., 0] > picture[..., 2] + 40).mean() > 0.9) == orange
     # Values are looked at on the boundaries; without what is inside there is no reason for glass.
-    for view in ({"colour_by": "size_skew"}, {"hidden": frozenset({"BLOCK"})}):
+    for view in ({"colour_by": "size-skew"}, {"hidden": frozenset({"BLOCK"})}):
         scene.update(changes.set_view(moving, **view))
         assert {one.actor.prop.opacity for one in scene.drawn.values()} == {1.0}
         assert scene.pick(*middle) == front

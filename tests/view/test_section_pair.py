@@ -30,7 +30,7 @@ def compared(mesh):
         moved = mesh.with_points(mesh.points + np.eye(mesh.dim)[0] * push[:, None])
         frames = [Frame(moved, quality(moved, mesh))]
         session = changes.end_run(changes.add_frames(session, frames), "done")
-    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.2, 0.9))
+    session = changes.set_view(session, colour_by="size-skew", colour_range=(0.2, 0.9))
     return changes.show_beside(changes.show_run(session, 2), 1)
 
 

@@ -13,13 +13,14 @@ from PIL import Image
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
+from slideviz.terms import QUANTITIES
 from slideviz.view.copies import passages, show_passages
 from slideviz.view.drawing.look import COLOUR_MAP, INVERTED_COLOUR
 from slideviz.view.sections import shapes as section_shapes
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.layout import inches_of, lay_out
 from slideviz.view.sections.model import Section
-from slideviz.view.sections.paint import PAINT_BY, paint
+from slideviz.view.sections.paint import paint
 from slideviz.view.sections.picture import SectionStyle, draw_section, section_picture
 from slideviz.view.sections.space import in_space
 from tests.builders import cube, passage, square
@@ -227,7 +228,7 @@ def test_a_2d_mesh_is_drawn_in_its_plane():
     assert len(shapes.get_paths()) == 6
 
 
-@pytest.mark.parametrize("by", PAINT_BY)
+@pytest.mark.parametrize("by", QUANTITIES)
 def test_every_number_can_be_drawn(by):
     base = cube(4, block=False)
     mesh = bent(base)

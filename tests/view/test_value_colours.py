@@ -41,7 +41,7 @@ def folded(session):
     frame = Frame(mesh, quality(mesh, session.mesh))
     assert frame.quality.inverted
     session = changes.add_frames(changes.start_run(session), [frame])
-    return changes.set_view(session, colour_by="size_skew", edges=False, legend=False)
+    return changes.set_view(session, colour_by="size-skew", edges=False, legend=False)
 
 
 def above_all(session):
@@ -54,7 +54,7 @@ LOWEST = tuple(pv.LookupTable("plasma").map_value(0.0)[:3])
 def test_cells_below_the_range_have_its_lowest_colour_and_inverted_ones_are_red(plotter, session):
     scene = Scene(plotter)
     for state, red in ((session, False), (folded(session), True)):
-        state = above_all(changes.set_view(state, colour_by="size_skew", edges=False, legend=False))
+        state = above_all(changes.set_view(state, colour_by="size-skew", edges=False, legend=False))
         scene.open(state, find_surfaces(state.mesh))
         picture = colours(plotter)
         assert count(picture, LOWEST) > 5000
@@ -63,7 +63,7 @@ def test_cells_below_the_range_have_its_lowest_colour_and_inverted_ones_are_red(
 
 def test_so_it_is_in_the_flat_view(plotter, cube):
     session = changes.open_mesh(Frame(cube, quality(cube)), None)
-    session = above_all(changes.set_view(session, colour_by="size_skew", edges=False))
+    session = above_all(changes.set_view(session, colour_by="size-skew", edges=False))
     scene = FlatScene(plotter, Cuts())
     scene.update(session, Section("plane", (0.5, 0.5, 0.52)))
     scene.fit()
@@ -74,7 +74,7 @@ def test_so_it_is_in_the_flat_view(plotter, cube):
 
 def test_the_labels_of_the_bar_differ(plotter, session):
     scene = Scene(plotter)
-    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
+    session = changes.set_view(session, colour_by="size-skew", colour_range=(0.949, 0.967))
     scene.open(session, find_surfaces(session.mesh))
     bar = plotter.scalar_bars["size-skew"]
     at = [
@@ -88,7 +88,7 @@ def test_the_labels_of_the_bar_differ(plotter, session):
 
 def test_so_it_is_in_vector_figures(session):
     for state, red in ((session, 0), (folded(session), 1)):
-        state = above_all(changes.set_view(state, colour_by="size_skew"))
+        state = above_all(changes.set_view(state, colour_by="size-skew"))
         with Studio(state, find_surfaces(state.mesh)) as studio:
             sheet = draw_vector(studio, Figure((300, 300), legend=False))
         cells = sheet.axes[0].collections[0]

@@ -159,7 +159,7 @@ def test_what_the_case_finds_wrong_is_passed_on(session):
 
 
 @pytest.mark.parametrize(
-    ("what", "name"), [("size", "size"), ("skew", "skew"), ("size_skew", "values")]
+    ("what", "name"), [("size", "size"), ("skew", "skew"), ("size-skew", "values")]
 )
 def test_frame_values_are_those_asked_for(session, what, name):
     frame = moved(session)
@@ -257,13 +257,13 @@ def test_the_range_of_the_displacement_ends_at_a_round_number():
 
 
 def test_each_quantity_has_a_colour_range_of_its_own(session):
-    session = changes.set_view(session, colour_by="size_skew", colour_range=(0.949, 0.967))
+    session = changes.set_view(session, colour_by="size-skew", colour_range=(0.949, 0.967))
     moved = changes.set_view(session, colour_by="displacement")
     assert moved.view.colour_range is None
     assert moved.colour_range == (0.0, 1.0)
     moved = changes.set_view(moved, colour_range=(0.0, 0.02))
     assert changes.set_view(moved, colour_by="skew").view.colour_range is None
-    back = changes.set_view(changes.set_view(moved, colour_by="role"), colour_by="size_skew")
+    back = changes.set_view(changes.set_view(moved, colour_by="role"), colour_by="size-skew")
     assert back.view.colour_range == (0.949, 0.967)
     assert changes.set_view(back, colour_by="displacement").view.colour_range == (0.0, 0.02)
 
@@ -292,7 +292,7 @@ def ran(session):
 
 
 def test_the_colours_fit_all_steps_whichever_is_shown(ran):
-    session = changes.set_view(ran, colour_by="size_skew", frame=0)
+    session = changes.set_view(ran, colour_by="size-skew", frame=0)
     values = [frame.quality.values for frame in session.frames]
     lowest, highest = (pick(values) for pick in (np.min, np.max))
     fitted = changes.fit_colours(session)
@@ -306,7 +306,7 @@ def test_the_colours_fit_all_steps_whichever_is_shown(ran):
 
 
 def test_the_colours_fit_the_step_that_is_shown(ran):
-    session = changes.set_view(ran, colour_by="size_skew", frame=1)
+    session = changes.set_view(ran, colour_by="size-skew", frame=1)
     low, high = changes.fit_colours(session, every=False).view.colour_range
     values = session.frames[1].quality.values
     assert low <= values.min() < low + 0.02
@@ -315,7 +315,7 @@ def test_the_colours_fit_the_step_that_is_shown(ran):
 
 
 def test_inverted_cells_do_not_widen_the_colours(ran):
-    session = changes.set_view(ran, colour_by="size_skew")
+    session = changes.set_view(ran, colour_by="size-skew")
     last = session.run_shown.last
     status = last.quality.status.copy()
     worst = np.argmin(last.quality.values)

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.case.model import ROLES, Translate
+from slideviz.case.model import Translate
 from slideviz.mesh.quality import quality
+from slideviz.terms import COLOUR_BY, ROLES
 from slideviz.view.session import changes
-from slideviz.view.session.state import COLOUR_BY, Frame, Session, ViewState
+from slideviz.view.session.state import Frame, Session, ViewState
 from slideviz.view.session.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
 
 
@@ -203,7 +204,7 @@ def test_another_mesh_forgets_removed_runs(store, cube):
 
 names = st.lists(st.sampled_from(["left", "right", "top", "bottom"]), min_size=1, unique=True)
 intents = st.one_of(
-    st.tuples(st.just("set_role"), names.map(tuple), st.sampled_from(ROLES)),
+    st.tuples(st.just("set_role"), names.map(tuple), st.sampled_from(list(ROLES))),
     st.tuples(st.just("confirm")),
     st.tuples(st.just("confirm"), names.map(tuple)),
     st.tuples(st.just("add_motion"), st.sampled_from(["top", "left", ""])),

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import Case, Motion, Radial, Reduction, Role, Rotate, Scale, Translate
+from slideviz.case.model import Case, Motion, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.terms import Role
 from tools.laws.draw import Rng
 from tools.laws.made import Made, Period
 from tools.laws.meshes import nearest_neighbour, random_mesh

@@ -21,11 +21,10 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.model import ROLES
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.drawing.look import ROLE_MEANING
+from slideviz.terms import ROLES, labels
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
 from slideviz.view.session.store import Store
@@ -168,13 +167,13 @@ class BoundariesPanel(QWidget):
             count = QTableWidgetItem()
             count.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.table.setItem(row, COUNT, count)
-            choice = Choice({role: role for role in ROLES})
+            choice = Choice(labels(ROLES))
             choice.setFrame(False)
             # The tab key goes on to the next panel: F2 opens the roles.
             choice.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
             for index, role in enumerate(ROLES):
                 choice.setItemIcon(index, role_icon(role))
-            choice.explain({role: f"{role}: {ROLE_MEANING[role]}" for role in ROLES})
+            choice.explain({role: f"{role}: {ROLES[role].tip}" for role in ROLES})
             choice.chosen.connect(partial(self._role_chosen, name))
             self.table.setCellWidget(row, ROLE, choice)
             self._choices.append(choice)
@@ -198,7 +197,7 @@ class BoundariesPanel(QWidget):
         font = choice.font()
         font.setItalic(guess is not None)
         choice.setFont(font)
-        told = f"{role}: {ROLE_MEANING[role]}."
+        told = f"{role}: {ROLES[role].tip}."
         if guess:
             told += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
         choice.setToolTip(wrapped(told))
@@ -258,7 +257,7 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
     roles = {store.session.role(name) for name in names}
     for role in ROLES:
         act = QAction(role_icon(role), role.capitalize(), menu)
-        act.setToolTip(ROLE_MEANING[role])
+        act.setToolTip(ROLES[role].tip)
         act.setCheckable(True)
         act.setChecked(roles == {role})
         act.triggered.connect(_later(store, changes.set_role, names, role))

@@ -19,27 +19,17 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.view_keys import MAPS
 from slideviz.gui.panels.display_fields import Copies, Span, map_icon
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.periodic import Pair
+from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, labels
 from slideviz.view.copies import passages_around
 from slideviz.view.layers.copies import Period
 from slideviz.view.session import changes
 from slideviz.view.session.colours import usual_range
-from slideviz.view.session.state import COLOUR_BY, POINTS, Session
+from slideviz.view.session.state import Session
 from slideviz.view.session.store import Store
-
-SHOWN: dict[str, tuple[str, str]] = {
-    "edges": ("Mesh edges", "Draw the edges of the cells."),
-    "undeformed": ("Undeformed", "Draw the undeformed boundaries as a ghost."),
-    "motion_ghost": ("Motion ghost", "Draw where the motions take the moving boundaries."),
-    "legend": ("Legend", "Draw the legend of roles or the colour bar."),
-    "triad": ("Axes", "Draw the directions of the axes in a corner."),
-    "perspective": ("Perspective", "Perspective instead of parallel projection."),
-}
-"""What can be drawn or not, with words and a sentence for it."""
 
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
@@ -81,12 +71,12 @@ class DisplayPanel(QWidget):
         return inside
 
     def _make_colours(self) -> None:
-        self.colour_by = self._choice("display_colour_by", dict(COLOUR_BY), "colour_by")
+        self.colour_by = self._choice("display_colour_by", labels(COLOUR_BY), "colour_by")
         self.colour_by.setToolTip("What the colours of the view say.")
         self.form.addRow("Colour by", self.colour_by)
-        self.map = self._choice("colour_map", {name: name for name in MAPS}, "colour_map")
+        self.map = self._choice("colour_map", labels(COLOUR_MAPS), "colour_map")
         self.map.setIconSize(QSize(64, 12))
-        for index, name in enumerate(MAPS):
+        for index, name in enumerate(COLOUR_MAPS):
             self.map.setItemIcon(index, map_icon(name))
         self.form.addRow("Colours", self.map)
         self.range = Span("range", lambda values: self._set(colour_range=values))
@@ -109,7 +99,7 @@ class DisplayPanel(QWidget):
         self.form.addRow(self.only, self.threshold)
 
     def _make_rest(self) -> None:
-        self.points = self._choice("points", dict(POINTS), "points")
+        self.points = self._choice("points", labels(POINTS_SHOWN), "points")
         self.points.setToolTip(
             wrapped(
                 "Draw nodes as points: those of the boundaries with what they may do, or the "
@@ -126,10 +116,10 @@ class DisplayPanel(QWidget):
         grid = QGridLayout()
         grid.setVerticalSpacing(3)
         self.shown: dict[str, QCheckBox] = {}
-        for index, (name, (word, tip)) in enumerate(SHOWN.items()):
-            box = QCheckBox(word)
+        for index, (name, term) in enumerate(SHOWN.items()):
+            box = QCheckBox(term.label)
             box.setObjectName(f"show_{name}")
-            box.setToolTip(wrapped(tip))
+            box.setToolTip(wrapped(term.tip))
             box.toggled.connect(lambda on, name=name: self._set(**{name: on}))
             grid.addWidget(box, index // 2, index % 2)
             self.shown[name] = box
@@ -195,9 +185,8 @@ class DisplayPanel(QWidget):
             box.setChecked(getattr(view, name))
         flat = opened and session.mesh.dim == 2
         self.shown["perspective"].setEnabled(not flat)
-        tip = (
-            "A 2D mesh is always shown in parallel projection." if flat else SHOWN["perspective"][1]
-        )
+        tip = "A 2D mesh is always shown in parallel projection."
+        tip = tip if flat else SHOWN["perspective"].tip
         self.shown["perspective"].setToolTip(wrapped(tip))
 
     def _sync_copies(self, session: Session, pair: Pair | None) -> None:

@@ -26,7 +26,7 @@ from slideviz.gui.widgets.fields import (
     positive,
 )
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.window_words import METHOD_WORDS, PERIODIC_WORDS, SLIDING_WORDS, TYPE_WORDS
+from slideviz.terms import METHODS, PERIODIC_MODES, PERIODIC_TYPES, SLIDING, labels, tips
 
 MAX_STEPS = 9999
 
@@ -50,24 +50,6 @@ TIPS = {
     "tolerance": "The largest error at the boundary that the control nodes may leave to the "
     "correction, in the mesh's length unit.",
 }
-
-SLIDING_TIPS = {
-    "none": "Nodes of sliding boundaries stay where they are.",
-    "ps": "Sliding nodes follow as inner nodes do and are put back on their boundary, in stages: "
-    "edges first, then surfaces.",
-    "ds": "That nodes stay on their boundary is part of the system, which has all components of "
-    "the displacement at once: takes longer.",
-}
-PERIODIC_TIPS = {
-    "none": "Periodic boundaries are treated as sliding ones; distances do not repeat.",
-    "periodic": "Periodic boundaries are treated as sliding ones, and distances repeat: what "
-    "moves near one side is felt at the other.",
-    "fixed": "Periodic boundaries move freely, both sides alike; the corners of the domain are "
-    "held.",
-    "moving": "Periodic boundaries move freely, both sides alike; the corners of the domain slide "
-    "in the periodic direction. Needs a sliding method.",
-}
-"""Of the entries of the lists, by their value."""
 
 
 class MethodForm(QWidget):
@@ -104,12 +86,12 @@ class MethodForm(QWidget):
         return layout
 
     def _make_fields(self) -> None:
-        self.method = Choice(METHOD_WORDS)
-        self.sliding = Choice(SLIDING_WORDS)
-        self.sliding.explain(SLIDING_TIPS)
-        self.periodic = Choice(PERIODIC_WORDS)
-        self.periodic.explain(PERIODIC_TIPS)
-        self.periodic_type = Choice(TYPE_WORDS)
+        self.method = Choice(labels(METHODS))
+        self.sliding = Choice(labels(SLIDING))
+        self.sliding.explain(tips(SLIDING))
+        self.periodic = Choice(labels(PERIODIC_MODES))
+        self.periodic.explain(tips(PERIODIC_MODES))
+        self.periodic_type = Choice(labels(PERIODIC_TYPES))
         self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
         self.origin = VectorField((0.0, 0.0, 0.0))
         self.found = QLabel()

@@ -8,13 +8,13 @@ from dataclasses import replace
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QFormLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
-from slideviz.case.kernels import kernel_titles
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Reduction
 from slideviz.errors import CaseError
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, angle_limit, positive
 from slideviz.gui.widgets.tips import wrapped
+from slideviz.terms import KERNELS, LEVEL_CRITERIA, METHODS, METRICS, SELECTIONS, labels, names
 from slideviz.view.session.state import Session
 
 TIPS = {
@@ -82,14 +82,12 @@ class MoreSettings(QWidget):
         self._show_form(False)
 
     def _make_fields(self) -> None:
-        self.kernel = Choice(dict(kernel_titles()))
+        self.kernel = Choice(names(KERNELS))
         self.influence_factor = NumberField(2.5, _radius_problem)
         self.feature_angle_deg = NumberField(40.0, angle_limit)
-        self.quality_metric = Choice({"knupp": "Knupp", "rbf-slide": "as RBF-SliDe"})
-        self.selection = Choice(
-            {"block": "growing blocks", "double": "two at a time", "one": "one"}
-        )
-        self.levels = Choice({"none": "none", "size": "by size", "tol": "by fall of the error"})
+        self.quality_metric = Choice(labels(METRICS))
+        self.selection = Choice(labels(SELECTIONS))
+        self.levels = Choice({"none": "none"} | labels(LEVEL_CRITERIA))
         self.level_end = NumberField(16, self._level_problem)
         self.gamma = NumberField(25.0, positive)
         for name, title in TITLES.items():
@@ -162,12 +160,7 @@ class MoreSettings(QWidget):
 
 def not_used(case: Case) -> str:
     """Return why settings of radial basis functions do nothing; empty where they do."""
-    if case.method == "rbf":
-        return ""
-    return {
-        "idw": "inverse distance weighting does not use it",
-        "elastic": "linear elasticity does not use it",
-    }[case.method]
+    return "" if case.method == "rbf" else f"{METHODS[case.method].label.lower()} does not use it"
 
 
 def enable(field: QWidget, why_not: str, tip: str) -> None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
+from slideviz.terms import MOTION_KINDS
 from slideviz.view.motions.places import Axis
 
 KINDS: dict[type, str] = {
-    Translate: "translate",
-    Rotate: "rotate",
-    Scale: "scale",
-    Radial: "push radially",
-    FromFile: "displacement file",
+    Translate: MOTION_KINDS["translate"].label,
+    Rotate: MOTION_KINDS["rotate"].label,
+    Scale: MOTION_KINDS["scale"].label,
+    Radial: MOTION_KINDS["radial"].label,
+    FromFile: MOTION_KINDS["file"].label,
 }
 
 

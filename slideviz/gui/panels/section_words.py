@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from slideviz.terms import SECTION_KINDS
+
 HINTS = {
     3: "Cut the mesh with a plane, or with a cylinder that can be unrolled, to see its cells "
     "inside.",
     2: "Lay a line or a circle through the mesh to see the cells on it, and their quality along "
     "it.",
 }
-NAMES = {3: ("Plane", "Cylinder"), 2: ("Line", "Circle")}
+NAMES = {
+    3: tuple(term.label for term in SECTION_KINDS.values()),
+    2: tuple(term.in_2d for term in SECTION_KINDS.values()),
+}
 """What sections are called, by the dimensions of the mesh."""
 UNSEEN = "Tick the section in the list to show it."
 

@@ -23,6 +23,7 @@ from slideviz.gui.panels.worst_table import WorstModel, WorstTable
 from slideviz.gui.theme import alarm
 from slideviz.gui.widgets.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
 from slideviz.mesh.model import FloatArray
+from slideviz.terms import COLOUR_BY
 from slideviz.view.inspect import (
     cell_info,
     measure,
@@ -31,7 +32,7 @@ from slideviz.view.inspect import (
     write_table,
 )
 from slideviz.view.session import changes
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 from slideviz.view.session.store import Store
 from slideviz.view.where import Around, axis_of, coordinates, nearest_boundary
 
@@ -146,7 +147,7 @@ class WorstPanel(QWidget):
         at = session.frames.index(session.frame)
         what = measure(session.view.colour_by)
         worst = worst_cells(session.frames, at, what)
-        title = f"Quality: {COLOUR_BY[what]} of the step that is shown"
+        title = f"Quality: {COLOUR_BY[what].label} of the step that is shown"
         self.table.horizontalHeader().setToolTip(title)
         self.model.show(worst, axis_of(session))
 

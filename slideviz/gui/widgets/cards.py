@@ -13,11 +13,11 @@ from qtpy.QtCore import QByteArray, QRectF, QSize, Qt
 from qtpy.QtGui import QPainter, QPixmap
 from qtpy.QtSvg import QSvgRenderer
 
-from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.terms import ROLES
 
 SIZE = (152, 96)
 """Pixels of a picture, at normal resolution."""
-BODY, WALL, REPEAT = (ROLE_COLOURS[role] for role in ("moving", "sliding", "periodic"))
+BODY, WALL, REPEAT = (ROLES[role].colour for role in ("moving", "sliding", "periodic"))
 Map = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """From the unit square to the picture."""
 

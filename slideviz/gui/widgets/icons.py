@@ -8,7 +8,7 @@ from qtpy.QtCore import QByteArray, QRectF, QSize, Qt
 from qtpy.QtGui import QIcon, QPainter, QPixmap
 from qtpy.QtSvg import QSvgRenderer
 
-from slideviz.view.drawing.look import ROLE_COLOURS
+from slideviz.terms import ROLES
 
 _STROKES = {
     "open": '<path d="M3 19V5h6l2 3h8v3"/><path d="M3 19l3-8h16l-3 8z"/>',
@@ -121,7 +121,7 @@ def role_icon(role: str) -> QIcon:
     inner = sign[sign.index("<g") : -len("</svg>")]
     svg = (
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="-4 -4 32 32"><rect x="-4" y="-4" '
-        f'width="32" height="32" rx="6" fill="{ROLE_COLOURS[role]}"/>{inner}</svg>'
+        f'width="32" height="32" rx="6" fill="{ROLES[role].colour}"/>{inner}</svg>'
     )
     return QIcon(_pixmap(svg, 40))
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import SLIDING, Case, PeriodicMode, Translate
+from slideviz import terms
+from slideviz.case.model import Case, Translate
 from slideviz.case.plan import Plan, make_plan
 from slideviz.case.samples import sample
 from slideviz.climb import Progress, Step
@@ -23,23 +24,20 @@ from slideviz.mesh.model import FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.problem import Cycle
 from slideviz.staircase import deform
+from slideviz.terms import PeriodicMode
 from slideviz.view.warmup import warm_up
 
 METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    "none": ("no sliding", {"method": "rbf", "sliding": "none"}),
-    "ps": ("pseudo sliding", {"method": "rbf", "sliding": "ps"}),
-    "ds": ("direct sliding", {"method": "rbf", "sliding": "ds"}),
-    "idw": ("inverse distance", {"method": "idw", "sliding": "ps"}),
-    "elastic": ("linear elasticity", {"method": "elastic", "sliding": "ds"}),
+    sliding: (term.name, {"method": "rbf", "sliding": sliding})
+    for sliding, term in terms.SLIDING.items()
+} | {
+    method: (term.name, {"method": method, "sliding": term.slides_by})
+    for method, term in terms.METHODS.items()
+    if method != "rbf"
 }
-"""What each method is called, and what of a case it changes; the last two slide, too."""
+"""What each method is called, and what of a case it changes."""
 
-MODES: Mapping[PeriodicMode, str] = {
-    "none": "not periodic",
-    "periodic": "periodic distance",
-    "fixed": "periodic, ends fixed",
-    "moving": "periodic, ends moving",
-}
+MODES = {mode: term.figure for mode, term in terms.PERIODIC_MODES.items()}
 """What each PERIODIC_MODE is called."""
 
 AUTO = 0
@@ -159,7 +157,7 @@ def warm(methods: Iterable[str]) -> None:
     made = sample("square", 4, "motion")
     (block,) = made.case.markers_with("moving")
     case = made.case.change(motions=(Translate(block, (1e-3, 0.0)),))
-    for method in set(methods) - set(SLIDING):
+    for method in set(methods) - set(terms.SLIDING):
         for _ in deform(Combination(method, "none", 1).applied(case), made.mesh):
             pass
 

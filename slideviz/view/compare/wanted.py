@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 
 from slideviz.case.check import check_case
-from slideviz.case.model import Case, PeriodicMode
+from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
+from slideviz.terms import SLIDING, PeriodicMode
 from slideviz.view.compare.combinations import METHODS, MODES, Combination
 
 Names = tuple[Callable[[str], str], Callable[[str], str]]
@@ -38,7 +39,7 @@ def wanted_modes(case: Case) -> tuple[PeriodicMode, ...]:
 def wanted_methods(case: Case) -> tuple[str, ...]:
     """Return the methods worth trying: those that slide, if the case has boundaries for it."""
     slides = any(case.markers_with(role) for role in ("sliding", "periodic", "internal"))
-    return ("none", "ps", "ds") if slides else ("none",)
+    return tuple(SLIDING) if slides else ("none",)
 
 
 def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combination, str]:

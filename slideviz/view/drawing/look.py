@@ -1,29 +1,12 @@
-"""Colours: of roles (told apart by colour-blind people too), of light and dark views."""
+"""Colours of light and dark views, and of what is to be seen at once in both."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slideviz.case.model import Role
+from slideviz.terms import COLOUR_MAPS
 
-ROLE_COLOURS: dict[Role, str] = {
-    "moving": "#d55e00",
-    "fixed": "#7d8793",
-    "sliding": "#0072b2",
-    "periodic": "#009e73",
-    "internal": "#cc79a7",
-}
-"""Okabe and Ito's palette (2008), and a grey for what does nothing."""
-
-ROLE_MEANING: dict[Role, str] = {
-    "moving": "is moved by the motions you list",
-    "fixed": "stays where it is",
-    "sliding": "its nodes slide along the surface",
-    "periodic": "repeats another boundary",
-    "internal": "its nodes move freely with the cells inside",
-}
-
-COLOUR_MAP = "viridis"
+COLOUR_MAP = next(iter(COLOUR_MAPS))
 """Perceptually even, and the same for colour-blind people and on paper."""
 
 INVERTED_COLOUR = "#e8112d"

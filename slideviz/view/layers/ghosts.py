@@ -10,8 +10,9 @@ import pyvista as pv
 
 from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray
+from slideviz.terms import ROLES
 from slideviz.view.drawing import actors
-from slideviz.view.drawing.look import CLASH_COLOUR, ROLE_COLOURS
+from slideviz.view.drawing.look import CLASH_COLOUR
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface
 from slideviz.view.session.state import Session
@@ -89,7 +90,7 @@ class GhostLayer:
                     if part in self._actors:
                         self._actors[part].visibility = False
                 continue
-            colour = CLASH_COLOUR if session.clash else ROLE_COLOURS["moving"]
+            colour = CLASH_COLOUR if session.clash else ROLES["moving"].colour
             for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour

@@ -7,7 +7,7 @@ from typing import Any
 
 import pyvista as pv
 
-from slideviz.case.model import ROLES
+from slideviz.terms import COLOUR_BY, ROLES
 from slideviz.view.drawing.plate import Plate
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface
@@ -19,7 +19,7 @@ from slideviz.view.legend import (
     lines_room,
     place_bar,
 )
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 
 PLATE = "plate:legend"
 
@@ -75,10 +75,10 @@ class LegendLayer:
             top = 24.0 * len(roles) + 16
             self._end = add_point_legend(stage.plotter, stage.point_words, top, style)
             return
-        title = COLOUR_BY[what]
-        add_colour_bar(stage.plotter, self._mapper, title, has_inverted(session), style)
+        told = COLOUR_BY[what]
+        add_colour_bar(stage.plotter, self._mapper, told, has_inverted(session), style)
         end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
-        self._bar, self._end = (title, end + (34 if stage.point_words else 0)), end
+        self._bar, self._end = (told.label, end + (34 if stage.point_words else 0)), end
 
     def _place(self) -> None:
         """Put colour bar and plate where they belong in a view of this size."""

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
+from slideviz.terms import ROLES
 from slideviz.view.drawing import actors
 from slideviz.view.drawing.actors import VALUES, Band, Drawn
-from slideviz.view.drawing.look import ROLE_COLOURS, SELECTED_COLOUR
+from slideviz.view.drawing.look import SELECTED_COLOUR
 from slideviz.view.drawing.shaders import see_through
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface
@@ -202,7 +203,7 @@ class BoundaryLayer:
             self.bands[name] = self._add_band(one.surface, session.frame.mesh.points)
         if name in self.bands:
             self.bands[name].actor.visibility = lit
-        one.actor.prop.color = ROLE_COLOURS[session.role(name)]
+        one.actor.prop.color = ROLES[session.role(name)].colour
         one.actor.mapper.scalar_visibility = by_value
         if one.surface.flat:
             one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0

@@ -9,16 +9,17 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.mesh.model import IntArray
+from slideviz.terms import NODE_TYPES
 from slideviz.view.drawing.stage import Stage
 from slideviz.view.drawing.surfaces import Surface, lifted
-from slideviz.view.node_types import NODE_COLOURS, NODE_WORDS, NOTHING, NodeTypes, TypedNodes
+from slideviz.view.node_types import NOTHING, NodeTypes, TypedNodes
 from slideviz.view.session.state import Session
 
 SIZES = ((0, 9.0), (1500, 7.0), (6000, 5.0))
 """Pixels of a point from so many points on: many large ones would cover the mesh."""
 
 _COLOUR = "point_colour"
-_RGB = np.array([pv.Color(colour).int_rgb for colour in NODE_COLOURS.values()], np.uint8)
+_RGB = np.array([pv.Color(term.colour).int_rgb for term in NODE_TYPES.values()], np.uint8)
 
 
 class PointLayer:
@@ -71,7 +72,8 @@ class PointLayer:
         """Draw other nodes."""
         self._drawn = typed
         count = len(typed.nodes)
-        self.stage.point_words = tuple((NODE_WORDS[k], NODE_COLOURS[k]) for k in typed.present)
+        present = [NODE_TYPES[kind] for kind in typed.present]
+        self.stage.point_words = tuple((term.label, term.colour) for term in present)
         if self._actor is None:
             self._shape = pv.PolyData()
             self._actor = self._make()

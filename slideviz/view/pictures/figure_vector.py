@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.case.model import ROLES
 from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED
-from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER, ROLE_COLOURS
+from slideviz.terms import COLOUR_BY, ROLES
+from slideviz.view.drawing.look import INVERTED_COLOUR, PAPER
 from slideviz.view.drawing.plate import OPACITY
 from slideviz.view.layers.mesh import FADED, is_faded
 from slideviz.view.legend import STRIP
@@ -24,7 +24,7 @@ from slideviz.view.pictures.studio import Studio, ordered
 from slideviz.view.plots.bar import number_bar
 from slideviz.view.plots.written import figure_bytes
 from slideviz.view.sections.choice import chosen_cells
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 
 SUFFIXES = (".svg", ".pdf")
 MOST_CELLS = 100_000
@@ -154,7 +154,7 @@ def _mesh(axes: Any, session: Session, figure: Figure, point: float) -> None:
         axes.add_collection(LineCollection(parts, **style))
     for name in mesh.marker_names:
         if name not in view.hidden:
-            colour = ROLE_COLOURS[session.role(name)]
+            colour = ROLES[session.role(name)].colour
             parts = list(_lines(mesh, name))
             axes.add_collection(LineCollection(parts, colors=colour, linewidths=_LINE * point))
     if figure.marked:
@@ -211,7 +211,7 @@ def _legend(sheet: Any, session: Session, figure: Figure) -> None:
         for row, role in enumerate(role for role in ROLES if role in used):
             y = 1.0 - (14 + 24 * (row + 1)) * scale / height
             style = {"va": "center", "fontsize": letters}
-            sheet.text(left, y, "\u25a0", color=ROLE_COLOURS[role], **style)
+            sheet.text(left, y, "\u25a0", color=ROLES[role].colour, **style)
             sheet.text(left + 20 * scale / width, y, role, color=PAPER.text, **style)
         return
     from matplotlib import colormaps
@@ -228,8 +228,7 @@ def _legend(sheet: Any, session: Session, figure: Figure) -> None:
     room = 0.3 * letters  # the numbers do not touch the bar
     place.tick_params(labelsize=letters, length=0, pad=room, labelcolor=PAPER.text)
     number_bar(bar, session.colour_range, 0.62 * height / sheet.dpi, letters)
-    place.set_title(
-        COLOUR_BY[session.view.colour_by], fontsize=letters, loc="left", color=PAPER.text
-    )
+    title = COLOUR_BY[session.view.colour_by].label
+    place.set_title(title, fontsize=letters, loc="left", color=PAPER.text)
     if inverted:
         place.set_xlabel("inverted", fontsize=0.9 * letters, loc="left", color=PAPER.text)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
+from slideviz.terms import ColourBy
 from slideviz.view.drawing.exposure import Drawn, expose, exposing, told
 from slideviz.view.drawing.look import PAPER, Look
 from slideviz.view.drawing.pieces import Beside, GoingOn, appearing, never
@@ -31,7 +32,7 @@ from slideviz.view.pictures.offscreen import (
 from slideviz.view.pictures.portrait import Portrait
 from slideviz.view.pictures.reel import USUAL, Reel, check_film
 from slideviz.view.pictures.titles import LETTER_WIDTH, LONGEST, place_words, title_words
-from slideviz.view.session.state import ColourBy, Frame, Session
+from slideviz.view.session.state import Frame, Session
 
 if TYPE_CHECKING:
     from slideviz.view.scene import Scene
@@ -42,7 +43,7 @@ def film(
     file: str | Path,
     reel: Reel = USUAL,
     *,
-    colour_by: ColourBy = "size_skew",
+    colour_by: ColourBy = "size-skew",
     zoom: Zoom = "auto",
     overwrite: bool = False,
 ) -> Generator[Drawn, None, None]:
@@ -56,7 +57,7 @@ def film(
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
     reel : Reel
         Size, speed, and images in between.
-    colour_by : {"size_skew", "size", "skew", "displacement"}
+    colour_by : {"size-skew", "size", "skew", "displacement"}
         What the colours say; their range is the same in all images.
     zoom : Detail, "auto" or "all"
         What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import SlidevizError
+from slideviz.terms import ColourBy
 from slideviz.view.drawing.exposure import Drawn, expose
 from slideviz.view.drawing.look import PAPER
 from slideviz.view.legend import STRIP
@@ -25,7 +26,7 @@ from slideviz.view.pictures.offscreen import (
 )
 from slideviz.view.pictures.portrait import Portrait
 from slideviz.view.pictures.reel import USUAL, Reel
-from slideviz.view.session.state import ColourBy, Frame
+from slideviz.view.session.state import Frame
 
 _GAP = 8
 """Pixels between the two pictures."""
@@ -58,7 +59,7 @@ def film_pair(
     file: str | Path,
     reel: Reel = USUAL,
     *,
-    colour_by: ColourBy = "size_skew",
+    colour_by: ColourBy = "size-skew",
     zoom: Zoom = "auto",
     overwrite: bool = False,
 ) -> Generator[Drawn, None, None]:

@@ -9,13 +9,14 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.terms import COLOUR_BY, ColourBy
 from slideviz.view.drawing.actors import VALUES, lookup_table, volume
 from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.surfaces import padded
 from slideviz.view.legend import STRIP, add_colour_bar, place_bar
 from slideviz.view.motions.moved import Detail, Zoom, half_of, lengths, require_detail, tiny_motion
 from slideviz.view.pictures.offscreen import font_scale
-from slideviz.view.session.state import COLOUR_BY, ColourBy, Frame
+from slideviz.view.session.state import Frame
 
 FILL = 0.86
 """How much of the free height or width a mesh takes; the rest is for title and margins."""
@@ -37,7 +38,7 @@ class Portrait:
         The deformed mesh; cut and camera suit it.
     base : Mesh
         The undeformed mesh, or ``mesh`` again where that is not known.
-    colour_by : {"size_skew", "size", "skew", "displacement"}
+    colour_by : {"size-skew", "size", "skew", "displacement"}
         What the colours say.
     zoom : Detail, "auto" or "all"
         What part of the mesh is seen.
@@ -55,7 +56,7 @@ class Portrait:
         plotter: Any,
         mesh: Mesh,
         base: Mesh,
-        colour_by: ColourBy = "size_skew",
+        colour_by: ColourBy = "size-skew",
         zoom: Zoom = "auto",
         seen: Sequence[Mesh] = (),
     ) -> None:
@@ -94,9 +95,9 @@ class Portrait:
             self.plotter.remove_scalar_bar(name, render=False)
         scale = font_scale(tuple(self.plotter.window_size))
         inverted = frame.quality.inverted > 0
-        words = COLOUR_BY[self.colour_by]
-        add_colour_bar(self.plotter, self._mapper, words, inverted, (PAPER, scale))
-        place_bar(self.plotter, words, 0.0, scale)
+        what = COLOUR_BY[self.colour_by]
+        add_colour_bar(self.plotter, self._mapper, what, inverted, (PAPER, scale))
+        place_bar(self.plotter, what.label, 0.0, scale)
         self.plotter.renderer.ResetCameraClippingRange()
 
     def caption(self, name: str, found: Quality) -> str:
@@ -105,9 +106,9 @@ class Portrait:
         return text + (" (whole mesh; detail shown)" if self.detail else "")
 
 
-def caption(name: str, found: Quality, colour_by: ColourBy = "size_skew") -> str:
+def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
     """Return what a picture shows, and the quality there, in a line."""
-    what = "" if colour_by == "size_skew" else "size-skew "
+    what = "" if colour_by == "size-skew" else "size-skew "
     text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
         text += f", {found.inverted} of {found.cells} cells inverted"

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.terms import ColourBy
 from slideviz.view.plots.series import Distribution
-from slideviz.view.session.state import ColourBy, Frame
+from slideviz.view.session.state import Frame
 
 BINS = 25
 """So many that a step of an outline is wide enough for its dashes in a panel of the window."""

@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
 from slideviz.view.motions.words import deformation
 from slideviz.view.plots.curves import look_of
 from slideviz.view.plots.distribution import distribution, spread
@@ -14,7 +15,7 @@ from slideviz.view.plots.histogram import draw_distribution
 from slideviz.view.plots.series import Bars, Distribution, Outline
 from slideviz.view.plots.style import Style
 from slideviz.view.plots.ticks import rounded_out
-from slideviz.view.session.state import COLOUR_BY, ColourBy, Frame, Run, Session
+from slideviz.view.session.state import Frame, Run, Session
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,9 +77,8 @@ def draw_histogram(
     limits = counts.limits(session, whole)
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
-    metric = (
-        f"{COLOUR_BY[what]} quality [-]" if what != "displacement" else "displacement [mesh units]"
-    )
+    told = QUANTITIES[what]
+    metric = told.axis if told.unit else f"{told.label} quality [-]"
     runs, left_out = compared(session)
     outlines = [
         Outline(other.label, counts.of(session, other.last, limits), look_of(other))
@@ -121,10 +121,9 @@ def first_value(axes: Axes) -> float:
     return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
 
 
-def shown_measure(session: Session) -> ColourBy:
+def shown_measure(session: Session) -> Quantity:
     """Return what the histogram counts: what the cells are coloured by, or size-skew."""
-    by = session.view.colour_by
-    return "size_skew" if by == "role" else by
+    return quantity_of(session.view.colour_by)
 
 
 def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:

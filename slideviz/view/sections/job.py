@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import CaseError
+from slideviz.terms import quantity_of
 from slideviz.view.copies import show_passages
 from slideviz.view.jobs import Doing, Report, Stopped, require_going
 from slideviz.view.layers.copies import Period, matrices
@@ -16,12 +17,12 @@ from slideviz.view.sections.around import surroundings
 from slideviz.view.sections.choice import Choice
 from slideviz.view.sections.cut import Cutter
 from slideviz.view.sections.model import Section
-from slideviz.view.sections.paint import PAINT_BY, PaintBy, paint
+from slideviz.view.sections.paint import paint
 from slideviz.view.sections.picture import SectionStyle, require_picture_name, section_picture
 from slideviz.view.sections.picture_pair import Shown, pair_picture
 from slideviz.view.session.changes import UNDEFORMED, seen_beside
 from slideviz.view.session.runs_words import run_words
-from slideviz.view.session.state import COLOUR_BY, Session
+from slideviz.view.session.state import Session
 
 _SHOWN = "shown: "
 
@@ -95,11 +96,10 @@ def _shown(session: Session, name: str, section: Section) -> Shown:
     """Return what a section shows of a view that is called so."""
     frame = session.frame
     assert frame is not None
-    word = COLOUR_BY[session.view.colour_by]
-    by: PaintBy = next((one for one in PAINT_BY if one == word), "size-skew")
-    painted = paint(frame.mesh, frame.quality, by, session.mesh)
+    by = session.view.colour_by
+    painted = paint(frame.mesh, frame.quality, quantity_of(by), session.mesh)
     painted = replace(painted, colour_map=session.view.colour_map)
-    if by == word:
+    if by != "role":
         painted = painted.within(*session.colour_range)
     around = matrices(session, Period().of(session) if session.view.copies else None)
     every = {0: np.eye(4)} | around

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import axis_basis
+from slideviz.terms import SectionKind
 from slideviz.view.drawing.surfaces import padded
 
-SectionKind = Literal["plane", "cylinder"]
 Triple = tuple[float, float, float]
 
 ON_SECTION = 1e-9

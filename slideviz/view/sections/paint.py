@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.terms import Quantity
 from slideviz.view.drawing.look import COLOUR_MAP
-
-PaintBy = Literal["size-skew", "size", "skew", "displacement"]
-PAINT_BY: tuple[PaintBy, ...] = ("size-skew", "size", "skew", "displacement")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +30,7 @@ class Paint:
         A colour map of matplotlib.
     """
 
-    label: PaintBy
+    label: Quantity
     values: FloatArray
     inverted: np.ndarray
     limits: tuple[float, float]
@@ -90,7 +87,7 @@ class Paint:
         return f"{self.label}: {end} {found[end]:{number}}, mean {found['mean']:{number}}; {count}"
 
 
-def paint(mesh: Mesh, quality: Quality, by: PaintBy, reference: Mesh | None = None) -> Paint:
+def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:
     """Return the numbers of all cells to colour them by.
 
     Parameters
@@ -98,7 +95,7 @@ def paint(mesh: Mesh, quality: Quality, by: PaintBy, reference: Mesh | None = No
     mesh : Mesh
     quality : Quality
         That of the mesh.
-    by : {"size-skew", "size", "skew", "displacement"}
+    by : Quantity
         The displacement of a cell is the mean of the lengths by which its nodes moved.
     reference : Mesh, optional
         The undeformed mesh; the displacement needs it.

@@ -12,9 +12,9 @@ import numpy as np
 from slideviz.errors import CaseError
 from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.terms import QUANTITIES
 from slideviz.view.drawing.look import PAPER
 from slideviz.view.drawing.polygons import Polygons, joined
-from slideviz.view.legend import UNITS
 from slideviz.view.plots.style import PRINT
 from slideviz.view.plots.written import figure_bytes
 from slideviz.view.sections.around import draw_around, window
@@ -223,7 +223,7 @@ def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layo
 def plot_curves(figure: Any, rows: list[CurveRow], section: Section, paint: Paint) -> Layout:
     """Draw curves along a section into one plot, the last one with its colours below."""
     layout = plot_layout(figure.get_size_inches())
-    labels = position_label(section).full, f"{paint.label} {UNITS.get(paint.label, '[-]')}"
+    labels = position_label(section).full, QUANTITIES[paint.label].axis
     colours = Colours(paint.colour_map, paint.limits)
     style = replace(PRINT, size=LETTERS)
     draw_curves(figure.add_axes(layout.axes), rows, labels, style, colours)

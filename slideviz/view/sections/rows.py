@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from slideviz.mesh.quality import INVERTED
-from slideviz.view.legend import UNITS
+from slideviz.terms import QUANTITIES, Quantity, quantity_of
 from slideviz.view.plots.curves import UNDEFORMED, look_of
 from slideviz.view.sections.curve import Colours, CurveRow, curve_of, position_label
 from slideviz.view.sections.cuts import Cuts
 from slideviz.view.sections.model import Section
 from slideviz.view.sections.paint import Paint
 from slideviz.view.session.changes import show_frame
-from slideviz.view.session.state import COLOUR_BY, ColourBy, Session
+from slideviz.view.session.state import Session
 
 
 class CurveRows:
@@ -57,16 +57,14 @@ class CurveRows:
         return CurveRow(run.label, curve, look_of(run))
 
 
-def what_of(session: Session) -> ColourBy:
+def what_of(session: Session) -> Quantity:
     """Return what the curve has: what the colours say, or the quality where they show roles."""
-    what = session.view.colour_by
-    return "size_skew" if what == "role" else what
+    return quantity_of(session.view.colour_by)
 
 
 def labels_of(session: Session, section: Section) -> tuple[str, str]:
     """Return what the axes of the curves are called."""
-    word = COLOUR_BY[what_of(session)]
-    return position_label(section).full, f"{word} {UNITS.get(word, '[-]')}"
+    return position_label(section).full, QUANTITIES[what_of(session)].axis
 
 
 def colours_of(session: Session) -> Colours:
@@ -84,9 +82,8 @@ def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
         return "it cuts no cell"
     what = what_of(session)
     inverted = frame.quality.status == INVERTED
-    word = COLOUR_BY[what]
     values = frame.values(what, session.mesh)
-    return Paint(word, values, inverted, (0.0, 1.0)).sentence(lines.cell_ids)  # type: ignore[arg-type]
+    return Paint(what, values, inverted, (0.0, 1.0)).sentence(lines.cell_ids)
 
 
 def _line(section: Section) -> Section:

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case, FromFile, Motion, Role, named
+from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.terms import Role
 from slideviz.view.guess import with_periodicity
 from slideviz.view.session.rows import replaced, without
 from slideviz.view.session.state import Place, Session

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from slideviz.terms import ColourBy
 from slideviz.view.sections.choice import ONLY_INVERTED
 from slideviz.view.session.rows import replaced, without
-from slideviz.view.session.state import ColourBy, Session, ViewState
+from slideviz.view.session.state import Session, ViewState
 
 if TYPE_CHECKING:
     from slideviz.view.sections.model import Section

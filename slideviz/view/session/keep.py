@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from slideviz.case.model import Case
-from slideviz.case.view_keys import SHOWN, SectionText
+from slideviz.case.view_keys import SectionText, hyphened
+from slideviz.terms import SHOWN
 from slideviz.view.sections.model import Section
-from slideviz.view.session.state import COLOUR_BY, ColourBy, Session, ViewState
+from slideviz.view.session.state import Session, ViewState
 
 Camera = tuple[float, ...]
 """Position, focal point, direction up, and half the height seen, in parallel projection."""
-
-_COLOUR_OF: dict[str, ColourBy] = {
-    word: key for key, word in zip(get_args(ColourBy), COLOUR_BY.values(), strict=True)
-}
 
 
 def keep_view(session: Session, camera: Camera | None = None) -> Case:
@@ -46,6 +43,7 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     """
     kept, values = case.view, dict[str, Any]()
     for key, field in (
+        ("VIEW_COLOR", "colour_by"),
         ("VIEW_RANGE", "colour_range"),
         ("VIEW_MAP", "colour_map"),
         ("VIEW_THRESHOLD", "threshold"),
@@ -54,10 +52,8 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
     ):
         if key in kept:
             values[field] = kept[key]
-    if "VIEW_COLOR" in kept:
-        values["colour_by"] = _COLOUR_OF[kept["VIEW_COLOR"]]
     if "VIEW_SHOW" in kept:
-        values |= {word.replace("-", "_"): word in kept["VIEW_SHOW"] for word in SHOWN}
+        values |= {name: hyphened(name) in kept["VIEW_SHOW"] for name in SHOWN}
     if "VIEW_HIDDEN" in kept:
         values["hidden"] = frozenset(kept["VIEW_HIDDEN"]) & frozenset(names)
     if "VIEW_SECTIONS" in kept:
@@ -79,10 +75,10 @@ def kept_camera(case: Case) -> Camera | None:
 def _plain(view: ViewState) -> dict[str, Any]:
     """Return the settings that always have a value, by key."""
     return {
-        "VIEW_COLOR": COLOUR_BY[view.colour_by],
+        "VIEW_COLOR": view.colour_by,
         "VIEW_MAP": view.colour_map,
         "VIEW_POINTS": view.points,
-        "VIEW_SHOW": tuple(word for word in SHOWN if getattr(view, word.replace("-", "_"))),
+        "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if getattr(view, name)),
         "VIEW_COPIES": view.copies,
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality
-from slideviz.view.session.view_state import ColourBy
+from slideviz.terms import ColourBy
 
 if TYPE_CHECKING:
     from slideviz.staircase import Step

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.atomic import atomic_write
+from slideviz.terms import PERIODIC_MODES
 from slideviz.view.motions.words import deformation, describe
 from slideviz.view.session.runs_words import (
-    PERIODIC,
     control_nodes,
     end_words,
     method_words,
@@ -63,7 +63,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("name", lambda run: run.name or None),
     Column("motion", _motions),
     Column("method", lambda run: method_words(run.case)),
-    Column("periodicity", lambda run: PERIODIC[run.case.periodic]),
+    Column("periodicity", lambda run: PERIODIC_MODES[run.case.periodic].name),
     Column("steps", lambda run: len(run.frames)),
     Column("kernel", lambda run: run.case.kernel),
     Column("support radius / extent", lambda run: run.case.influence_factor, "g"),

@@ -5,23 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from slideviz.case.model import Case
+from slideviz.terms import METHODS, PERIODIC_MODES, SLIDING
 from slideviz.view.motions.words import motion_labels, vector_words
 from slideviz.view.session.state import Run
 
-SLIDING = {"none": "no sliding", "ps": "pseudo sliding", "ds": "direct sliding"}
-OTHER = {"idw": "inverse distance", "elastic": "linear elasticity"}
-PERIODIC = {
-    "none": "not periodic",
-    "periodic": "periodic distance",
-    "fixed": "periodic, fixed vertices",
-    "moving": "periodic, moving vertices",
-}
 USUAL = Case()
 
 
 def method_words(case: Case) -> str:
     """Return which method a case asks for, in words."""
-    return OTHER.get(case.method, SLIDING[case.sliding])
+    return (SLIDING[case.sliding] if case.method == "rbf" else METHODS[case.method]).name
 
 
 def run_words(run: Run) -> str:
@@ -77,13 +70,11 @@ SETTINGS: dict[str, Callable[[Case], str]] = {
     "influence_factor": lambda case: f"radius × {case.influence_factor:g}",
     "reduction": reduction_words,
     "feature_angle_deg": lambda case: f"feature angle {case.feature_angle_deg:g}°",
-    "curved": lambda _: "curved boundaries",
     "steps_gain": lambda case: f"gain {case.steps_gain:g}",
     "idw_power": lambda case: f"power {case.idw_power:g}",
     "idw_fixed_weight": lambda case: f"fixed weight {case.idw_fixed_weight:g}",
     "quality_metric": lambda case: f"quality {case.quality_metric}",
     "periodic_type": lambda case: f"{case.periodic_type} type",
-    "direction": lambda case: f"repeats in direction {case.direction}",
     "axis": lambda case: f"axis {vector_words(case.axis)}",
     "origin": lambda case: f"axis through {vector_words(case.origin)}",
 }
@@ -105,7 +96,7 @@ def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
         return any(getattr(other, name) != getattr(case, name) for other in cases)
 
     if case.periodic != "none" or differs("periodic"):
-        yield PERIODIC[case.periodic].removeprefix("periodic, "), differs("periodic")
+        yield PERIODIC_MODES[case.periodic].name.removeprefix("periodic, "), differs("periodic")
     yield steps_words(run), differs("steps")
     for name, words in SETTINGS.items():
         # What is as usual needs no words: the other runs say that they are not.

@@ -10,20 +10,17 @@ from typing import Literal
 
 import numpy as np
 
-from slideviz.case.model import Case, Role
+from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.terms import Role
 from slideviz.view.session.results import Frame, Run, cell_displacement
-from slideviz.view.session.view_state import COLOUR_BY, POINTS, ColourBy, PointsShown, ViewState
+from slideviz.view.session.view_state import ViewState
 
 __all__ = [
-    "COLOUR_BY",
-    "POINTS",
-    "ColourBy",
     "Frame",
     "Guess",
     "Place",
-    "PointsShown",
     "Run",
     "Session",
     "ViewState",

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
+
+from slideviz.terms import ColourBy, PointsShown
 
 if TYPE_CHECKING:
     from slideviz.view.sections.model import Section
-
-ColourBy = Literal["role", "size_skew", "size", "skew", "displacement"]
-
-PointsShown = Literal["none", "types", "control"]
-
-COLOUR_BY: dict[ColourBy, str] = {
-    "role": "role",
-    "size_skew": "size-skew",
-    "size": "size",
-    "skew": "skew",
-    "displacement": "displacement",
-}
-"""What the view can be coloured by, and the words for it."""
-
-POINTS: dict[PointsShown, str] = {
-    "none": "none",
-    "types": "boundary nodes by type",
-    "control": "control nodes",
-}
-"""Which nodes the view can draw as points, and the words for it."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +17,16 @@ class ViewState:
 
     Attributes
     ----------
-    colour_by : {"role", "size_skew", "size", "skew", "displacement"}
+    colour_by : ColourBy
         What the colours say.
     colour_range : (float, float) or None
         Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
         above the largest of all runs for the displacement.
     colour_map : str
-        A key of `slideviz.view.drawing.look.COLOUR_MAPS`.
+        One of `slideviz.terms.COLOUR_MAPS`.
     threshold : (float, float) or None
         Draw only the cells whose value is in this range; None draws all.
-    points : {"none", "types", "control"}
+    points : PointsShown
         Nodes drawn as points.
     edges : bool
         Draw the edges of the cells.
