@@ -206,6 +206,13 @@ _APPLIES = {
 }
 """Settings of one method: which, and the key."""
 
+_WITHOUT_EFFECT = {
+    "curved": "CURVED= YES is without effect: curved boundaries are found and followed anyway",
+    "direction": "PERIODIC_DIRECTION is without effect: matching the periodic markers finds the "
+    "direction",
+}
+"""Settings that change no result, which files of RBF-SliDe have: what is said of them."""
+
 _SLIDES = {
     ("idw", "ds"): "direct sliding acts like pseudo sliding here: inverse distance weighting "
     "solves no system that nodes could slide in (edges first, then surfaces, each put back on its "
@@ -226,7 +233,7 @@ def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def idle_settings(case: Case) -> tuple[str, ...]:
-    """Return sentences about settings that the chosen method does not use."""
+    """Return sentences about settings that the chosen method, or none, uses."""
     usual = type(case)()
     idle = [
         key
@@ -236,4 +243,15 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:
         found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
+    found += [
+        sentence
+        for field, sentence in _WITHOUT_EFFECT.items()
+        if getattr(case, field) != getattr(usual, field)
+    ]
     return tuple(Note(text) for text in found)
+
+
+def effective(case: Case) -> Case:
+    """Return the case without the settings that change no result."""
+    usual = type(case)()
+    return case.change(**{field: getattr(usual, field) for field in _WITHOUT_EFFECT})

@@ -112,8 +112,8 @@ _ROWS = (
         "PERIODIC_DIRECTION",
         PERIODICITY,
         choice({word: word for word in PERIODIC_DIRECTIONS}),
-        "Direction of the repetition, found by matching the markers if not given: 0, 1, 2 are "
-        "x, y, z or r, theta, z.",
+        "Without effect, but that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
+        "for x, y, z or r, theta, z) is found by matching the markers.",
         put_direction,
         get_direction,
     ),
@@ -189,7 +189,7 @@ _ROWS = (
         METHOD,
         YES_NO,
         "curved",
-        "RBF-SliDe's switch for curved boundaries; here they are found and followed anyway.",
+        "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
     ),
     setting(
         "FEATURE_ANGLE",

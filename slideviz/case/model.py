@@ -135,8 +135,9 @@ class Case:
     Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
     thesis. Paths are absolute, or relative to the current folder. ``direction`` is the
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
-    where that is left to the matching of the periodic markers; ``steps`` is 0 for as many as it
-    takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
+    where none is given; it and ``curved`` are RBF-SliDe's and without effect, since the matching
+    of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0 for as
+    many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
     control nodes are used, ``idw_power`` where it is the number of dimensions. ``view`` has how
     a window showed the case, by key: it changes no result.
     """

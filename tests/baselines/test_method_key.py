@@ -10,9 +10,10 @@ import pytest
 import slideviz as sv
 from slideviz import staircase
 from slideviz.case.cfg import set_key
-from slideviz.case.check import idle_settings
+from slideviz.case.check import effective, idle_settings
+from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Reduction, Rotate
-from slideviz.case.samples import SAMPLES, write_sample
+from slideviz.case.samples import SAMPLES, sample, write_sample
 from slideviz.cli import run
 from slideviz.errors import CaseError, DeformError
 from slideviz.terms import METHODS
@@ -49,6 +50,19 @@ def test_settings_that_the_method_does_not_use_are_told():
     )
     assert "acts like pseudo sliding" in idle_settings(Case(method="idw", sliding="ds"))[0]
     assert "acts like direct sliding" in idle_settings(Case(method="elastic", sliding="ps"))[0]
+
+
+def test_settings_without_effect_are_told_and_change_no_result():
+    made = sample("square", 6, "motion")
+    given = made.case.change(curved=True, direction=1)
+    curved, direction = idle_settings(given)
+    assert curved.startswith("CURVED= YES is without effect")
+    assert direction.startswith("PERIODIC_DIRECTION is without effect")
+    assert effective(given) == effective(made.case) == made.case
+    last, other = (list(sv.deform(case, made.mesh))[-1] for case in (given, made.case))
+    assert last.mesh.points.tobytes() == other.mesh.points.tobytes()
+    for key in ("CURVED", "PERIODIC_DIRECTION"):
+        assert "without effect" in KEYS[key].meaning.lower()
 
 
 def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_is_not(

@@ -37,6 +37,10 @@ def test_motions_are_told_where_they_differ():
     assert second.startswith("translate y +0.05 · ")
 
 
+def test_settings_without_effect_tell_no_runs_apart():
+    assert words(BASE, BASE.change(curved=True), BASE.change(direction=1)) == ["0 steps"] * 3
+
+
 @pytest.mark.parametrize(
     ("motion", "label"),
     [

@@ -107,6 +107,11 @@ def test_other_settings_make_the_steps_outdated_but_file_names_do_not(session):
     assert changes.set_role(session, ("top",), "sliding").outdated
 
 
+def test_settings_without_effect_make_no_step_outdated(session):
+    session = changes.add_frames(changes.start_run(session), [moved(session)])
+    assert not changes.set_case(session, curved=True, direction=1).outdated
+
+
 def test_essence_takes_unnamed_boundaries_as_fixed():
     assert essence(Case(roles={"a": "fixed", "b": "moving"})) == essence(
         Case(roles={"b": "moving"})

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from slideviz.case.check import effective
 from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
@@ -195,6 +196,6 @@ def round_above(value: float) -> float:
 
 
 def essence(case: Case) -> Case:
-    """Return the case without what does not change the result: file names, order of roles."""
+    """Return the case with only what changes the result: no file names, no order of roles."""
     roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
-    return replace(case, roles=roles, mesh_out=None, source=None, warnings=(), view={})
+    return replace(effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={})
