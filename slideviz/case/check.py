@@ -197,15 +197,6 @@ def idle_roles(case: Case) -> tuple[str, ...]:
     return tuple(found)
 
 
-_APPLIES = {
-    "reduction": ("rbf", "DATA_REDUCTION= YES"),
-    "kernel": ("rbf", "RBF_KERNEL"),
-    "influence_factor": ("rbf", "INFLUENCE_FACTOR"),
-    "idw_power": ("idw", "IDW_POWER"),
-    "idw_fixed_weight": ("idw", "IDW_FIXED_WEIGHT"),
-}
-"""Settings of one method: which, and the key."""
-
 _WITHOUT_EFFECT = {
     "curved": "CURVED= YES is without effect: curved boundaries are found and followed anyway",
     "direction": "PERIODIC_DIRECTION is without effect: matching the periodic markers finds the "
@@ -236,9 +227,9 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     """Return sentences about settings that the chosen method, or none, uses."""
     usual = type(case)()
     idle = [
-        key
-        for field, (method, key) in _APPLIES.items()
-        if case.method != method and getattr(case, field) != getattr(usual, field)
+        f"{key.name}= YES" if key.get(case) is True else key.name
+        for key in KEYS.values()
+        if key.method not in (None, case.method) and key.get(case) != key.get(usual)
     ]
     found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from slideviz.case.model import Case, FromFile, Motion, Reduction
 from slideviz.case.values import Kind
 from slideviz.errors import CaseError
-from slideviz.terms import PERIODIC_DIRECTIONS, Role
+from slideviz.terms import METHODS, PERIODIC_DIRECTIONS, ROLES, Method, Role
 
 Put = Callable[[Case, Any], Case]
 Get = Callable[[Case], Any]
+Form = Literal["main", "more"]
 _NO_DEFAULT = "not set"
 FILES, BOUNDARIES, MOTION = "Files", "Boundaries", "Motion"
 PERIODICITY, METHOD, REDUCTION, QUALITY = "Periodicity", "Method", "Data reduction", "Quality"
@@ -40,6 +41,24 @@ class Key:
         The text of the value that holds when the file does not have the key.
     rbf_slide : bool
         Whether RBF-SliDe has the key too.
+    field : str
+        The field of ``Case``, or of its ``Reduction``, that has the value; empty where it is in
+        several or in a part of one.
+    label, unit : str
+        What the window calls it, and the unit of its value, if it has one.
+    form : "main", "more" or None
+        Where the method panel has a field for it: among the first, below "More settings", nowhere.
+    tip : str
+        What it does, for who looks at that field; the meaning where it is empty.
+    rank : int
+        Its place in that form, and in the words of a run: small ones first, like ones as listed.
+    said : str or None
+        What is said of a run of which it differs from others, with ``{}`` for the value; the
+        label and the value where it is None, nothing where it is empty.
+    method : str or None
+        The only method that uses it.
+    unless : callable
+        Why it does nothing in a case that has that method; empty where it does something.
     """
 
     name: str
@@ -50,20 +69,69 @@ class Key:
     get: Get
     default: str = _NO_DEFAULT
     rbf_slide: bool = True
+    field: str = ""
+    label: str = ""
+    unit: str = ""
+    form: Form | None = None
+    tip: str = ""
+    rank: int = 99
+    said: str | None = None
+    method: Method | None = None
+    unless: Callable[[Case], str] = lambda _: ""
+
+    @property
+    def title(self) -> str:
+        """Return its label with its unit."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
+    def idle(self, case: Case) -> str:
+        """Return why it does nothing in a case; empty where it does something."""
+        return _other_method(case, self.method) or self.unless(case)
+
+
+def _other_method(case: Case, method: Method | None) -> str:
+    """Return that the method of a case is another one, which does not use a setting."""
+    if method in (None, case.method):
+        return ""
+    label = METHODS[case.method].label
+    return f"{label if label[:2].isupper() else label[0].lower() + label[1:]} does not use it"
+
+
+def no_pair(case: Case) -> str:
+    """Return why settings of periodicity do nothing in a case."""
+    return "" if "periodic" in case.roles.values() else "no boundary has the role “periodic”"
+
+
+def nothing_slides(case: Case) -> str:
+    """Return why it does not matter in a case how nodes slide."""
+    slides = {"sliding", "periodic", "internal"}.intersection(case.roles.values())
+    return "" if slides else "no boundary has the role “sliding” or “periodic”"
+
+
+def no_reduction(case: Case) -> str:
+    """Return why settings of data reduction do nothing in a case."""
+    off = "" if case.reduction is not None else "data reduction is off"
+    return _other_method(case, "rbf") or off
+
+
+def no_levels(case: Case) -> str:
+    """Return why settings of the levels of data reduction do nothing in a case."""
+    levels = case.reduction is not None and case.reduction.multilevel
+    return no_reduction(case) or ("" if levels else "there are no levels")
 
 
 def _field(field: str) -> tuple[Put, Get]:
     return lambda case, value: case.change(**{field: value}), lambda case: getattr(case, field)
 
 
-def setting(name: str, group: str, kind: Kind, field: str, meaning: str) -> Key:
-    """Return the row of a plain field of ``Case``."""
+def setting(name: str, group: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
+    """Return the row of a plain field of ``Case``; ``window`` has further attributes of the row."""
     value = getattr(Case(), field)
     default = _NO_DEFAULT if value is None else kind.write(value)
-    return Key(name, group, kind, meaning, *_field(field), default)
+    return Key(name, group, kind, meaning, *_field(field), default, field=field, **window)
 
 
-def greedy(name: str, kind: Kind, field: str, meaning: str) -> Key:
+def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
     """Return the row of a field of ``Reduction``; without data reduction it is checked only."""
 
     def put(case: Case, value: Any) -> Case:
@@ -76,7 +144,8 @@ def greedy(name: str, kind: Kind, field: str, meaning: str) -> Key:
 
     value = getattr(Reduction(), field)
     default = _NO_DEFAULT if value is None else kind.write(value)
-    return Key(name, REDUCTION, kind, meaning, put, get, default)
+    window = {"unless": no_reduction, **window}
+    return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
 
 
 def put_double_edge(case: Case, wanted: bool) -> Case:
@@ -97,7 +166,10 @@ def role(name: str, kind: Kind, wanted: Role, meaning: str) -> Key:
     def put(case: Case, names: tuple[str, ...]) -> Case:
         return case.change(roles={**case.roles, **dict.fromkeys(names, wanted)})
 
-    return Key(name, BOUNDARIES, kind, meaning, put, lambda case: case.markers_with(wanted) or None)
+    def get(case: Case) -> tuple[str, ...] | None:
+        return case.markers_with(wanted) or None
+
+    return Key(name, BOUNDARIES, kind, meaning, put, get, label=f"the role “{ROLES[wanted].label}”")
 
 
 def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:

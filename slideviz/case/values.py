@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from slideviz.case.words import (
     Word,
@@ -24,6 +24,14 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError
+from slideviz.terms import Term, labels
+
+Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
+"""How a value is entered in a window."""
+
+LARGEST_WHOLE = 999_999_999
+MAX_STEPS = 9999
+"""Steps that the window offers; a case file may ask for more."""
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
@@ -48,6 +56,14 @@ class Kind:
         Text to a warning about it, empty if there is none.
     details : tuple of str
         More lines for the reference.
+    entry : str
+        How it is entered in a window; ``text`` where no field of it takes such values.
+    words : mapping
+        What the window calls values, where that is not what a case file calls them.
+    tips : mapping
+        What the values mean, for who is about to choose one.
+    span : tuple of int
+        The smallest and the largest whole number that the window offers.
     """
 
     allowed: str
@@ -55,6 +71,25 @@ class Kind:
     write: Callable[[Any], str]
     remark: Callable[[str], str] = lambda _: ""
     details: tuple[str, ...] = ()
+    entry: Entry = "text"
+    words: Mapping[Any, str] = field(default_factory=dict)
+    tips: Mapping[Any, str] = field(default_factory=dict)
+    span: tuple[int, int] = (0, LARGEST_WHOLE)
+
+    def problem(self, text: str) -> str:
+        """Return why a text is no value of the kind; empty where it is one."""
+        try:
+            self.read(text)
+        except CaseError as problem:
+            return str(problem)
+        return ""
+
+    def called(self, text: str) -> str:
+        """Return what the window calls the value that a text of a case file stands for."""
+        try:
+            return self.words.get(self.read(text), text)
+        except CaseError:
+            return text
 
 
 def choice(words: Mapping[str, Any]) -> Kind:
@@ -78,6 +113,13 @@ def choice(words: Mapping[str, Any]) -> Kind:
     return Kind(allowed, read, write)
 
 
+def one_of(terms: Mapping[Any, Term], also: Mapping[str, str] | None = None) -> Kind:
+    """Return the kind of the values of an enumeration, some of which have other words, too."""
+    kind = choice({**{value: value for value in terms}, **(also or {})})
+    tips = {value: term.tip for value, term in terms.items() if term.tip}
+    return replace(kind, entry="choice", words=labels(terms), tips=tips)
+
+
 def whole(low: int) -> Kind:
     """Return the kind of whole numbers from ``low``."""
     allowed = f"a whole number from {low}"
@@ -89,7 +131,7 @@ def whole(low: int) -> Kind:
             raise CaseError(f"{text} is too small; needed is {allowed}")
         return int(text)
 
-    return Kind(allowed, read, str)
+    return Kind(allowed, read, str, entry="whole", span=(low, LARGEST_WHOLE))
 
 
 def steps_kind() -> Kind:
@@ -105,7 +147,14 @@ def steps_kind() -> Kind:
         except CaseError as problem:
             raise CaseError(f"{problem}, or auto") from None
 
-    return Kind(allowed, read, lambda value: "auto" if value == 0 else str(value))
+    return Kind(
+        allowed,
+        read,
+        lambda value: "auto" if value == 0 else str(value),
+        entry="whole",
+        words={0: "automatic"},
+        span=(0, MAX_STEPS),
+    )
 
 
 def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
@@ -121,7 +170,7 @@ def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
             raise CaseError(f"{text} is out of range; needed is {allowed}")
         return value
 
-    return Kind(allowed, read, lambda value: repr(float(value)))
+    return Kind(allowed, read, lambda value: repr(float(value)), entry="real")
 
 
 def _read_path(text: str) -> Path | None:
@@ -250,9 +299,13 @@ def _read_origin(text: str) -> tuple[float, float, float]:
     return (*values, 0.0)[:3] if len(values) == 2 else values  # type: ignore[return-value]
 
 
-YES_NO = choice({"YES": True, "NO": False, "TRUE": True, "FALSE": False})
+YES_NO = replace(
+    choice({"YES": True, "NO": False, "TRUE": True, "FALSE": False}),
+    entry="switch",
+    words={True: "on", False: "off"},
+)
 PATH = Kind("a file name", _read_path, path_text)
 NAMES = Kind("( A, B, ... )", _read_names, _write_names)
 PAIRS = Kind("( A, B, ... ), also with SU2's numbers", _read_pairs, _write_names, _remark_pairs)
-AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text)
-POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text)
+AXIS = Kind("x | y | z | (x, y, z)", lambda text: read_axis(list_of(text)), axis_text, entry="axis")
+POINT = Kind("(x, y) | (x, y, z)", _read_origin, vector_text, entry="point")

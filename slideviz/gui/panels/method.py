@@ -1,15 +1,25 @@
 """The method panel: sliding, periodicity, steps, data reduction, and more."""
 
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
-from qtpy.QtCore import QTimer
-from qtpy.QtWidgets import QWidget
+from qtpy.QtCore import QPoint, QRect, Qt, QTimer
+from qtpy.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
-from slideviz.case.model import Reduction
-from slideviz.gui.panels.method_form import TIPS, MethodForm
-from slideviz.gui.panels.method_more import NO_REDUCTION, enable, not_used
+from slideviz.case.key import Key, no_pair, nothing_slides
+from slideviz.case.model import Case, Reduction
+from slideviz.gui.panels.key_form import KeyForm
+from slideviz.gui.panels.method_more import MoreSettings
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.view.missing import Missing
 from slideviz.view.motions.period_words import found_text
@@ -18,8 +28,11 @@ from slideviz.view.session.state import Session
 from slideviz.view.session.store import Store
 
 
-class MethodPanel(MethodForm):
-    """Shows the settings of the case and changes them."""
+class MethodPanel(QWidget):
+    """Shows the settings of the case and changes them: a field for each key that has one.
+
+    Each field is found by the name that it has in the case, as ``panel.sliding``.
+    """
 
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -27,10 +40,59 @@ class MethodPanel(MethodForm):
         self._mesh = None
         self._extent = 0.0
         self._reduction: Reduction | None = None
+        layout = self._make_scroll()
+        self.form, self.more = KeyForm("main"), MoreSettings()
+        for part in (self, self.more):
+            for name, field in part.form.fields.items():
+                setattr(part, name, field)
+        self.found, self.tolerance_hint, self.guess_text, self.reason = (_hint() for _ in range(4))
+        self.tolerance_hint.setWordWrap(False)
+        self._complete_form()
+        layout.addLayout(self.form)
+        layout.addWidget(self.reason)
+        layout.addWidget(self.more)
+        layout.addStretch(1)
         self._connect()
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
         self.watch = FieldWatch(self, store, "method")
+
+    def _make_scroll(self) -> QVBoxLayout:
+        outside = QVBoxLayout(self)
+        outside.setContentsMargins(0, 0, 0, 0)
+        self.scroll = WholeScroll()
+        self.scroll.setWidgetResizable(True)
+        self.scroll.setFrameShape(QFrame.Shape.NoFrame)
+        self.scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        outside.addWidget(self.scroll)
+        inside = QWidget()
+        self.scroll.setWidget(inside)
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(6, 6, 6, 4)
+        return layout
+
+    def _complete_form(self) -> None:
+        """Say in the form what belongs to its fields."""
+        form, fields = self.form, self.form.fields
+        fields["reduction"].setText("Use fewer control nodes")
+        row, _ = form.getWidgetPosition(fields["origin"])
+        form.insertRow(row + 1, "", self.found)
+        both, (row, role) = QWidget(), form.getWidgetPosition(fields["tolerance"])
+        form.removeWidget(fields["tolerance"])
+        line = QHBoxLayout(both)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.addWidget(fields["tolerance"], 1)
+        line.addWidget(self.tolerance_hint)
+        form.setWidget(row, role, both)
+        form.addRow(self.guess_text)
+
+    def _connect(self) -> None:
+        self.form.changed.connect(self._set)
+        self.more.changed.connect(self._set)
+        self.more.button.toggled.connect(
+            # When its form has been laid out.
+            lambda on: on and QTimer.singleShot(0, self, self._show_more)
+        )
 
     def _show_more(self) -> None:
         """Scroll to the settings that have opened below the others."""
@@ -38,115 +100,98 @@ class MethodPanel(MethodForm):
         bar = self.scroll.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
 
-    def _connect(self) -> None:
-        for name in ("method", "sliding", "periodic", "periodic_type"):
-            getattr(self, name).chosen.connect(lambda value, name=name: self._set(name, value))
-        self.axis.changed.connect(lambda value: self._set("axis", value))
-        self.origin.changed.connect(lambda value: self._set("origin", value))
-        self.steps.valueChanged.connect(lambda value: self._set("steps", value))
-        self.reduction.toggled.connect(self._reduction_toggled)
-        self.tolerance.changed.connect(self._tolerance_changed)
-        self.more.changed.connect(self._set)
-        self.more.button.toggled.connect(
-            # When its form has been laid out.
-            lambda on: on and QTimer.singleShot(0, self, self._show_more)
-        )
-
     def lead_to(self, _missing: Missing) -> None:
         """Put the cursor where something is put right."""
         if not self.watch.focus():
-            self.sliding.setFocus()
+            self.form.fields["sliding"].setFocus()
 
-    def _set(self, name: str, value: object) -> None:
-        if getattr(self.store.session.case, name) != value:
-            self.store.change(changes.set_case, **{name: value})
+    # Widgets to state ------------------------------------------------------------------
 
-    def _reduction_toggled(self, on: bool) -> None:
+    def _set(self, key: Key, value: object) -> None:
+        """Change the case by the value of a key, and by what the window means with it."""
+        own = {"DATA_REDUCTION": self._reduce, "DATA_RED_TOLERANCE": self._tolerate}
+        case = self.store.session.case
+        new = own.get(key.name, key.put)(case, value)
+        values = {field.name: getattr(new, field.name) for field in fields(Case)}
+        changed = {name: now for name, now in values.items() if now != getattr(case, name)}
+        if changed:
+            self.store.change(changes.set_case, **changed)
+
+    def _reduce(self, case: Case, on: bool) -> Case:
         # What was set before it was switched off comes back with it.
         mesh = self.store.session.mesh
         first = self._reduction or (changes.suggested_reduction(mesh) if mesh else Reduction())
-        self._set("reduction", first if on else None)
+        return case.change(reduction=first if on else None)
 
-    def _tolerance_changed(self, value: float) -> None:
-        given = self.store.session.case.reduction or Reduction()
-        self._set("reduction", replace(given, tolerance=value, relative=None))
+    def _tolerate(self, case: Case, value: float) -> Case:
+        given = case.reduction or Reduction()
+        return case.change(reduction=replace(given, tolerance=value, relative=None))
 
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
         """Show the session."""
-        case = session.case
-        for name in ("method", "sliding", "periodic", "periodic_type"):
-            getattr(self, name).show_value(getattr(case, name))
-        self.axis.show_value(case.axis)
-        self.origin.set_scale(self._extent)
-        self.origin.show_value(case.origin)
-        if self.steps.value() != case.steps:
-            self.steps.blockSignals(True)
-            self.steps.setValue(case.steps)
-            self.steps.blockSignals(False)
-        self._sync_reduction(session)
-        self.more.sync(session)
-        self._sync_reasons(session)
-        text = found_text(session)
-        self.found.setText(text)
-        self.form.setRowVisible(self.found, bool(text))
-
-    def _sync_reduction(self, session: Session) -> None:
-        given = session.case.reduction
         if session.mesh is not self._mesh:
             self._mesh, self._reduction = session.mesh, None
             # Once for each mesh: it takes 10 ms where there are 250,000 cells.
             self._extent = session.mesh.extent if session.mesh is not None else 0.0
-        self._reduction = given or self._reduction
-        self.reduction.blockSignals(True)
-        self.reduction.setChecked(given is not None)
-        self.reduction.blockSignals(False)
-        no_method = not_used(session.case)
-        enable(self.reduction, no_method, TIPS["reduction"])
-        enable(self.tolerance, no_method or ("" if given else NO_REDUCTION), TIPS["tolerance"])
-        extent = self._extent
-        if self._reduction is not None:
-            of_extent = self._reduction.relative
-            absolute = of_extent * extent if of_extent else self._reduction.tolerance
-            self.tolerance.show_value(float(f"{absolute:.6g}"))
-        part = f"{self.tolerance.value / extent:.3g} of the extent" if extent and given else ""
-        self.tolerance_hint.setText(part)
-        self.guess_text.setText(session.reduction_guess)
-        self.form.setRowVisible(self.guess_text, bool(session.reduction_guess))
-
-    def _sync_reasons(self, session: Session) -> None:
-        case = session.case
-        roles = set(case.roles.values())
-        no_pair = "" if "periodic" in roles else "no boundary has the role “periodic”"
-        slides = roles & {"sliding", "periodic", "internal"}
-        no_slide = "" if slides else "no boundary has the role “sliding” or “periodic”"
+        self._reduction = session.case.reduction or self._reduction
+        case, spare = session.case, Case(reduction=self._in_length(self._reduction or Reduction()))
+        if case.reduction is not None:
+            case = case.change(reduction=spare.reduction)
+        fields = self.form.fields
+        fields["origin"].set_scale(self._extent)
         rotational = case.periodic_type != "translational" and "rotational" in _kinds(session)
         rotational = rotational or case.periodic_type == "rotational"
-        no_axis = no_pair or ("" if rotational else "only rotational periodicity has an axis")
-        for name, why in (
-            ("sliding", no_slide),
-            ("periodic", no_pair),
-            ("periodic_type", no_pair),
-            ("axis", no_axis),
-            ("origin", no_axis),
-        ):
-            enable(getattr(self, name), why, TIPS[name])
+        no_axis = "" if rotational else "only rotational periodicity has an axis"
+        self.form.sync(case, spare, {"axis": no_axis, "origin": no_axis})
+        self.more.sync(case, spare)
         for name in ("axis", "origin"):
-            self.form.setRowVisible(getattr(self, name), not no_axis)
-        reasons = list(
-            dict.fromkeys(
-                f"{title}: {why}."
-                for title, why in (("Sliding", no_slide), ("Periodicity", no_pair))
-                if why
-            )
-        )
-        self.reason.setText(
-            "\n".join(reasons) if session.mesh is not None else "Open a mesh first."
-        )
+            self.form.setRowVisible(fields[name], not (no_pair(case) or no_axis))
+        self._sync_hints(session)
+
+    def _in_length(self, given: Reduction) -> Reduction:
+        """Return data reduction with its tolerance as a length of six digits."""
+        absolute = given.relative * self._extent if given.relative else given.tolerance
+        return replace(given, tolerance=float(f"{absolute:.6g}"))
+
+    def _sync_hints(self, session: Session) -> None:
+        """Say what is found, guessed and not available."""
+        case, extent = session.case, self._extent
+        part = f"{self.form.fields['tolerance'].value / extent:.3g} of the extent" if extent else ""
+        self.tolerance_hint.setText(part if case.reduction is not None else "")
+        reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
+        told = "\n".join(f"{title}: {why}." for title, why in reasons if why)
+        self.reason.setText(told if session.mesh is not None else "Open a mesh first.")
         self.reason.setVisible(bool(self.reason.text()))
+        for label, text in (
+            (self.found, found_text(session)),
+            (self.guess_text, session.reduction_guess),
+        ):
+            label.setText(text)
+            self.form.setRowVisible(label, bool(text))
+
+
+def _hint() -> QLabel:
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setProperty("hint", True)
+    return label
 
 
 def _kinds(session: Session) -> set[str]:
     names = set(session.case.markers_with("periodic"))
     return {pair.kind for pair in session.pairs if {pair.first, pair.second} <= names}
+
+
+class WholeScroll(QScrollArea):
+    """Shows a field whole when the tab key comes to it, not only where its cursor is."""
+
+    def focusNextPrevChild(self, forwards: bool) -> bool:
+        moved = super().focusNextPrevChild(forwards)
+        field = self.widget().focusWidget()
+        if moved and field is not None:
+            place = QRect(field.mapTo(self.widget(), QPoint(0, 0)), field.size())
+            for y in (place.bottom(), place.top()):
+                self.ensureVisible(place.left(), y, 0, 6)
+        return moved

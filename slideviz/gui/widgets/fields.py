@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from qtpy.QtCore import QEvent, QLocale, Qt, QTimer, Signal
 from qtpy.QtWidgets import (
     QApplication,
+    QCheckBox,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -226,6 +227,13 @@ class NumberBox(QSpinBox):
     def wheelEvent(self, event) -> None:
         event.ignore()
 
+    def show_value(self, value: int) -> None:
+        """Show a number without telling."""
+        if self.value() != value:
+            self.blockSignals(True)
+            self.setValue(value)
+            self.blockSignals(False)
+
     def _look(self) -> None:
         fault = "" if self.lineEdit().hasAcceptableInput() else "a number is needed"
         if fault != self.fault:
@@ -234,6 +242,14 @@ class NumberBox(QSpinBox):
             self.style().unpolish(self)
             self.style().polish(self)
             self.marked.emit()
+
+
+class Switch(QCheckBox):
+    """A setting that is on or off; ``clicked`` tells what the user wants."""
+
+    def show_value(self, on: bool) -> None:
+        """Show whether it is on."""
+        self.setChecked(on)
 
 
 class VectorField(QWidget):
@@ -349,8 +365,3 @@ def not_zero(value: float) -> str:
 def a_direction(values: Sequence[float]) -> str:
     """Return why numbers are no direction."""
     return "" if any(values) else "an axis needs a direction: not all may be 0"
-
-
-def angle_limit(value: float) -> str:
-    """Return why a feature angle is out of range."""
-    return "" if 0 < value <= 180 else f"{number_text(value)} must be above 0 and at most 180"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
+from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
+from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.terms import METHODS, PERIODIC_MODES, SLIDING
-from slideviz.view.motions.words import motion_labels, vector_words
+from slideviz.view.motions.words import motion_labels
 from slideviz.view.session.state import Run
 
-USUAL = Case()
+TOLD = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
+"""Groups of keys whose values are said of a run, the more telling ones first."""
 
 
 def method_words(case: Case) -> str:
@@ -22,12 +25,18 @@ def run_words(run: Run) -> str:
     return run.name or method_words(run.case)
 
 
+def _number_words(value: float) -> str:
+    """Return a number as short as it can be without losing a digit."""
+    return repr(float(value)).removesuffix(".0")
+
+
 def reduction_words(case: Case) -> str:
     """Return how control nodes are chosen, in words."""
     given = case.reduction
     if given is None or case.method != "rbf":
         return "all nodes"
-    part = f"{given.relative:g} of the extent" if given.relative else f"{given.tolerance:g}"
+    part = _number_words(given.relative or given.tolerance)
+    part += " of the extent" if given.relative else ""
     levels = ", in levels" if given.multilevel else ""
     most = f", at most {given.max_nodes:,} nodes" if given.max_nodes else ""
     return f"reduced to {part}{levels}{most}"
@@ -62,23 +71,29 @@ def control_nodes(run: Run) -> int | None:
     return step.control_nodes if step is not None else None
 
 
-RBF = ("kernel", "influence_factor", "reduction")
-"""Settings that only radial basis functions know."""
+SETTINGS: tuple[Key, ...] = tuple(
+    sorted(
+        (key for key in KEYS.values() if key.group in TOLD and key.said != ""),
+        key=lambda key: (TOLD[key.group], key.rank),
+    )
+)
+"""Settings that tell runs apart; the motions, roles and others have their own words."""
 
-SETTINGS: dict[str, Callable[[Case], str]] = {
-    "kernel": lambda case: case.kernel,
-    "influence_factor": lambda case: f"radius × {case.influence_factor:g}",
-    "reduction": reduction_words,
-    "feature_angle_deg": lambda case: f"feature angle {case.feature_angle_deg:g}°",
-    "steps_gain": lambda case: f"gain {case.steps_gain:g}",
-    "idw_power": lambda case: f"power {case.idw_power:g}",
-    "idw_fixed_weight": lambda case: f"fixed weight {case.idw_fixed_weight:g}",
-    "quality_metric": lambda case: f"quality {case.quality_metric}",
-    "periodic_type": lambda case: f"{case.periodic_type} type",
-    "axis": lambda case: f"axis {vector_words(case.axis)}",
-    "origin": lambda case: f"axis through {vector_words(case.origin)}",
-}
-"""Settings in words, by the field of the case; the motions, roles and others have their own."""
+
+def _setting_words(key: Key, case: Case) -> str:
+    """Return a setting in words; nothing where it is as usual, or does nothing."""
+    value = key.get(case)
+    if value is None or key.kind.write(value) == key.default or key.idle(case):
+        return ""
+    if key.field == "reduction":
+        return reduction_words(case)
+    text = key.kind.write(value)
+    if key.kind.entry in ("axis", "point"):
+        text = f"({', '.join(map(_number_words, value))})"
+    elif key.kind.entry == "real":
+        text = _number_words(value)
+    said = key.said or f"{key.label or key.name.replace('_', ' ')} {{}}".lower()
+    return said.format(text + key.unit)
 
 
 def _roles_words(case: Case, others: Sequence[Case]) -> str:
@@ -98,12 +113,12 @@ def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
     if case.periodic != "none" or differs("periodic"):
         yield PERIODIC_MODES[case.periodic].name.removeprefix("periodic, "), differs("periodic")
     yield steps_words(run), differs("steps")
-    for name, words in SETTINGS.items():
+    for key in SETTINGS:
         # What is as usual needs no words: the other runs say that they are not.
-        usual = getattr(case, name) == getattr(USUAL, name)
-        known = case.method == "rbf" or name not in RBF
-        if known and not usual and (differs(name) or name == "kernel"):
-            yield words(case), differs(name)
+        words = _setting_words(key, case)
+        apart = bool(words) and any(_setting_words(key, other) != words for other in cases)
+        if apart or (words and key.field == "kernel"):
+            yield words, apart
     nodes = control_nodes(run)
     if nodes is not None:
         yield f"{nodes:,} nodes", False

@@ -1,0 +1,118 @@
+"""Forms made from the table of keys of the case file: a row for each key that is shown there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
+
+from slideviz.case.key import Form, Key
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case
+from slideviz.case.values import Entry, Kind
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import (
+    NumberBox,
+    NumberField,
+    Switch,
+    VectorField,
+    a_direction,
+    number_text,
+)
+from slideviz.gui.widgets.tips import wrapped
+
+
+def number_field(kind: Kind) -> NumberField:
+    """Return a field for numbers of a kind, which says what the kind says of others."""
+    return NumberField(0.0, lambda value: kind.problem(number_text(value)))
+
+
+def _choice(kind: Kind) -> Choice:
+    field = Choice(kind.words)
+    field.explain(kind.tips)
+    return field
+
+
+def _number_box(kind: Kind) -> NumberBox:
+    field = NumberBox()
+    field.setRange(*kind.span)
+    field.setSpecialValueText(kind.words.get(kind.span[0], ""))
+    field.setMinimumHeight(Choice({}).sizeHint().height())
+    return field
+
+
+FIELDS: dict[Entry, tuple[Callable[[Kind], QWidget], str]] = {
+    "choice": (_choice, "chosen"),
+    "switch": (lambda _: Switch(), "clicked"),
+    "real": (number_field, "changed"),
+    "whole": (_number_box, "valueChanged"),
+    "axis": (lambda _: VectorField((0.0, 0.0, 1.0), a_direction), "changed"),
+    "point": (lambda _: VectorField(), "changed"),
+}
+"""How to make the field for a kind of value, and the signal by which it tells a new one."""
+
+
+class KeyForm(QFormLayout):
+    """A form of settings of a case.
+
+    Parameters
+    ----------
+    place : "main" or "more"
+        Which of the keys.
+    own : mapping
+        Fields by the name of the key, for those which somebody else makes, connects and fills.
+
+    Signals
+    -------
+    changed(object, object)
+        The row of the table of keys, and the new value.
+    """
+
+    changed = Signal(object, object)
+
+    def __init__(self, place: Form, own: Mapping[str, QWidget] | None = None) -> None:
+        super().__init__()
+        self.setVerticalSpacing(4)
+        self.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        self.fields: dict[str, QWidget] = {}
+        self._rows: list[tuple[Key, QWidget]] = []
+        self._own = own or {}
+        for key in sorted(KEYS.values(), key=lambda key: key.rank):
+            if key.form == place:
+                self._add(key)
+
+    def _add(self, key: Key) -> None:
+        field = self._own.get(key.name)
+        if field is None:
+            make, signal = FIELDS[key.kind.entry]
+            field = make(key.kind)
+            field.setObjectName(key.field)
+            getattr(field, signal).connect(lambda value: self.changed.emit(key, value))
+        label = QLabel(key.title)
+        label.setToolTip(wrapped(key.tip or key.meaning))
+        self.fields[field.objectName()] = field
+        self._rows.append((key, field))
+        self.addRow(label, field)
+
+    def sync(self, case: Case, spare: Case, reasons: Mapping[str, str]) -> None:
+        """Show the settings of a case, and of a spare one those that the case has not.
+
+        ``reasons`` has more reasons, by the field, for which it is not available.
+        """
+        for key, field in self._rows:
+            if key.name not in self._own:
+                value = key.get(case)
+                field.show_value(key.get(spare) if value is None else value)
+            why_not = key.idle(case) or reasons.get(key.field, "")
+            field.setEnabled(not why_not)
+            tip = key.tip or key.meaning
+            _set_tip(field, f"Not available: {why_not}." if why_not else tip)
+
+
+def _set_tip(field: QWidget, text: str) -> None:
+    """Explain a field and its parts."""
+    if hasattr(field, "set_tip"):
+        field.set_tip(text)
+    if not isinstance(field, NumberField):  # that one may have more urgent things to say
+        field.setToolTip(wrapped(text))
