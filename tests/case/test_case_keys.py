@@ -306,3 +306,47 @@ def test_a_mistyped_key_or_two_roles_tell_no_more_than_that(read):
     with pytest.raises(CaseError) as caught:
         read(f"MARKER_MOVING= (B)\n{motion}")
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_key_that_the_method_panel_shows_has_what_its_field_needs():
+    shown = [key for key in KEYS.values() if key.form]
+    assert len({key.field for key in shown}) == len(shown) > 10
+    for key in shown:
+        assert key.label, key.name
+        assert key.kind.entry != "text", key.name
+        assert key.default != "not set", f"{key.name}: a field cannot show nothing"
+        assert (key.tip or key.meaning).endswith("."), key.name
+
+
+def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
+    assert KEYS["GAMMA"].kind.problem("25") == ""
+    assert KEYS["GAMMA"].kind.problem("-1") == "-1 is out of range; needed is a number above 0"
+    for name, text, called in (
+        ("SLIDING_MODE", "PS", "pseudo sliding"),
+        ("PERIODIC_TYPE", "1", "rotational"),
+        ("RBF_KERNEL", "gaussian", "Gaussian (global)"),
+        ("DATA_REDUCTION", "YES", "on"),
+        ("STEPS", "auto", "automatic"),
+        ("STEPS", "3", "3"),
+        ("METHOD", "magic", "magic"),
+    ):
+        assert KEYS[name].kind.called(text) == called
+
+
+@pytest.mark.parametrize(
+    ("name", "case", "reason"),
+    [
+        ("RBF_KERNEL", Case(method="idw"), "inverse distance weighting does not use it"),
+        ("IDW_POWER", Case(), "RBF interpolation does not use it"),
+        ("IDW_POWER", Case(method="elastic"), "linear elasticity does not use it"),
+        ("GAMMA", Case(method="elastic"), "linear elasticity does not use it"),
+        ("GAMMA", Case(), "data reduction is off"),
+        ("LVL_SIZE", Case(reduction=Reduction()), "there are no levels"),
+        ("LVL_SIZE", Case(reduction=Reduction(multilevel=True)), ""),
+        ("PERIODIC_AXIS", Case(), "no boundary has the role “periodic”"),
+        ("SLIDING_MODE", Case(roles={"hub": "sliding"}), ""),
+        ("STEPS", Case(method="idw"), ""),
+    ],
+)
+def test_a_key_says_why_it_does_nothing_in_a_case(name, case, reason):
+    assert KEYS[name].idle(case) == reason

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
+from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.mesh.quality import quality
 from slideviz.view.drawing.panes import choices
@@ -14,6 +16,15 @@ from slideviz.view.session.runs_words import brief, run_words
 from slideviz.view.session.state import Frame, Run, Session
 
 BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
+
+SETTINGS = [
+    key
+    for key in KEYS.values()
+    if key.group in (PERIODICITY, METHOD, REDUCTION, QUALITY)
+    # DOUBLE_EDGE is another word for SELECTION; of STEPS those that were made are told; the others
+    # change nothing of a run.
+    and key.name not in ("DOUBLE_EDGE", "STEPS", "GENERATE_QUALITY", "CURVED", "PERIODIC_DIRECTION")
+]
 
 
 def runs_of(*cases):
@@ -148,3 +159,29 @@ def test_a_motion_in_full():
     assert describe(Scale("blade", (2.0, 1.0))) == "blade: scale by 2 × 1 about its centroid"
     assert describe(FromFile(Path())) == "all moving: displace as in (no file yet)"
     assert describe(Radial("blade", 1.0, 0.0)) == "blade: push radially by +0"
+
+
+def other_value(key, case):
+    """Return a value of a key that the case does not have."""
+    value, kind = key.get(case), key.kind
+    texts = {
+        "choice": list(kind.words),
+        "switch": ["YES", "NO"],
+        "real": ["0.250000001", "0.25", "2.5"],
+        "whole": ["7", "8"],
+        "axis": ["(1.0, 0.0, 1e-9)"],
+        "point": ["(1.0, 0.0, 1e-9)"],
+    }[kind.entry]
+    return next(kind.read(text) for text in texts if kind.read(text) != value)
+
+
+@pytest.mark.parametrize("key", SETTINGS, ids=lambda key: key.name)
+def test_every_setting_that_changes_a_result_tells_runs_apart(key):
+    base = BASE.change(
+        roles={**BASE.roles, "up": "periodic"},
+        method=key.method or "rbf",
+        reduction=Reduction(0.25, multilevel=True),
+    )
+    runs = runs_of(base, key.put(base, other_value(key, base)))
+    first, second = (f"{run_words(run)}: {brief(run, runs)}" for run in runs)
+    assert first != second

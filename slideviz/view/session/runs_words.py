@@ -116,7 +116,8 @@ def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
     for key in SETTINGS:
         # What is as usual needs no words: the other runs say that they are not.
         words = _setting_words(key, case)
-        apart = bool(words) and any(_setting_words(key, other) != words for other in cases)
+        of = reduction_words if key.field == "reduction" else key.get
+        apart = bool(words) and any(of(other) != of(case) for other in cases)
         if apart or (words and key.field == "kernel"):
             yield words, apart
     nodes = control_nodes(run)
