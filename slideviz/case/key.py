@@ -68,7 +68,7 @@ class Key:
     put: Put
     get: Get
     default: str = _NO_DEFAULT
-    rbf_slide: bool = True
+    rbf_slide: bool = False
     field: str = ""
     label: str = ""
     unit: str = ""

@@ -427,25 +427,13 @@ _ROWS = (
     ),
     *VIEW_ROWS,
 )
-_OURS = {
-    "ZONE",
-    "MARKER_FIXED",
-    "MARKER_SLIDING",
-    "MOTION",
-    "PERIODIC_AXIS",
-    "PERIODIC_ORIGIN",
-    "FEATURE_ANGLE",
-    "QUALITY_METRIC",
-    "RBF_KERNEL",
-    "STEPS_GAIN",
-    "SELECTION",
-    "MAX_CONTROL_NODES",
-    "DATA_RED_RELATIVE",
-    "METHOD",
-    "IDW_POWER",
-    "IDW_FIXED_WEIGHT",
+_RBF_SLIDE = {
+    *("MESH_FILENAME", "MESH_OUT_FILENAME", "DEFORMATION_FILENAME", "GENERATE_QUALITY"),
+    *("MARKER_BDRY", "MARKER_MOVING", "MARKER_INTERNAL", "MARKER_PERIODIC"),
+    *("PERIODIC_MODE", "PERIODIC_TYPE", "PERIODIC_DIRECTION"),
+    *("SLIDING_MODE", "STEPS", "INFLUENCE_FACTOR", "CURVED"),
+    *("DATA_REDUCTION", "DATA_RED_TOLERANCE", "DOUBLE_EDGE", "GAMMA"),
+    *("MULTILEVEL", "MULTI_CRIT", "LVL_TOL_CRIT", "LVL_SIZE"),
 }
 
-KEYS: dict[str, Key] = {
-    row.name: replace(row, rbf_slide=row.rbf_slide and row.name not in _OURS) for row in _ROWS
-}
+KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name in _RBF_SLIDE) for row in _ROWS}

@@ -128,7 +128,7 @@ def _row(name: str, kind: Kind, meaning: str) -> Key:
     def put(case: Case, value: Any) -> Case:
         return case.change(view={**case.view, name: value})
 
-    return Key(name, VIEW, kind, meaning, put, lambda case: case.view.get(name), rbf_slide=False)
+    return Key(name, VIEW, kind, meaning, put, lambda case: case.view.get(name))
 
 
 VIEW_ROWS = (

@@ -1,5 +1,7 @@
 """Absurd but finite numbers in a case are refused in a sentence, or do what they say."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -15,11 +17,8 @@ TEXTS = ("1e300", "1.7e308", "1e30", "1e-30", "1e-300", "1e-320", "5e-324")
 FIELDS = [key for key in KEYS.values() if key.group in (METHOD, REDUCTION)]
 REALS = [key.name for key in FIELDS if key.kind.allowed.startswith("a number")]
 REFUSED = {
-    "small": ("INFLUENCE_FACTOR", "IDW_FIXED_WEIGHT"),
-    "large": (
-        *("INFLUENCE_FACTOR", "IDW_FIXED_WEIGHT", "IDW_POWER"),
-        *("FEATURE_ANGLE", "STEPS_GAIN", "LVL_TOL_CRIT"),
-    ),
+    "small": [name for name in REALS if "above 0 " not in f"{KEYS[name].kind.allowed} "],
+    "large": [name for name in REALS if re.search("below|up to", KEYS[name].kind.allowed)],
 }
 ENDS = [
     *[("INFLUENCE_FACTOR", text, kernel) for text in ("1.1e-6", "9e5") for kernel in KERNELS],
@@ -47,6 +46,12 @@ def case_with(name, text, sliding, kernel="wendland-c2"):
 
 def test_the_real_keys_are_found():
     assert {"INFLUENCE_FACTOR", "GAMMA", "FEATURE_ANGLE", "LVL_TOL_CRIT", "IDW_POWER"} < {*REALS}
+    both = {"INFLUENCE_FACTOR", "IDW_FIXED_WEIGHT"}
+    assert both <= {*REFUSED["small"]}
+    assert both | {"IDW_POWER", "FEATURE_ANGLE", "STEPS_GAIN", "LVL_TOL_CRIT"} <= {
+        *REFUSED["large"]
+    }
+    assert not {"GAMMA", "DATA_RED_TOLERANCE", "DATA_RED_RELATIVE"} & {*REFUSED["large"]}
 
 
 @pytest.mark.filterwarnings("error")
