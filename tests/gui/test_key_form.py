@@ -32,8 +32,9 @@ def field_of(driver, key):
     return form.fields[OWN.get(key.field, key.field)]
 
 
-def change_by_hand(driver, field):
-    """Give a field another value, as a user does."""
+def change_by_hand(driver, key):
+    """Give the field of a key another value, as a user does."""
+    field = field_of(driver, key)
     if isinstance(field, Choice):
         driver.choose(field, field.itemData((field.currentIndex() + 1) % field.count()))
     elif isinstance(field, Switch):
@@ -42,7 +43,8 @@ def change_by_hand(driver, field):
         driver.type(field.fields[0], "0.625")
     else:
         assert isinstance(field, NumberField | NumberBox)
-        driver.type(field if isinstance(field, NumberField) else field.lineEdit(), "7")
+        text = next(text for text in ("7", "0.7") if not key.kind.problem(text))
+        driver.type(field if isinstance(field, NumberField) else field.lineEdit(), text)
 
 
 def test_every_key_that_is_shown_has_a_field_that_sets_it(ready):
@@ -52,7 +54,7 @@ def test_every_key_that_is_shown_has_a_field_that_sets_it(ready):
         field, before = field_of(ready, key), ready.session.case
         assert field.objectName() == OWN.get(key.field, key.field)
         assert field.isEnabled(), key.name
-        change_by_hand(ready, field)
+        change_by_hand(ready, key)
         own = "reduction" if key.group == REDUCTION else key.field
         assert getattr(ready.session.case, own) != getattr(before, own), key.name
         ready.window.store.undo()
