@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QKeySequence, QShortcut
@@ -22,7 +22,6 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui import dialogs
-from slideviz.gui.canvas.cutting import Cutting
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.panels.section_words import HINTS, NAMES, TIPS, UNSEEN
 from slideviz.gui.widgets.elided import elide_items
@@ -35,6 +34,9 @@ from slideviz.view.sections.model import Section
 from slideviz.view.sections.start import first_cylinder, first_plane
 from slideviz.view.session import changes
 from slideviz.view.session.state import Session
+
+if TYPE_CHECKING:
+    from slideviz.gui.canvas.cutting import Cutting
 
 PICTURES = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 SIZES = {
