@@ -12,11 +12,11 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.deformation.solver import Step, deform
     from slideviz.errors import SlidevizError
-    from slideviz.mesh.files import read, write
+    from slideviz.mesh.io.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
-    from slideviz.staircase import Step, deform
 
 _HOME = {
     "Case": "case.model",
@@ -25,11 +25,11 @@ _HOME = {
     "Mesh": "mesh.model",
     "Quality": "mesh.quality",
     "SlidevizError": "errors",
-    "Step": "staircase",
-    "deform": "staircase",
+    "Step": "deformation.solver",
+    "deform": "deformation.solver",
     "quality": "mesh.quality",
-    "read": "mesh.files",
-    "write": "mesh.files",
+    "read": "mesh.io.files",
+    "write": "mesh.io.files",
 }
 
 __all__ = [

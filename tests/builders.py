@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.su2_write import su2_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import Pair, match
-from slideviz.mesh.su2_write import su2_blocks
 
 SIDE_TYPE = {2: {2: 3}, 3: {3: 5, 4: 9}}
 """VTK identifier of a side by dimension of the mesh and number of nodes."""

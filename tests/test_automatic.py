@@ -7,10 +7,10 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Translate
-from slideviz.case.samples import sample, write_sample
 from slideviz.cli import run
+from slideviz.deformation.solver import COUNTS, folded_at
 from slideviz.mesh.quality import INVERTED
-from slideviz.staircase import COUNTS, folded_at
+from slideviz.samples.table import sample, write_sample
 
 
 @pytest.fixture

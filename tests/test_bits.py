@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, Rotate, Scale
-from slideviz.case.plan import make_plan
+from slideviz.deformation.setup import make_plan
 from slideviz.mesh.topology import find_boundary
 from tests import builders
 from tools.laws.renumber import renumbered

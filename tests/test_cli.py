@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.samples import write_sample
 from slideviz.cli import run
+from slideviz.samples.table import write_sample
 
 SECONDS = {
     *("read", "classify", "select", "solve", "evaluate", "project", "quality", "write", "total"),
@@ -172,7 +172,7 @@ def test_a_folder_that_is_missing_is_told_before_the_mesh_is_read(
         raise AssertionError("too late")
 
     monkeypatch.chdir(square)
-    monkeypatch.setattr("slideviz.mesh.files.read", never)
+    monkeypatch.setattr("slideviz.mesh.io.files.read", never)
     monkeypatch.setattr("slideviz.read", never, raising=False)
     assert run(words) == 1
     assert "the folder" in (err := capsys.readouterr().err)

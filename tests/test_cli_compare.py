@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.samples import write_sample
 from slideviz.cli import run
 from slideviz.errors import DeformError
+from slideviz.samples.table import write_sample
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ def test_what_fails_later_has_a_line_and_the_reason_once(square, tmp_path, capsy
     def through(case, mesh):
         raise DeformError("the motion puts BLOCK through RIGHT")
 
-    monkeypatch.setattr("slideviz.view.compare.combinations.make_plan", through)
+    monkeypatch.setattr("slideviz.study.combinations.make_plan", through)
     assert run([*argv, "-o", str(out), "--no-pictures"]) == 1
     printed = capsys.readouterr().out
     assert "2 combinations" in printed
@@ -174,8 +174,8 @@ def test_a_case_without_mesh_and_a_folder_that_is_a_file_are_told(square, tmp_pa
 
 
 def test_the_help_names_every_method(capsys):
+    from slideviz.study.combinations import METHODS
     from slideviz.terms import PERIODIC_MODES
-    from slideviz.view.compare.combinations import METHODS
 
     assert run(["compare", "--help"]) == 0
     text = capsys.readouterr().out

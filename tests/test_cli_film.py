@@ -15,8 +15,8 @@ import pytest
 from PIL import Image
 
 import slideviz as sv
-from slideviz.case.samples import write_sample
 from slideviz.cli import run
+from slideviz.samples.table import write_sample
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_a_picture_has_the_size_and_the_detail_asked_for(tmp_path):
 
 def test_a_detail_may_lie_where_coordinates_are_negative(case, tmp_path):
     from slideviz.cli.parser import parse
-    from slideviz.view.motions.moved import Detail
+    from slideviz.scene.moved import Detail
 
     words = ["film", str(case), "-o", "a.gif", "--zoom", "-0.5,.25,-1e-3,2"]
     assert parse(words).zoom == Detail((-0.5, 0.25, -1e-3), 2.0)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.samples import write_sample
 from slideviz.cli import commands, parser, run
 from slideviz.cli.places import inputs_of
 from slideviz.errors import MeshError
-from slideviz.mesh.atomic import atomic_write, require_writable
-from slideviz.mesh.inputs import spared
+from slideviz.mesh.io.atomic import atomic_write, require_writable
+from slideviz.mesh.io.inputs import spared
+from slideviz.samples.table import write_sample
 
 CASE = ["square.cfg", "--set", "STEPS=1"]
 PLANE = ["--plane", "y=0.5"]

@@ -8,10 +8,10 @@ import pytest
 from PIL import Image
 
 import slideviz as sv
-from slideviz.case.samples import sample, write_sample
 from slideviz.cli import run
 from slideviz.cli.parser import parse
 from slideviz.cli.section_options import cylinder, glued, plane
+from slideviz.samples.table import sample, write_sample
 from slideviz.terms import COLOUR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
 
@@ -107,7 +107,7 @@ def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, 
 
 
 def title_of(folder, monkeypatch, mesh, *options):
-    from slideviz.view.sections import picture as section_picture
+    from slideviz.plots import section_picture
 
     seen = []
     monkeypatch.setattr(section_picture, "write_title", lambda *words: seen.append(words))

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.samples import write_sample
-from slideviz.mesh.atomic import atomic_write, require_writable
+from slideviz.mesh.io.atomic import atomic_write, require_writable
 from slideviz.mesh.undone import PREFIX, draft
+from slideviz.samples.table import write_sample
 
 SAID = {
     signal.SIGINT: "slideviz: cancelled; nothing half-written is left\n",

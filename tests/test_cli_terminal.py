@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.samples import write_sample
 from slideviz.cli import run
 from slideviz.cli.terminal import Terminal, plain
 from slideviz.errors import SlidevizError
+from slideviz.samples.table import write_sample
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.case.samples import write_sample
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.samples.table import write_sample
 from tests import builders
 
 REDUCTIONS = [None, Reduction(tolerance=1e-4)]

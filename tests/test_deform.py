@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz import staircase
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
+from slideviz.deformation import solver
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve
@@ -115,14 +115,14 @@ def test_a_callback_that_raises_ends_the_run_at_once_wherever_it_is(method):
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_plan_made_before_gives_the_same_mesh(steps, monkeypatch):
-    from slideviz.case.plan import make_plan
-    from slideviz.case.samples import sample
+    from slideviz.deformation.setup import make_plan
+    from slideviz.samples.table import sample
 
     made = sample("square", 10, "motion")
     case, mesh = made.case.change(steps=steps), made.mesh
     *_, alone = sv.deform(case, mesh)
     plan = make_plan(case.change(steps=7), mesh)
-    monkeypatch.setattr(staircase, "make_plan", None)
+    monkeypatch.setattr(solver, "make_plan", None)
     *_, shared = sv.deform(case, mesh, plan=plan)
     assert np.array_equal(shared.mesh.points, alone.mesh.points)
     assert shared.warnings == alone.warnings
@@ -182,7 +182,7 @@ def test_nothing_known_is_refused():
 @pytest.mark.parametrize(("method", "unknowns"), [("none", 32), ("ps", 32), ("ds", 44)])
 def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unknowns, monkeypatch):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "free_memory", lambda: 1000.0)
+    monkeypatch.setattr(solver, "free_memory", lambda: 1000.0)
     monkeypatch.setattr(solve, "extend", lambda *_: pytest.fail("the system was built"))
     text = rf"{unknowns} unknowns need 0\.0 GB of memory, 0\.0 GB are free; give large bound"
     with pytest.raises(DeformError, match=text):
@@ -191,7 +191,7 @@ def test_a_system_too_large_for_memory_is_refused_before_it_is_built(method, unk
 
 def test_direct_sliding_along_axes_needs_memory_for_one_axis_at_a_time(monkeypatch):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "free_memory", lambda: 15_000.0)  # 44 unknowns: 40,000
+    monkeypatch.setattr(solver, "free_memory", lambda: 15_000.0)  # 44 unknowns: 40,000
     case = square_case(mesh, sliding="ds")
     last(case, mesh)
     turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
@@ -200,7 +200,7 @@ def test_direct_sliding_along_axes_needs_memory_for_one_axis_at_a_time(monkeypat
 
 
 def testfree_memory_is_a_number_of_bytes():
-    assert staircase.free_memory() > 1e7
+    assert solver.free_memory() > 1e7
 
 
 def test_a_marker_element_that_is_no_side_is_told():

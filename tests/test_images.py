@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz import climb
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.case.plan import make_plan
 from slideviz.cli import run as command
+from slideviz.deformation import stepping
+from slideviz.deformation.setup import make_plan
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
 from slideviz.rbf.images import misfits
 from slideviz.rbf.problem import Solution
+from slideviz.session import changes
+from slideviz.session.node_types import NodeTypes
+from slideviz.session.state import Frame
 from slideviz.terms import NODE_TYPES
-from slideviz.view.node_types import NodeTypes
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
 from tests import builders
 
 SHARED = Path(__file__).parents[1] / ".." / "shared"
@@ -318,7 +318,7 @@ def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
     zeros = np.zeros((len(mesh.points), 2))
     for error, note in ((1e-12, True), (1e-3, False)):
         solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
-        (warning,) = climb._dropped_warning(solution, 1, mesh)
+        (warning,) = stepping._dropped_warning(solution, 1, mesh)
         assert isinstance(warning, Note) == note
         assert f"off by {error:.2g} at most" in warning
         assert "no harm" not in warning

@@ -14,7 +14,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.case.plan import make_plan
+from slideviz.deformation.setup import make_plan
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.axis import corners
 from slideviz.rbf.closest import ClosestPoints

@@ -7,7 +7,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction
-from slideviz.case.samples import write_sample
+from slideviz.samples.table import write_sample
 
 
 @pytest.mark.parametrize("selection", ["block", "one", "double"])

@@ -9,9 +9,9 @@ from PIL import Image
 
 from slideviz.case.cfg import set_key
 from slideviz.case.model import Case
-from slideviz.case.samples import SAMPLES, VARIANTS
+from slideviz.samples.table import SAMPLES, VARIANTS
+from slideviz.study.combinations import METHODS
 from slideviz.terms import PERIODIC_MODES
-from slideviz.view.compare.combinations import METHODS
 from tools.study import __main__ as study
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense

@@ -14,7 +14,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case
-from slideviz.case.samples import write_sample
+from slideviz.samples.table import write_sample
 
 REFERENCE = """
 square_25_severe none none 2 0.0558838 0.637004
@@ -226,7 +226,7 @@ def test_node_counts_of_the_dense_square(thesis, method, expected):
 
 
 def node_counts(mesh, case):
-    from slideviz.case.plan import make_plan
+    from slideviz.deformation.setup import make_plan
 
     return make_plan(case, mesh).classes.counts()
 

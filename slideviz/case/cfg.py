@@ -19,7 +19,7 @@ from slideviz.case.model import Case, FromFile
 from slideviz.case.reference import describe_keys
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
-from slideviz.mesh.atomic import atomic_write
+from slideviz.mesh.io.atomic import atomic_write
 from slideviz.terms import ROLES
 
 __all__ = ["describe_keys", "read_case", "set_key", "write_case"]

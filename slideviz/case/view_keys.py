@@ -1,6 +1,6 @@
 """Keys of a case file that say how the window showed it; a run without window passes them by.
 
-They are kept in ``Case.view`` as values by key; `slideviz.view.session.keep` puts them into a view.
+They are kept in ``Case.view`` as values by key; `slideviz.session.keep` puts them into a view.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def _run(argv: Sequence[str]) -> int:
         from slideviz.cli.parser import parse
         from slideviz.cli.places import inputs_of
         from slideviz.cli.progress import compiling_told
-        from slideviz.mesh.inputs import spared
+        from slideviz.mesh.io.inputs import spared
 
         arguments = parse(argv)
         arguments.inputs = inputs_of(arguments)

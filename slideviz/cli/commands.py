@@ -20,7 +20,7 @@ __all__ = ["info", "keys", "quality", "run", "sample", "shots", "window"]
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given."""
     from slideviz.errors import CaseError
-    from slideviz.view.screen import missing_screen
+    from slideviz.export.screen import missing_screen
 
     if arguments.file is not None and not arguments.file.exists():
         raise CaseError(
@@ -122,7 +122,7 @@ def quality(arguments: argparse.Namespace) -> int:
 def _write_csv(path: Path, found: Quality) -> None:
     """Write id, size-skew, size, skew and status of each cell."""
     from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import atomic_write
+    from slideviz.mesh.io.atomic import atomic_write
     from slideviz.terms import CELL_STATES
 
     columns = zip(found.values, found.size, found.skew, found.status, strict=True)
@@ -136,9 +136,9 @@ def _write_csv(path: Path, found: Quality) -> None:
 
 def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples."""
-    from slideviz.case.samples import SAMPLES, VARIANTS, write_sample
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
+    from slideviz.samples.table import SAMPLES, VARIANTS, write_sample
 
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
-    from slideviz.view.compare.combinations import Combination, Row
+    from slideviz.study.combinations import Combination, Row
 
 STEPS = (1, 5, 20)
 TABLE, HISTORY = "compare.csv", "convergence.csv"
@@ -74,9 +74,9 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import Output, make_folder, require_places
     from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
-    from slideviz.view.compare.combinations import METHODS, MODES, warm
-    from slideviz.view.compare.table import terminal_head
-    from slideviz.view.compare.wanted import announcement, refused
+    from slideviz.study.combinations import METHODS, MODES, warm
+    from slideviz.study.table import terminal_head
+    from slideviz.study.wanted import announcement, refused
 
     case = read_case(arguments)
     if case.mesh_file is None:
@@ -116,9 +116,9 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
         A name is unknown, or a number of steps is none.
     """
     from slideviz.errors import CaseError
+    from slideviz.study.combinations import AUTO, METHODS
+    from slideviz.study.wanted import combinations, wanted_methods, wanted_modes
     from slideviz.terms import PERIODIC_MODES
-    from slideviz.view.compare.combinations import AUTO, METHODS
-    from slideviz.view.compare.wanted import combinations, wanted_methods, wanted_modes
 
     def names(option: str, known: Sequence[str], usual: Sequence[str]) -> list[str]:
         text = getattr(arguments, option)
@@ -158,8 +158,8 @@ def _computed(
     say: Callable[[str], None],
 ) -> tuple[list[Row], list[Path]]:
     """Return all rows and the tables written; after each row they have what was finished."""
-    from slideviz.view.compare.combinations import bounded, compare
-    from slideviz.view.compare.table import csv_text, history_text, save_text, terminal_line
+    from slideviz.study.combinations import bounded, compare
+    from slideviz.study.table import csv_text, history_text, save_text, terminal_line
 
     table, histories = folder / TABLE, folder / HISTORY
     files = [table]
@@ -200,9 +200,9 @@ def _drawn(
     arguments: argparse.Namespace, case: Case, mesh: Mesh, rows: Sequence[Row], folder: Path
 ) -> list[Path]:
     """Return the plots and pictures written."""
-    from slideviz.view.compare.panels import profiler
-    from slideviz.view.compare.plots import figures, save_figure, steps_name
-    from slideviz.view.compare.sheets import DPI, sheet
+    from slideviz.study.panels import profiler
+    from slideviz.study.plots import figures, save_figure, steps_name
+    from slideviz.study.sheets import DPI, sheet
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
     files = []

@@ -13,11 +13,11 @@ from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.export.film_pair import Told
+    from slideviz.export.reel import Reel
     from slideviz.mesh.model import Mesh
-    from slideviz.view.motions.moved import Zoom
-    from slideviz.view.pictures.film_pair import Told
-    from slideviz.view.pictures.reel import Reel
-    from slideviz.view.session.state import Frame
+    from slideviz.scene.moved import Zoom
+    from slideviz.session.state import Frame
 
 SMOOTH = 4
 """Films of fewer steps are told that images can be put in between."""
@@ -29,10 +29,10 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import Output, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.run_command import read_case
-    from slideviz.view.pictures.encode import kind_of
-    from slideviz.view.pictures.film import film as draw
-    from slideviz.view.pictures.film_pair import film_pair, pair_size
-    from slideviz.view.pictures.reel import Reel, check_film
+    from slideviz.export.encode import kind_of
+    from slideviz.export.film import film as draw
+    from slideviz.export.film_pair import film_pair, pair_size
+    from slideviz.export.reel import Reel, check_film
 
     file = arguments.output
     reel = Reel(arguments.size, arguments.fps, arguments.hold, arguments.between)
@@ -64,8 +64,8 @@ def _runs(arguments: argparse.Namespace, case: Case) -> list[Told]:
     from slideviz import read
     from slideviz.cli.run_command import changed
     from slideviz.errors import CaseError
-    from slideviz.view.motions.moved import require_detail
-    from slideviz.view.pictures.film_pair import Told
+    from slideviz.export.film_pair import Told
+    from slideviz.scene.moved import require_detail
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     if case.mesh_file is None:
@@ -98,7 +98,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Frame
     """Return the undeformed mesh and every step, with their quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
-    from slideviz.view.session.state import Frame
+    from slideviz.session.state import Frame
 
     frames = [Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))]
     with Bar(not arguments.quiet) as bar:
@@ -224,7 +224,7 @@ def zoom(text: str) -> Zoom:
         return "auto"
     if text == "all":
         return "all"
-    from slideviz.view.motions.moved import Detail
+    from slideviz.scene.moved import Detail
 
     try:
         *centre, width = (float(word) for word in text.split(","))

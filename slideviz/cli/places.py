@@ -79,8 +79,8 @@ def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
         is no permission, a folder has that name, or no mesh format has that ending.
     """
     from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import require_writable
-    from slideviz.mesh.inputs import require_no_input
+    from slideviz.mesh.io.atomic import require_writable
+    from slideviz.mesh.io.inputs import require_no_input
 
     there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
     for one in there:
@@ -130,7 +130,7 @@ def _paths(one: Output) -> Iterator[Path]:
 
 def _meet(one: Output, other: Output) -> bool:
     """Tell whether two results would go to one file; the other is a file."""
-    from slideviz.mesh.inputs import same_file
+    from slideviz.mesh.io.inputs import same_file
 
     assert one.path is not None
     assert other.path is not None
@@ -145,7 +145,7 @@ def _meet(one: Output, other: Output) -> bool:
 
 def _require_mesh_ending(file: Path) -> None:
     if file.suffix.lower() not in (".su2", ".vtu"):
-        from slideviz.mesh.quiet_meshio import formats_of
+        from slideviz.mesh.io.quiet_meshio import formats_of
 
         formats_of(file)
 
@@ -159,7 +159,7 @@ def make_folder(folder: Path) -> None:
         It cannot be made.
     """
     from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import reason_of
+    from slideviz.mesh.io.atomic import reason_of
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.terminal import control
 
 if TYPE_CHECKING:
-    from slideviz.staircase import Progress
+    from slideviz.deformation.solver import Progress
 
 _PHASES = {
     "classify": "sorting nodes",

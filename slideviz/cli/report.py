@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.deformation.solver import Step, folded_at
 from slideviz.errors import CaseError
-from slideviz.mesh.atomic import atomic_write
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
-from slideviz.staircase import Step, folded_at
 
 LISTED = 100
 """Inverted cells named in a report."""

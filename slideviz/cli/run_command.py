@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from slideviz.case.model import Case
+    from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
-    from slideviz.staircase import Step
 
 KEPT_BYTES = 1_000_000_000
 """Meshes of steps are kept up to this size, to tell when cells were inverted."""
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import run_report, save_history, save_json
     from slideviz.errors import CaseError
-    from slideviz.view.motions.moved import require_detail
+    from slideviz.scene.moved import require_detail
 
     begin = time.perf_counter()
     case = read_case(arguments)
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
     if arguments.picture:
-        from slideviz.view.pictures.picture import SIZE, picture
+        from slideviz.export.picture import SIZE, picture
 
         named = replace(last.mesh, name=output.name)
         size = arguments.picture_size or SIZE
@@ -86,7 +86,7 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
     from slideviz.cli.places import Output, require_places
-    from slideviz.mesh.inputs import same_file
+    from slideviz.mesh.io.inputs import same_file
 
     assert case.mesh_file is not None
     may_force = not arguments.force and same_file(output, case.mesh_file)
@@ -100,8 +100,8 @@ def _require_places(
         + (", or say --force to write over it" if may_force else ""),
     )
     if arguments.picture:
-        from slideviz.view.pictures.offscreen import check_png, check_size
-        from slideviz.view.pictures.picture import SIZE
+        from slideviz.export.offscreen import check_png, check_size
+        from slideviz.export.picture import SIZE
 
         check_png(arguments.picture)
         check_size(arguments.picture_size or SIZE)
@@ -187,7 +187,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
 def _write_qualities(path: Path, found: Quality) -> None:
     """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
     from slideviz.errors import CaseError
-    from slideviz.mesh.atomic import atomic_write
+    from slideviz.mesh.io.atomic import atomic_write
 
     with atomic_write(path, CaseError) as file:
         file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())

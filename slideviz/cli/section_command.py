@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
-    from slideviz.view.sections.model import Section
+    from slideviz.sections.model import Section
 
 
 def section(arguments: argparse.Namespace) -> int:
@@ -22,12 +22,12 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.cli.reference import NONE, reference_of, words_of
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
-    from slideviz.view.copies import show_passages
-    from slideviz.view.drawing.polygons import joined
-    from slideviz.view.sections.around import surroundings
-    from slideviz.view.sections.cut import Cutter
-    from slideviz.view.sections.paint import paint
-    from slideviz.view.sections.picture import SectionStyle, require_picture_name, section_picture
+    from slideviz.plots.around import surroundings
+    from slideviz.plots.section_paint import paint
+    from slideviz.plots.section_picture import SectionStyle, require_picture_name, section_picture
+    from slideviz.sections.cut import Cutter
+    from slideviz.sections.polygons import joined
+    from slideviz.session.passages import show_passages
 
     _check_usage(arguments)
     require_picture_name(arguments.output)
@@ -94,7 +94,7 @@ def _section_and_passages(
     import numpy as np
 
     from slideviz.errors import CaseError
-    from slideviz.view.copies import find_period, passages
+    from slideviz.session.passages import find_period, passages
 
     asked = arguments.plane or arguments.cylinder.section
     chosen = replace(asked, whole=mesh.dim == 2 if arguments.whole is None else arguments.whole)

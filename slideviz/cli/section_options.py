@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES, SectionKind
 
 if TYPE_CHECKING:
-    from slideviz.view.sections.model import Section
+    from slideviz.sections.model import Section
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -185,7 +185,7 @@ def _section(
 ) -> Section:
     """Return a section, whose mistakes are those of the command line."""
     from slideviz.errors import CaseError
-    from slideviz.view.sections.model import Section
+    from slideviz.sections.model import Section
 
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0
     a, b, c, *_ = *direction, 0.0, 0.0, 0.0

@@ -8,15 +8,15 @@ from functools import partial
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMainWindow, QMenu
 
-from slideviz.gui.theme import THEMES
 from slideviz.gui.tool_bar import ToolBar
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.runs_menu import fill_compare
+from slideviz.gui.widgets.theme import THEMES
 from slideviz.gui.widgets.tips import tip_of, wrapped
+from slideviz.session import changes
+from slideviz.session.colors import usual_range
+from slideviz.session.state import Session
 from slideviz.terms import SHOWN, Shown
-from slideviz.view.session import changes
-from slideviz.view.session.colours import usual_range
-from slideviz.view.session.state import Session
 
 CUTS = {
     3: {"add_plane": "&Cut by a plane", "add_cylinder": "Cut by a c&ylinder"},

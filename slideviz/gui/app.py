@@ -15,13 +15,13 @@ from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 from threadpoolctl import ThreadpoolController
 
-from slideviz.gui.faults import caught, crash_log
-from slideviz.gui.tidy import Tidy
-from slideviz.gui.warm import prepare_drawing
+from slideviz.gui.responsiveness.garbage import Tidy
+from slideviz.gui.responsiveness.jit_warmup import prepare_drawing
+from slideviz.gui.responsiveness.worker import hold_libraries_back
+from slideviz.gui.widgets.faults import caught, crash_log
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
-from slideviz.gui.worker import hold_libraries_back
-from slideviz.mesh.private import private_file, private_folder
+from slideviz.mesh.io.private import private_file, private_folder
 
 log = logging.getLogger("slideviz")
 WARM_UP_MS = 300
@@ -89,7 +89,7 @@ def ready_numerics() -> None:
     """Import what computes, before there is any other thread, and let the window go before it."""
     # Here, once: two threads that import Numba at the same time (the warm-up and a run) find it
     # half-made.
-    import_module("slideviz.staircase")
+    import_module("slideviz.deformation.solver")
     hold_libraries_back()
     _leave_products_alone()
 

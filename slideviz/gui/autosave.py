@@ -23,11 +23,11 @@ from qtpy.QtCore import QLockFile, QObject, QTimer
 from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
-from slideviz.gui.worker import JobRunner
-from slideviz.mesh.private import private_file, private_folder
-from slideviz.view.session.keep import Camera, keep_view
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.mesh.io.private import private_file, private_folder
+from slideviz.session.keep import Camera, keep_view
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 
 DELAY_MS = 5000
 """The session is written so long after the first change that is not in the file yet."""

@@ -17,10 +17,10 @@ from slideviz.gui.panels.histogram import HistogramPanel
 from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
+from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.runs import RunsPanel
 from slideviz.gui.panels.sections import sections_panel
 from slideviz.gui.panels.worst import WorstPanel
-from slideviz.gui.run import RunPanel
 
 Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea

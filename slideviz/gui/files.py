@@ -14,12 +14,11 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
 from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs
-from slideviz.mesh.atomic import atomic_write
-from slideviz.view import jobs, jobs_sample
-from slideviz.view.formats import left_out
-from slideviz.view.session import changes
-from slideviz.view.session.keep import keep_view
+from slideviz.gui.widgets import questions
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.session import changes, jobs, jobs_sample
+from slideviz.session.formats import left_out
+from slideviz.session.keep import keep_view
 
 log = logging.getLogger("slideviz")
 RECENT = 10
@@ -69,7 +68,7 @@ class Files(QObject):
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
-        path = dialogs.ask_open(self.window, self.folder())
+        path = questions.ask_open(self.window, self.folder())
         if path is not None:
             self.open_path(path)
 
@@ -89,10 +88,10 @@ class Files(QObject):
 
     def ask_and_open_sample(self) -> None:
         """Ask for a sample and its size, and open it."""
-        from slideviz.case.samples import DEFAULT_SIZES
+        from slideviz.samples.table import DEFAULT_SIZES
 
         sizes = {name: jobs_sample.SIZES.get(name, DEFAULT_SIZES[name]) for name in self.samples}
-        found = dialogs.ask_sample(self.window, self.samples, sizes)
+        found = questions.ask_sample(self.window, self.samples, sizes)
         if found is not None:
             self.open_sample(found[0], size=found[1])
 
@@ -145,7 +144,7 @@ class Files(QObject):
             return True
         can_save = [name for name in unsaved if name in ("case", "mesh")]
         question = self._question(unsaved, before)
-        answer = dialogs.ask_unsaved(self.window, question, can_save)
+        answer = questions.ask_unsaved(self.window, question, can_save)
         # What else there is was in the question, too: it is not asked about again.
         if answer in ("case", "both") and not self.save_case():
             return False
@@ -221,12 +220,12 @@ class Files(QObject):
             return
         step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
         default = self.folder() / f"{self.stem()}{step}.su2"
-        filters = dialogs.mesh_filters(session.mesh)
-        path = dialogs.ask_save(self.window, "Save mesh", default, filters)
+        filters = questions.mesh_filters(session.mesh)
+        path = questions.ask_save(self.window, "Save mesh", default, filters)
         if path is None:
             return
         overwrite = _same(path, session.path)
-        if overwrite and not dialogs.ask_overwrite_input(self.window, path):
+        if overwrite and not questions.ask_overwrite_input(self.window, path):
             return
         self.settings.setValue("folder", str(path.parent))
         last = frame is session.frames[-1]
@@ -260,7 +259,7 @@ class Files(QObject):
         default = source or self.folder() / f"{self.stem()}.cfg"
         if sample_folder() in default.parents:
             default = self.folder() / default.name
-        path = dialogs.ask_save(self.window, "Save case", default, dialogs.CASE_FILTERS)
+        path = questions.ask_save(self.window, "Save case", default, questions.CASE_FILTERS)
         if path is None:
             return False
         if not self._take_along(path):
@@ -300,7 +299,7 @@ class Files(QObject):
             if file.is_file() and sample_folder() not in path.parents
         }
         there = [target for target in moved.values() if target.exists()]
-        if there and not dialogs.ask_replace(self.window, there):
+        if there and not questions.ask_replace(self.window, there):
             return False
         try:
             for file, target in moved.items():
@@ -329,6 +328,6 @@ def sample_folder() -> Path:
 
 def known_samples() -> dict[str, str]:
     """Return the sample cases: name and description."""
-    from slideviz.case.samples import SAMPLES
+    from slideviz.samples.table import SAMPLES
 
     return dict(SAMPLES)

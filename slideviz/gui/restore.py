@@ -11,10 +11,10 @@ from pathlib import Path
 from qtpy.QtCore import QObject
 
 from slideviz.gui.autosave import Autosave, Found, find_sessions
-from slideviz.gui.dialogs import Banner
-from slideviz.gui.faults import old_crashes
-from slideviz.view import jobs
-from slideviz.view.session.keep import restored
+from slideviz.gui.widgets.faults import old_crashes
+from slideviz.gui.widgets.questions import Banner
+from slideviz.session import jobs
+from slideviz.session.keep import restored
 
 log = logging.getLogger("slideviz")
 

@@ -10,15 +10,14 @@ from typing import Any
 from qtpy.QtCore import QObject, Signal
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.dialogs import Banner
-from slideviz.gui.worker import JobRunner
-from slideviz.view import jobs
-from slideviz.view.advice import help_for, inverted_words, notes_of, warnings_of
-from slideviz.view.jobs import Doing
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame, Run
-from slideviz.view.session.store import Store
-from slideviz.view.window_words import in_window_words
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.gui.widgets.questions import Banner
+from slideviz.session import changes, jobs
+from slideviz.session.jobs import Doing
+from slideviz.session.run_messages import help_for, inverted_words, notes_of, warnings_of
+from slideviz.session.state import Frame, Run
+from slideviz.session.store import Store
+from slideviz.session.window_words import in_window_words
 
 log = logging.getLogger("slideviz")
 

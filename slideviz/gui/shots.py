@@ -95,7 +95,7 @@ def open_window(place: Path) -> Iterator[MainWindow]:
     from qtpy.QtCore import QSettings
     from qtpy.QtWidgets import QApplication
 
-    from slideviz.gui import dialogs
+    from slideviz.gui.widgets import questions
     from slideviz.gui.window import MainWindow
 
     app = QApplication.instance() or QApplication(["slideviz"])
@@ -105,12 +105,12 @@ def open_window(place: Path) -> Iterator[MainWindow]:
     window.resize(*SIZE)
     window.move(0, 0)
     window.show()
-    dialogs.ask_unsaved, asked = (lambda *_: "discard"), dialogs.ask_unsaved
+    questions.ask_unsaved, asked = (lambda *_: "discard"), questions.ask_unsaved
     try:
         yield window
     finally:
         window.close()
-        dialogs.ask_unsaved = asked
+        questions.ask_unsaved = asked
         app.processEvents()
 
 

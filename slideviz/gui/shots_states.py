@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.model import Case, Motion, Rotate, Translate
-from slideviz.case.samples import sample, write_sample
 from slideviz.gui.shots_wait import settle
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
+from slideviz.samples.table import sample, write_sample
+from slideviz.sections.model import Section
+from slideviz.session import changes
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -156,11 +156,11 @@ STATES = (
 
 def film_of_passage(path: Path) -> Path:
     """Write a film of the passage that the dark picture shows, and return its path."""
+    from slideviz.deformation.solver import deform
+    from slideviz.export.film import film
+    from slideviz.export.reel import Reel
     from slideviz.mesh.quality import quality as quality_of
-    from slideviz.staircase import deform
-    from slideviz.view.pictures.film import film
-    from slideviz.view.pictures.reel import Reel
-    from slideviz.view.session.state import Frame
+    from slideviz.session.state import Frame
 
     made = sample("passage", 24)
     steps = deform(made.case.change(motions=FAR), made.mesh)

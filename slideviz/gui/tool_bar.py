@@ -11,9 +11,9 @@ from qtpy.QtWidgets import QLabel, QMenu, QSizePolicy, QToolBar, QToolButton, QW
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import TIPS, wrapped
+from slideviz.session import changes
+from slideviz.session.state import Session
 from slideviz.terms import COLOUR_BY, labels
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
 
 FIRST = ("open", "save_mesh", "save_case", "save_picture")
 SHOWN = ("edges", "undeformed", "motion_ghost", "legend", "perspective")

@@ -11,30 +11,29 @@ from pathlib import Path
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidget
 
-from slideviz.gui import theme
+from slideviz.case.motion_words import box_words
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
-from slideviz.gui.canvas.cutting import Cutting
-from slideviz.gui.clash import ClashWatch
-from slideviz.gui.dialogs import Banner
+from slideviz.gui.dialogs.exporter import Exports
+from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks
-from slideviz.gui.export.exporter import Exports
-from slideviz.gui.faults import Faults
 from slideviz.gui.files import Files
-from slideviz.gui.help import Help
-from slideviz.gui.player import Player
+from slideviz.gui.panels.intersection_check import ClashWatch
+from slideviz.gui.responsiveness.jit_warmup import WarmUp
 from slideviz.gui.restore import Restore
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
-from slideviz.gui.viewing import Viewing
-from slideviz.gui.warm import WarmUp
+from slideviz.gui.viewport.cutting import Cutting
+from slideviz.gui.viewport.player import Player
+from slideviz.gui.viewport.viewing import Viewing
+from slideviz.gui.widgets import theme
+from slideviz.gui.widgets.faults import Faults
+from slideviz.gui.widgets.questions import Banner
 from slideviz.gui.widgets.tips import plain_labels
-from slideviz.mesh.inputs import spared
-from slideviz.view import jobs
-from slideviz.view.missing import Missing
-from slideviz.view.motions.words import box_words
-from slideviz.view.session import changes
-from slideviz.view.session.store import Store
+from slideviz.mesh.io.inputs import spared
+from slideviz.session import changes, jobs
+from slideviz.session.run_requirements import Missing
+from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
 

@@ -16,7 +16,7 @@ from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
-    from slideviz.mesh.su2 import Document
+    from slideviz.mesh.io.su2 import Document
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz import staircase
 from slideviz.case.cfg import set_key
 from slideviz.case.check import effective, idle_settings
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Reduction, Rotate
-from slideviz.case.samples import SAMPLES, sample, write_sample
 from slideviz.cli import run
+from slideviz.deformation import solver
 from slideviz.errors import CaseError, DeformError
+from slideviz.samples.table import SAMPLES, sample, write_sample
 from slideviz.terms import METHODS
 from tests import builders
 
@@ -69,7 +69,7 @@ def test_a_mesh_too_large_for_elasticity_is_refused_and_for_the_explicit_method_
     monkeypatch,
 ):
     mesh = builders.square(6)
-    monkeypatch.setattr(staircase, "free_memory", lambda: 1000.0)
+    monkeypatch.setattr(solver, "free_memory", lambda: 1000.0)
     case = Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),), method="elastic")
     with pytest.raises(DeformError, match=r"elasticity of 48 nodes needs .* METHOD= idw"):
         list(sv.deform(case, mesh))

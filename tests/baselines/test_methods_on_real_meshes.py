@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from slideviz.case.plan import make_plan
+from slideviz.deformation.setup import make_plan
 from tests import test_real_meshes as real
 
 pytestmark = real.pytestmark

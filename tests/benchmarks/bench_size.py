@@ -11,7 +11,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Reduction
-from slideviz.case.samples import write_sample
+from slideviz.samples.table import write_sample
 from tests.benchmarks.measured import call
 
 

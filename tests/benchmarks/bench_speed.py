@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.samples import sample, write_sample
 from slideviz.mesh.topology import find_boundary, find_fans
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.solve import factorise
+from slideviz.samples.table import sample, write_sample
 
 TARGETS, CONTROLS = 200_000, 1_000
 RULES = {"euclidean": (3, 0.0), "translational": (4, 0.0), "rotational": (4, 0.5)}

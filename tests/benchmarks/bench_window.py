@@ -21,8 +21,8 @@ if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
 
 from qtpy.QtCore import QSettings, Qt, QTimer
 
-from slideviz.case.samples import write_sample
-from slideviz.view.session import changes
+from slideviz.samples.table import write_sample
+from slideviz.session import changes
 
 TICK_MS = 10
 STEPS = 20
@@ -59,7 +59,7 @@ class Bench:
 
     def __init__(self, app, folder: Path) -> None:
         from slideviz.gui.app import be_quick, ready_numerics
-        from slideviz.gui.warm import prepare_drawing
+        from slideviz.gui.responsiveness.jit_warmup import prepare_drawing
         from slideviz.gui.window import MainWindow
 
         ready_numerics()
@@ -98,16 +98,16 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def bench(qapp, tmp_path_factory):
-    from slideviz.gui import dialogs
+    from slideviz.gui.widgets import questions
 
     folder = tmp_path_factory.mktemp("window")
     write_sample("stator", folder, 240_000)
-    asked, dialogs.ask_unsaved = dialogs.ask_unsaved, lambda *_: "discard"
+    asked, questions.ask_unsaved = questions.ask_unsaved, lambda *_: "discard"
     made = Bench(qapp, folder)
     made.open()
     yield made
     made.window.close()
-    dialogs.ask_unsaved = asked
+    questions.ask_unsaved = asked
 
 
 def measure(benchmark, bench, work) -> None:
@@ -133,7 +133,7 @@ def test_colouring(benchmark, bench):
 
 
 def test_cutting(benchmark, bench):
-    from slideviz.view.sections.model import Section
+    from slideviz.sections.model import Section
 
     store = bench.window.store
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.clash import clash, jump
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
-from slideviz.case.samples import sample
+from slideviz.deformation.intersection import clash, jump
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
+from slideviz.samples.table import sample
 from tests.builders import airfoil, cube, make_mesh, passage, sphere_in_box
 from tools.laws.cases import random_run
 

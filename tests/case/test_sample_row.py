@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.sample_front import NEAREST, front_points
-from slideviz.case.sample_row import row_case, row_mesh
-from slideviz.case.sample_sizing import Sizing, find_sizing
-from slideviz.case.sample_triangles import inside, relax, triangulate
-from slideviz.case.sample_vane import camber, pitch, vane_layers
-from slideviz.case.samples import DEFAULT_SIZES, sample
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
+from slideviz.samples.front import NEAREST, front_points
+from slideviz.samples.row import row_case, row_mesh
+from slideviz.samples.sizing import Sizing, find_sizing
+from slideviz.samples.table import DEFAULT_SIZES, sample
+from slideviz.samples.triangles import inside, relax, triangulate
+from slideviz.samples.vane import camber, pitch, vane_layers
 
 TRIANGLE, QUADRILATERAL = 5, 9
 KEPT = Path(__file__).parents[2] / "sample_meshes" / "turbine-row"

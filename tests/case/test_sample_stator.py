@@ -9,15 +9,15 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.motion import displacements
-from slideviz.case.sample_blade import Section, blade_nodes
-from slideviz.case.sample_channel import Shares, counts
-from slideviz.case.sample_passage import make_grid, smoothed, straight_points
-from slideviz.case.sample_refine import refined
-from slideviz.case.sample_stator import stator_mesh
-from slideviz.case.samples import DEFAULT_SIZES, Sample, sample, write_sample
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
+from slideviz.samples.blade import Section, blade_nodes
+from slideviz.samples.channel import Shares, counts
+from slideviz.samples.passage import make_grid, smoothed, straight_points
+from slideviz.samples.refine import refined
+from slideviz.samples.stator import stator_mesh
+from slideviz.samples.table import DEFAULT_SIZES, Sample, sample, write_sample
 
 made = cache(sample)
 KEPT = Path(__file__).parents[2] / "sample_meshes" / "stator"

@@ -10,11 +10,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.motion import displacements
-from slideviz.case.sample_passage import passage_mesh
-from slideviz.case.sample_smooth import smooth
-from slideviz.case.samples import SAMPLES, VARIANTS, Sample, sample, write_sample
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.samples.passage import passage_mesh
+from slideviz.samples.smooth import smooth
+from slideviz.samples.table import SAMPLES, VARIANTS, Sample, sample, write_sample
 
 ROOT = Path(__file__).parents[2]
 THESIS = ROOT / ".." / "shared" / "meshes" / "thesis"

@@ -30,16 +30,17 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.samples import write_sample
-from slideviz.gui import dialogs, shots, shots_states
+from slideviz.gui import shots, shots_states
 from slideviz.gui.shots_wait import settle
-from slideviz.view.session import changes
+from slideviz.gui.widgets import questions
+from slideviz.samples.table import write_sample
+from slideviz.session import changes
 from tests.golden.desk import Desk, keep_picture
 from tests.golden.parts import FONT
 
 SMALL = 0.45
 
-ask_unsaved = dialogs.ask_unsaved
+ask_unsaved = questions.ask_unsaved
 """That of the program: `open_window` puts one in its place that answers by itself."""
 
 
@@ -207,14 +208,14 @@ def tell_contexts(desk: Desk, window) -> None:
 
 def tell_dialogs(desk: Desk, window, place: Path) -> None:
     """Keep the words of every dialog, and pictures of those that a user fills in."""
-    from slideviz.case.samples import DEFAULT_SIZES, SAMPLES
+    from slideviz.samples.table import DEFAULT_SIZES, SAMPLES
 
     here = [place / name for name in ("a.su2", "b.su2")]
     with answered(desk):
-        dialogs.ask_sample(window, SAMPLES, DEFAULT_SIZES)
-        dialogs.ask_replace(window, here[:1])
-        dialogs.ask_replace(window, here)
-        dialogs.ask_overwrite_input(window, here[0])
+        questions.ask_sample(window, SAMPLES, DEFAULT_SIZES)
+        questions.ask_replace(window, here[:1])
+        questions.ask_replace(window, here)
+        questions.ask_overwrite_input(window, here[0])
         for able in ((), ("case",), ("mesh",), ("case", "mesh")):
             ask_unsaved(window, "Save it?\nIt would be lost.", able)
         window.exports.picture()

@@ -10,12 +10,11 @@ else:
     from qtpy.QtCore import QSettings, Qt
     from qtpy.QtTest import QTest
 
-    from slideviz.case.samples import write_sample
-    from slideviz.gui import dialogs
-    from slideviz.gui.widgets import plot_canvas
+    from slideviz.gui.widgets import plot_canvas, questions
     from slideviz.gui.window import MainWindow
-    from slideviz.view.drawing.pick import to_display
-    from slideviz.view.session.store import Store
+    from slideviz.samples.table import write_sample
+    from slideviz.scene.pick import to_display
+    from slideviz.session.store import Store
 
 
 DIALOGS = (
@@ -35,8 +34,8 @@ def nothing_of_closed_windows():
     """Collect what closed windows left, as PySide would give their wrappers to new objects.
 
     The view keeps a QSurface; where Qt puts an action at its address later, Python gets the
-    surface for it. Meanwhile, as in the program (`slideviz.gui.tidy`), no thread of a job or a plot
-    looks for garbage: what belongs to Qt and VTK would end there.
+    surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.garbage`), no thread
+    of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
     """
     gc.collect()
     gc.disable()
@@ -52,7 +51,7 @@ def no_questions(monkeypatch):
         raise AssertionError(f"unexpected question: {values[1:]}")
 
     for name in DIALOGS:
-        monkeypatch.setattr(dialogs, name, unexpected)
+        monkeypatch.setattr(questions, name, unexpected)
 
 
 @pytest.fixture
@@ -66,7 +65,7 @@ def answers(monkeypatch):
             asked.append(values[1:])
             return value
 
-        monkeypatch.setattr(dialogs, name, reply)
+        monkeypatch.setattr(questions, name, reply)
         return asked
 
     return answer
@@ -83,7 +82,7 @@ def window(qtbot, settings, monkeypatch):
 
     def close(window):
         # Whatever a test leaves unsaved is of no interest.
-        monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+        monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
         window.close()
 
     qtbot.addWidget(made, before_close_func=close)

@@ -9,10 +9,11 @@ import pytest
 from qtpy.QtWidgets import QMessageBox
 
 from slideviz.case.model import Case
-from slideviz.gui import autosave, dialogs, faults
+from slideviz.gui import autosave
 from slideviz.gui.autosave import find_sessions
+from slideviz.gui.widgets import faults, questions
 from slideviz.gui.window import MainWindow
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def make(qtbot, settings, monkeypatch, folder):
         window = MainWindow(settings, multi_samples=0, kept=folder)
 
         def close(window):
-            monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+            monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
             window.close()
 
         qtbot.addWidget(window, before_close_func=close)
@@ -73,7 +74,7 @@ def crashed(make, qtbot, folder, case_file):
 
 @pytest.fixture(autouse=True)
 def nothing_asked(monkeypatch):
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
 
 
 def test_nobody_else_may_read_what_is_kept(make, qtbot, folder, case_file, tmp_path):
@@ -261,9 +262,9 @@ from pathlib import Path
 from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QApplication
 from slideviz.gui.window import MainWindow
-from slideviz.view.session import changes
+from slideviz.session import changes
 
-import slideviz.staircase  # as `launch` does, before any thread
+import slideviz.deformation.solver  # as `launch` does, before any thread
 
 app = QApplication([])
 folder = Path(sys.argv[1])
@@ -317,15 +318,15 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
         asked.append((what, tuple(can_save)))
         return "both"
 
-    monkeypatch.setattr(dialogs, "ask_unsaved", ask)
-    monkeypatch.setattr(dialogs, "ask_save", lambda *_: next(names))
+    monkeypatch.setattr(questions, "ask_unsaved", ask)
+    monkeypatch.setattr(questions, "ask_save", lambda *_: next(names))
     window.store.change(changes.show_frame, 1)
     assert not window.close(), "first the mesh is written"
     qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
     assert [can for _, can in asked] == [("case", "mesh")]
     assert "the deformed mesh of run 1" in asked[0][0]
     assert (tmp_path / "out.cfg").is_file()
-    from slideviz.mesh.files import read
+    from slideviz.mesh.io.files import read
 
     last = window.store.session.frames[-1].mesh
     assert (read(tmp_path / "out.su2").points == last.points).all(), "the last step, not that shown"
@@ -338,9 +339,9 @@ def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, an
     window.store.change(changes.set_case, steps=2)
     run_in(window, qtbot)
     answers = iter([answer])
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: next(answers))
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: next(answers))
     file = tmp_path / {"case": "out.cfg", "mesh": "out.su2"}[answer]
-    monkeypatch.setattr(dialogs, "ask_save", lambda *_: file)
+    monkeypatch.setattr(questions, "ask_save", lambda *_: file)
     window.close()
     qtbot.waitUntil(lambda: not window.isVisible(), timeout=20_000)
     assert file.is_file()
@@ -365,6 +366,6 @@ def test_the_question_offers_what_can_be_saved(make, monkeypatch, can_save, word
         next(b for b in box.buttons() if b.text() == words[0]).click()
 
     monkeypatch.setattr(QMessageBox, "exec", look)
-    answer = dialogs.ask_unsaved(window, "Save it?\nIt is worth it.", can_save)
+    answer = questions.ask_unsaved(window, "Save it?\nIt is worth it.", can_save)
     assert sorted(seen[0]) == sorted(words)
     assert answer == (can_save[0] if can_save else "discard")

@@ -8,10 +8,10 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
+from slideviz.color_scheme import DARK
 from slideviz.gui.panels.curves import CurvesPanel
-from slideviz.view.drawing.look import DARK
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
+from slideviz.session import changes
+from slideviz.session.state import Session
 
 
 @pytest.fixture

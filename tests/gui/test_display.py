@@ -8,12 +8,12 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.samples import write_sample
 from slideviz.gui.panels.display import NOT_PERIODIC, ROLES_ONLY, SHOWN
 from slideviz.gui.panels.display_fields import MOST_COPIES, Copies
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.layers.copies import CopyLayer
-from slideviz.view.session import changes
+from slideviz.samples.table import write_sample
+from slideviz.scene.passages import CopyLayer
+from slideviz.scene.pick import to_display
+from slideviz.session import changes
 
 
 @pytest.fixture

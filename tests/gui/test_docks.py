@@ -10,12 +10,12 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QWidget
 
 from slideviz.case.model import Reduction
-from slideviz.gui import dialogs
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 SMALL = 1280, 800
 
@@ -129,7 +129,7 @@ def widths(window):
 
 
 def close(window, monkeypatch):
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     window.close()
 
 

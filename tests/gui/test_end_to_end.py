@@ -12,9 +12,9 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QDialog, QDialogButtonBox, QFileDialog, QLineEdit
 
 from slideviz.case.model import Rotate, Translate
-from slideviz.gui import dialogs
+from slideviz.gui.widgets import questions
 
-ASK_SAVE = dialogs.ask_save
+ASK_SAVE = questions.ask_save
 
 
 def type_into_file_dialog(path):
@@ -66,7 +66,7 @@ def test_a_blade_passage_from_mesh_to_case_and_the_command_line_agrees(
     driver, passage_file, tmp_path, monkeypatch
 ):
     window, mesh_file = driver.window, Path(passage_file)
-    monkeypatch.setattr(dialogs, "ask_save", ASK_SAVE)
+    monkeypatch.setattr(questions, "ask_save", ASK_SAVE)
     driver.open(mesh_file)
 
     # The blade by a click in the view and the right button, the others in the table.

@@ -15,20 +15,19 @@ from qtpy.QtWidgets import QApplication, QDialog
 
 from slideviz import read
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs
-from slideviz.gui.export import exporter as export
-from slideviz.gui.export.film import FilmDialog
-from slideviz.gui.export.film_form import FilmForm, length_words
-from slideviz.gui.export.picture import PictureDialog
+from slideviz.export import exposure
+from slideviz.export import film as film_module
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
+from slideviz.export.reel import Reel
+from slideviz.gui.dialogs import exporter as export
+from slideviz.gui.dialogs.film import FilmDialog
+from slideviz.gui.dialogs.film_form import FilmForm, length_words
+from slideviz.gui.dialogs.picture import PictureDialog
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import fitted, framed, to_image
 from slideviz.mesh.quality import quality
-from slideviz.view import jobs, jobs_export
-from slideviz.view.drawing import exposure, pieces
-from slideviz.view.pictures import film as film_module
-from slideviz.view.pictures.figure import Figure
-from slideviz.view.pictures.reel import Reel
-from slideviz.view.pictures.studio import Studio
-from slideviz.view.session import changes
+from slideviz.session import changes, jobs, jobs_export, pieces
 
 
 @pytest.fixture
@@ -203,7 +202,7 @@ def test_drawings_of_2d_meshes(ran, answers, tmp_path, suffix):
 
 def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    assert export.picture_filters(driver.session) == dialogs.PICTURE_FILTERS
+    assert export.picture_filters(driver.session) == questions.PICTURE_FILTERS
     viewing = driver.window.viewing
     with Studio(driver.session, viewing.surfaces, viewing.scene) as studio:
         dialog = PictureDialog(None, studio)
@@ -528,11 +527,11 @@ def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path
 
 
 def test_formats_for_the_mesh_are_offered(opened, driver, sample_folder):
-    flat = dialogs.mesh_filters(opened.session.mesh)
+    flat = questions.mesh_filters(opened.session.mesh)
     assert flat.startswith("SU2 (keeps all")
     assert "Nastran" not in flat
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
-    assert "Nastran" in dialogs.mesh_filters(driver.session.mesh)
+    assert "Nastran" in questions.mesh_filters(driver.session.mesh)
 
 
 def test_saved_quality_is_in_the_vtu(ran, tmp_path):
@@ -546,7 +545,7 @@ def test_saved_quality_is_in_the_vtu(ran, tmp_path):
 
 
 def test_a_drawing_of_another_ending_is_refused(studio):
-    from slideviz.view.pictures.figure_vector import require_vector
+    from slideviz.export.vector import require_vector
 
     with pytest.raises(SlidevizError, match="end the name so"):
         require_vector(studio.session, Path("a.png"))

@@ -11,10 +11,9 @@ from qtpy.QtCore import QTimer, qWarning
 from qtpy.QtWidgets import QApplication
 
 from slideviz.errors import CaseError
-from slideviz.gui import dialogs, faults
-from slideviz.view import jobs
-from slideviz.view.session import changes
-from slideviz.view.session.store import Store, tell_all
+from slideviz.gui.widgets import faults, questions
+from slideviz.session import changes, jobs
+from slideviz.session.store import Store, tell_all
 
 
 @pytest.fixture
@@ -145,7 +144,7 @@ def test_an_error_in_a_file_dialog_is_told(driver, caught, monkeypatch, passage_
     def broken(*_):
         raise OSError("the portal does not answer")
 
-    monkeypatch.setattr(dialogs, "ask_open", broken)
+    monkeypatch.setattr(questions, "ask_open", broken)
     caught.actions_.by_name["open"].trigger()
     driver.qtbot.waitUntil(lambda: caught.faults.count == 1)
     assert "the portal does not answer" in text(caught)
@@ -220,7 +219,7 @@ def test_a_line_that_repeats_is_counted(window, qtbot):
 CRASH = """
 import faulthandler, sys
 from pathlib import Path
-from slideviz.gui.faults import crash_log
+from slideviz.gui.widgets.faults import crash_log
 with crash_log(Path(sys.argv[1])):
     {}
 """

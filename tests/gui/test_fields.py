@@ -6,7 +6,7 @@ from qtpy.QtGui import QColor, QFocusEvent, QPalette
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
-from slideviz.gui import theme
+from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField, short_text
 

@@ -6,12 +6,12 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.samples import write_sample
-from slideviz.gui.canvas.handle import PlaneHandle
-from slideviz.gui.canvas.handle_round import RoundHandle
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.sections.grip_round import on_cylinder
-from slideviz.view.session import changes
+from slideviz.gui.viewport.handle import PlaneHandle
+from slideviz.gui.viewport.handle_round import RoundHandle
+from slideviz.samples.table import write_sample
+from slideviz.scene.cylinder_handle import on_cylinder
+from slideviz.scene.pick import to_display
+from slideviz.session import changes
 
 
 @pytest.fixture(scope="module")

@@ -6,14 +6,13 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
-from slideviz.gui import dialogs
+from slideviz.color_scheme import DARK
 from slideviz.gui.panels.histogram import HistogramPanel
-from slideviz.gui.widgets import plot_canvas
+from slideviz.gui.widgets import plot_canvas, questions
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.drawing.look import DARK
-from slideviz.view.sections.choice import ONLY_INVERTED
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.session import changes
+from slideviz.session.state import Frame
 
 
 @pytest.fixture
@@ -248,7 +247,7 @@ def test_what_goes_wrong_in_a_drawing_is_told_in_the_window(full, qtbot, monkeyp
 
 
 def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
-    from slideviz.view.plots import session_histogram
+    from slideviz.plots import session_histogram
 
     asked = []
     real = session_histogram.distribution
@@ -276,7 +275,7 @@ def test_it_is_saved_as_a_figure(full, tmp_path, answers, name, start):
 
 
 def test_another_kind_of_file_is_refused_and_nothing_written(full, tmp_path):
-    with pytest.raises(dialogs.SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
+    with pytest.raises(questions.SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
         plot_canvas.write_plot(tmp_path / "h.xls", full.drawing())
     assert not list(tmp_path.iterdir())
 

@@ -3,8 +3,8 @@
 import pytest
 
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs
-from slideviz.mesh.atomic import atomic_write
+from slideviz.gui.widgets import questions
+from slideviz.mesh.io.atomic import atomic_write
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def test_exports_spare_what_was_read(opened, tmp_path):
 def test_a_case_is_not_saved_over_the_mesh(opened, monkeypatch):
     path = opened.store.session.path
     before = path.read_bytes()
-    monkeypatch.setattr(dialogs, "ask_save", lambda *_: path)
+    monkeypatch.setattr(questions, "ask_save", lambda *_: path)
     assert not opened.files.save_case()
     assert path.read_bytes() == before
     assert "choose another name" in opened.banner.text.text()
@@ -35,7 +35,7 @@ def test_a_case_is_not_saved_over_the_mesh(opened, monkeypatch):
 
 def test_a_closed_window_spares_nothing_any_more(opened, monkeypatch):
     path = opened.store.session.path
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     opened.close()
     with atomic_write(path) as file:
         file.write(b"new")

@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QLineEdit
 
 from slideviz.case.model import Rotate, Scale, Translate
 from slideviz.gui.widgets.fields import NumberBox, NumberField
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Reduction
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch, VectorField
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 OWN = {"multilevel": "levels", "level_size": "level_end"}
 """Fields that stand for more than one key, by the one that they have label and tip from."""

@@ -7,7 +7,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
 from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from qtpy.QtCore import QCoreApplication, QEvent
 
 from slideviz.gui.widgets.plot_image import THREAD
 from slideviz.gui.window import MainWindow
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 1e6
 
@@ -56,9 +56,9 @@ def settle():
 
 
 def windows(qtbot, settings, path, monkeypatch, count):
-    from slideviz.gui import dialogs
+    from slideviz.gui.widgets import questions
 
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     memory = []
     for _ in range(count):
         gone = cycle(qtbot, settings, path)

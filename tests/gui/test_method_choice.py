@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 REDUCTION = ("selection", "levels", "level_end", "gamma")
 

@@ -5,9 +5,9 @@ import pytest
 from qtpy.QtTest import QTest
 
 from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
-from slideviz.gui.panels.motion_table import TableDialog
-from slideviz.view.motions.table import Rows
-from slideviz.view.session import changes
+from slideviz.gui.dialogs.motion_table import TableDialog
+from slideviz.session import changes
+from slideviz.session.motion_table import Rows
 
 NOISE = 3.7e-13
 

@@ -4,13 +4,13 @@ import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QLabel, QMessageBox
 
-from slideviz.gui import dialogs
 from slideviz.gui.start import StartPage
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.tips import wrapped
 
 NAME = '<b>wing</b><img src="a.png">'
-ask_replace = dialogs.ask_replace
-ask_overwrite_input = dialogs.ask_overwrite_input
+ask_replace = questions.ask_replace
+ask_overwrite_input = questions.ask_overwrite_input
 
 
 def test_tooltips_show_names_as_they_are(qtbot):

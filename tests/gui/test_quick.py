@@ -9,8 +9,8 @@ import pytest
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from slideviz.gui.canvas.canvas import View3D
-from slideviz.gui.tidy import YOUNG, Tidy
+from slideviz.gui.responsiveness.garbage import YOUNG, Tidy
+from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.widgets.bar import QuietBar
 
 
@@ -164,7 +164,7 @@ def test_old_garbage_is_found_too(tidy):
 
 BACK = """
 import _thread, os, threading, time
-from slideviz.gui import worker
+from slideviz.gui.responsiveness import worker
 
 numbers = {}
 
@@ -216,11 +216,11 @@ def test_numpy_multiplies_in_the_thread_that_asks():
 
 
 def test_the_warm_up_stands_back(window, qtbot, monkeypatch):
-    from slideviz.gui import warm
+    from slideviz.gui.responsiveness import jit_warmup
 
     order = []
-    monkeypatch.setattr(warm, "stand_back", lambda: order.append("back"))
-    monkeypatch.setattr(warm.warmup, "warm_up", lambda *_: order.append("warm"))
+    monkeypatch.setattr(jit_warmup, "stand_back", lambda: order.append("back"))
+    monkeypatch.setattr(jit_warmup.warmup, "warm_up", lambda *_: order.append("warm"))
     window.warm_up.start()
     qtbot.waitUntil(lambda: len(order) == 2)
     assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"

@@ -6,8 +6,8 @@ from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 
 from slideviz.case.model import Radial, Rotate
-from slideviz.case.samples import write_sample
-from slideviz.view.session import changes
+from slideviz.samples.table import write_sample
+from slideviz.session import changes
 
 
 @pytest.fixture

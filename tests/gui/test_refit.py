@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Translate
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 
 @pytest.mark.parametrize("zoomed", [False, True])

@@ -10,13 +10,12 @@ import time
 import pytest
 
 from slideviz.errors import Cancelled
-from slideviz.gui import worker
-from slideviz.mesh.files import read
+from slideviz.gui.responsiveness import worker
+from slideviz.mesh.io.files import read
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
-from slideviz.view import jobs
-from slideviz.view.session import changes
+from slideviz.session import changes, jobs
 
 
 @pytest.fixture
@@ -160,7 +159,7 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
 
 
 def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeypatch):
-    from slideviz.gui.canvas import canvas
+    from slideviz.gui.viewport import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -172,7 +171,7 @@ def test_a_large_mesh_appears_part_by_part_and_wholly(driver, case_file, monkeyp
 
 
 def test_a_picture_of_a_mesh_that_is_still_appearing_is_whole(driver, case_file, monkeypatch):
-    from slideviz.gui.canvas import canvas
+    from slideviz.gui.viewport import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -184,7 +183,7 @@ def test_a_picture_of_a_mesh_that_is_still_appearing_is_whole(driver, case_file,
 
 
 def test_what_is_hidden_meanwhile_stays_hidden(driver, case_file, monkeypatch):
-    from slideviz.gui.canvas import canvas
+    from slideviz.gui.viewport import canvas
 
     monkeypatch.setattr(canvas, "PART_CELLS", 40)
     driver.open(case_file)
@@ -209,7 +208,7 @@ opened = MainWindow.show_opened
 
 def then_run(window, *values):
     opened(window, *values)
-    from slideviz.view.session import changes
+    from slideviz.session import changes
     window.store.change(changes.set_case, steps=5000)
     QTimer.singleShot(0, window.start_run)
     QTimer.singleShot(int(sys.argv[2]), window.close)

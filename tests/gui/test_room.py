@@ -10,11 +10,12 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtTest import QTest
 
 from slideviz.case.model import Case, FromFile, Radial, Rotate
-from slideviz.gui import dialogs, files
+from slideviz.gui import files
 from slideviz.gui.panels.worst import info_text
 from slideviz.gui.start import StartPage
+from slideviz.gui.widgets import questions
 from slideviz.gui.window import MainWindow
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 SIZES = """
 import sys, tempfile
@@ -98,7 +99,7 @@ def test_the_size_of_the_mesh_is_told(driver, sample_folder):
 
 
 def test_a_cell_tells_x_and_y_beside_r_and_theta(driver, tmp_path):
-    from slideviz.case.samples import write_sample
+    from slideviz.samples.table import write_sample
 
     case = next(p for p in write_sample("polar", tmp_path / "polar", 6) if p.suffix == ".cfg")
     driver.open(case)
@@ -108,7 +109,7 @@ def test_a_cell_tells_x_and_y_beside_r_and_theta(driver, tmp_path):
 
 
 def test_what_turns_is_about_the_axis_for_each_new_motion(driver, tmp_path):
-    from slideviz.case.samples import write_sample
+    from slideviz.samples.table import write_sample
 
     case = next(p for p in write_sample("polar", tmp_path / "polar", 6) if p.suffix == ".cfg")
     driver.open(case)
@@ -121,7 +122,7 @@ def test_what_turns_is_about_the_axis_for_each_new_motion(driver, tmp_path):
 
 
 def test_a_blade_is_restaggered_about_its_radius(driver, tmp_path):
-    from slideviz.case.samples import write_sample
+    from slideviz.samples.table import write_sample
 
     made = write_sample("cylindrical", tmp_path / "cylindrical", 5)
     driver.open(next(path for path in made if path.suffix == ".cfg"))
@@ -212,7 +213,7 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
     monkeypatch.setattr(QDialog, "exec", look)
     samples = files.known_samples()
     sizes = dict.fromkeys(samples, 25) | {"stator": 20_000}
-    found = dialogs.ask_sample(driver.window, samples, sizes)
+    found = questions.ask_sample(driver.window, samples, sizes)
     assert seen == [(25, True, False), (20_000, False, True)]
     assert found == ("stator", 20_000)
 

@@ -12,11 +12,11 @@ from qtpy.QtGui import QContextMenuEvent, QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QLineEdit
 
+from slideviz.color_scheme import DARK
 from slideviz.gui.panels.runs_tree import INVERTED, MEAN, MIN, NUMBER, RUN, WORDS
-from slideviz.view.drawing.look import DARK
-from slideviz.view.drawing.panes import run_title
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.session import changes
+from slideviz.scene.pick import to_display
+from slideviz.session import changes
+from slideviz.session.panes import run_title
 
 
 @pytest.fixture

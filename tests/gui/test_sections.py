@@ -9,14 +9,14 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.samples import write_sample
-from slideviz.gui import dialogs
-from slideviz.gui.canvas.cutting import followed, place_for
-from slideviz.gui.canvas.flats import stack
+from slideviz.gui.viewport.cutting import followed, place_for
+from slideviz.gui.viewport.flats import stack
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
+from slideviz.samples.table import write_sample
+from slideviz.scene.pick import to_display
+from slideviz.sections.model import Section
+from slideviz.session import changes
 
 
 @pytest.fixture
@@ -544,7 +544,7 @@ def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel,
     panel.flat.click()
     QApplication.processEvents()
     cutting, handle = window.cutting, window.cutting.handles.of(window.view)
-    monkeypatch.setattr(dialogs, "ask_unsaved", lambda *_: "discard")
+    monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     window.close()
     assert handle.widget.GetInteractor() is None
     assert cutting.flat is None

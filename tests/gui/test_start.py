@@ -9,12 +9,12 @@ from qtpy.QtCore import Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.samples import SAMPLES
 from slideviz.errors import Cancelled
 from slideviz.gui import files
 from slideviz.gui.start import COLUMNS, RECENT, StartPage, changed_words
 from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
-from slideviz.view import jobs_sample
+from slideviz.samples.table import SAMPLES
+from slideviz.session import jobs_sample
 
 
 @pytest.fixture

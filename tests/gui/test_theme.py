@@ -4,11 +4,11 @@ import pytest
 from qtpy.QtGui import QColor, QPalette
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui import theme
-from slideviz.gui.step_numbers import result_parts
+from slideviz.gui.viewport.step_numbers import result_parts
+from slideviz.gui.widgets import theme
 from slideviz.mesh.quality import quality
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.session import changes
+from slideviz.session.state import Frame
 from tests.builders import square
 
 

@@ -16,10 +16,10 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui import running
-from slideviz.gui.help import MOUSE, shortcut_rows
+from slideviz.gui.dialogs.help import MOUSE, shortcut_rows
 from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.tips import LETTERS, wrapped
-from slideviz.view.session import changes
+from slideviz.session import changes
 
 LONG = "the correction of a blade moves nodes of a shroud that is < 0.01 away " * 4
 

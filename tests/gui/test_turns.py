@@ -6,8 +6,8 @@ import pytest
 from qtpy.QtCore import QTimer
 
 from slideviz.errors import Cancelled
-from slideviz.gui.canvas.turns import Turns
-from slideviz.view.drawing.pieces import Beside
+from slideviz.gui.responsiveness.turns import Turns
+from slideviz.session.pieces import Beside
 
 
 @pytest.fixture

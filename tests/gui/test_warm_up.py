@@ -8,7 +8,7 @@ from threading import Event, current_thread, main_thread
 
 import pytest
 
-from slideviz.view import warmup
+from slideviz.session import jit_warmup
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def work(monkeypatch):
 
     made = Work()
     made.compile, made.end = Event(), Event()
-    monkeypatch.setattr(warmup, "warm_up", made)
+    monkeypatch.setattr(jit_warmup, "warm_up", made)
     yield made
     made.compile.set()
     made.end.set()

@@ -14,14 +14,13 @@ from qtpy.QtWidgets import QApplication, QMenu
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
-from slideviz.gui import player as player_module
-from slideviz.gui.player import step_ms
-from slideviz.gui.step_numbers import plain, result_parts
+from slideviz.gui.viewport import player as player_module
+from slideviz.gui.viewport.player import step_ms
+from slideviz.gui.viewport.step_numbers import plain, result_parts
 from slideviz.mesh.quality import INVERTED
-from slideviz.view import jobs
-from slideviz.view.advice import ended
-from slideviz.view.session import changes, opening
-from slideviz.view.session.runs_table import described
+from slideviz.session import changes, jobs, opening
+from slideviz.session.run_messages import ended
+from slideviz.session.runs_table import described
 
 
 @pytest.fixture
@@ -302,8 +301,8 @@ def test_a_scaling(opened):
 
 
 def test_a_clash_is_told_while_the_motion_is_typed(opened):
+    from slideviz.color_scheme import CLASH_COLOUR
     from slideviz.terms import ROLES
-    from slideviz.view.drawing.look import CLASH_COLOUR
 
     window, panel = opened.window, opened.window.run_panel
     # Periodic sides that move along may be passed; others may not.
@@ -328,7 +327,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
 
 
 def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
-    from slideviz.view.motions import clashes
+    from slideviz.session import intersections
 
     window, asked = opened.window, []
 
@@ -337,7 +336,7 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
         return ""
 
     opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
-    monkeypatch.setattr(clashes, "find_clash", listening)
+    monkeypatch.setattr(intersections, "find_clash", listening)
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
     opened.click(field)
@@ -890,7 +889,7 @@ def test_a_case_that_cannot_be_written_is_told(opened, answers, tmp_path):
 def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, monkeypatch):
     from PIL import Image
 
-    from slideviz.gui.export.picture import PictureDialog
+    from slideviz.gui.dialogs.picture import PictureDialog
 
     def accept(dialog):
         dialog.width_px.setValue(1280)

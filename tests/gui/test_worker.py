@@ -3,8 +3,8 @@ import threading
 import pytest
 
 from slideviz.errors import Cancelled, DeformError
-from slideviz.gui.worker import JobRunner
-from slideviz.view.jobs import Doing
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.session.jobs import Doing
 
 
 @pytest.fixture

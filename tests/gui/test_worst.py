@@ -10,18 +10,18 @@ from qtpy.QtGui import QGuiApplication
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.case.samples import sample
 from slideviz.gui.panels import worst
 from slideviz.gui.panels.worst import WorstPanel, info_text
 from slideviz.gui.panels.worst_table import CELL, COLUMNS, QUALITY, SINCE, digits_apart
 from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
-from slideviz.view.inspect import cell_info, worst_cells
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
-from slideviz.view.session.store import Store
-from slideviz.view.where import nearest_boundary
+from slideviz.samples.table import sample
+from slideviz.session import changes
+from slideviz.session.inspect import cell_info, worst_cells
+from slideviz.session.locate import nearest_boundary
+from slideviz.session.state import Frame
+from slideviz.session.store import Store
 
 
 def shaken(mesh, size, seed):
@@ -280,7 +280,7 @@ def double_click(driver, point):
     driver.click_view(point)
     from qtpy.QtCore import QPoint
 
-    from slideviz.view.drawing.pick import to_display
+    from slideviz.scene.pick import to_display
 
     x, y = to_display(view, [[*point, 0.0][:3]])[0] / view.devicePixelRatioF()
     QTest.mouseDClick(
@@ -317,7 +317,7 @@ def test_the_mouse_at_rest_tells_of_the_cell(opened, monkeypatch):
     from qtpy.QtGui import QHelpEvent
     from qtpy.QtWidgets import QApplication, QToolTip
 
-    from slideviz.view.drawing.pick import to_display
+    from slideviz.scene.pick import to_display
 
     view = opened.window.view
     opened.window.store.change(changes.show_frame, 0)
@@ -334,7 +334,7 @@ def test_the_mouse_at_rest_tells_of_the_cell(opened, monkeypatch):
 
 
 def test_panels_behind_another_tab_do_nothing_until_they_are_in_front(opened, monkeypatch):
-    from slideviz.view.plots import session_histogram
+    from slideviz.plots import session_histogram
 
     window, asked = opened.window, []
     for module, name in ((worst, "worst_cells"), (session_histogram, "distribution")):

@@ -10,9 +10,9 @@ import pytest
 from su2_samples import SOLID, assert_same, save
 
 from slideviz.errors import MeshError
-from slideviz.mesh import apart
-from slideviz.mesh.files import read, write
-from slideviz.mesh.foreign import read_foreign
+from slideviz.mesh.io import subprocess_reader
+from slideviz.mesh.io.files import read, write
+from slideviz.mesh.io.meshio_bridge import read_foreign
 
 NETGEN = """\
 mesh3d
@@ -104,7 +104,7 @@ def test_stopping_ends_the_process(vtu, started):
 
 
 def test_a_reader_that_takes_too_long(tmp_path, monkeypatch):
-    monkeypatch.setattr(apart, "_SECONDS", 2)
+    monkeypatch.setattr(subprocess_reader, "_SECONDS", 2)
     path = save(tmp_path, NETGEN.format(count=10**12), "a.vol")
     with pytest.raises(
         MeshError, match=r"a.vol: cannot be read: it takes longer than a file of th"
@@ -140,14 +140,17 @@ def test_modules_beside_the_mesh_are_not_run(vtu, monkeypatch):
 
 
 def test_limits_grow_with_the_file():
-    seconds, memory = np.transpose([apart._limits(size) for size in (0, 10**6, 10**9)])
+    seconds, memory = np.transpose([subprocess_reader._limits(size) for size in (0, 10**6, 10**9)])
     assert seconds.tolist() == [20, 40, 20020]
     assert memory[0] <= memory[1] <= memory[2]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has such a call")
 def test_the_reader_does_not_outlive_a_killed_program():
-    child = "import os, time; from slideviz.mesh.apart import _die_with; _die_with(os.getppid())"
+    child = (
+        "import os, time; "
+        "from slideviz.mesh.io.subprocess_reader import _die_with; _die_with(os.getppid())"
+    )
     code = (
         "import subprocess, sys\n"
         f"call = [sys.executable, '-c', {child + '; print(1, flush=True); time.sleep(300)'!r}]\n"

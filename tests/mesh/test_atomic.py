@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.atomic import atomic_write, require_writable
+from slideviz.mesh.io.atomic import atomic_write, require_writable
 
 
 def names(folder: Path) -> list[str]:

@@ -15,8 +15,8 @@ from su2_samples import SOLID, SQUARE, assert_same, bits, meshes, save
 import slideviz
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.files import read, write
-from slideviz.mesh.foreign import read_foreign
+from slideviz.mesh.io.files import read, write
+from slideviz.mesh.io.meshio_bridge import read_foreign
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.outer import outer_facets
 
@@ -109,7 +109,7 @@ ABAQUS = """\
 @pytest.fixture(autouse=True)
 def _in_this_process(monkeypatch):
     """Read in this process, where it is quick and can be patched; test_apart.py does the rest."""
-    monkeypatch.setattr("slideviz.mesh.apart.read_apart", read_foreign)
+    monkeypatch.setattr("slideviz.mesh.io.subprocess_reader.read_apart", read_foreign)
 
 
 @pytest.fixture(scope="module")
@@ -620,7 +620,7 @@ def test_disk_full_for_the_draft(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("slideviz.mesh.foreign_write.draft", full)
+    monkeypatch.setattr("slideviz.mesh.io.meshio_write.draft", full)
     with pytest.raises(
         MeshError, match=r"out.vtk: cannot be written: No space left on device; fre"
     ):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from slideviz.errors import MeshError
-from slideviz.mesh.files import read
-from slideviz.mesh.foreign import read_foreign
+from slideviz.mesh.io.files import read
+from slideviz.mesh.io.meshio_bridge import read_foreign
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 TRIANGLE = [("triangle", np.array([[0, 1, 2]]))]

@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.case.lines import LARGEST, read_text
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh.files import read
+from slideviz.mesh.io.files import read
 
 KINDS = sorted(LARGEST)
 

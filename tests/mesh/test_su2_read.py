@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
-import slideviz.mesh.su2_scan as su2_scan
+import slideviz.mesh.io.su2_scan as su2_scan
 from slideviz.mesh.check import unused_nodes
-from slideviz.mesh.files import read
+from slideviz.mesh.io.files import read
 
 
 def test_square(tmp_path):
@@ -57,8 +57,8 @@ def test_byte_order_mark_is_skipped(tmp_path):
 def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     path = save(tmp_path, SAMPLES[name])
     whole = read(path)
-    monkeypatch.setattr("slideviz.mesh.su2_scan.BLOCK_BYTES", block)
-    monkeypatch.setattr("slideviz.mesh.su2_numbers.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.mesh.io.su2_scan.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.mesh.io.su2_numbers.BLOCK_BYTES", block)
     small = read(path)
     assert_same(small, whole)
     assert small.document.begins.tolist() == whole.document.begins.tolist()
@@ -121,7 +121,7 @@ def test_unused_nodes_are_allowed_and_listed(tmp_path):
 
 def test_progress_rises_to_one(tmp_path, monkeypatch):
     monkeypatch.setattr(su2_scan, "BLOCK_BYTES", 16)
-    monkeypatch.setattr("slideviz.mesh.su2_numbers.BLOCK_BYTES", 16)
+    monkeypatch.setattr("slideviz.mesh.io.su2_numbers.BLOCK_BYTES", 16)
     seen = []
     read(save(tmp_path, SOLID), progress=seen.append)
     assert len(seen) > 20

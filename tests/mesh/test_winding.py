@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.mesh.found import boundary_of
+from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.winding import winding
 from tests.builders import airfoil, annulus, cube, passage, sphere_in_box, square
 

@@ -9,9 +9,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, FromFile, Reduction, Translate
-from slideviz.case.samples import sample, write_sample
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import evaluate as evaluation
+from slideviz.samples.table import sample, write_sample
 
 KINDS = {
     "block": Reduction(),

@@ -5,11 +5,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Reduction
-from slideviz.case.samples import sample, write_sample
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import linear_terms
 from slideviz.rbf.solve import condition, saddle_condition, solve_saddle
+from slideviz.samples.table import sample, write_sample
 
 COMPACT = [name for name, kernel in KERNELS.items() if kernel.compact]
 TAILED = [name for name, kernel in KERNELS.items() if kernel.polynomial]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Scale, Translate
-from slideviz.case.samples import sample
 from slideviz.rbf.classify import _Around, _cluster
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.correction import correct
@@ -17,6 +16,7 @@ from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.pool import TIE, favour
 from slideviz.rbf.problem import Problem
 from slideviz.rbf.problem import Reduction as Settings
+from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS
 

@@ -7,11 +7,11 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Translate
-from slideviz.case.samples import write_sample
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.patience import LOSSES, Patience
+from slideviz.samples.table import write_sample
 from tests import builders
 
 TOLD = r"step \d+: the data reduction ended with \d+ control nodes at an error of \S+, above its "

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction
-from slideviz.case.samples import write_sample
 from slideviz.rbf import exact, greedy
 from slideviz.rbf.evaluate import Basis, matrix
 from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.rows import Rows, blocks
 from slideviz.rbf.solve import NOTHING, extend, factorise
+from slideviz.samples.table import write_sample
 
 
 def rows_along(*normals):

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.case.samples import sample
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view.scene import Scene
-from slideviz.view.session.changes import open_mesh
-from slideviz.view.session.state import Frame
+from slideviz.samples.table import sample
+from slideviz.scene.scene import Scene
+from slideviz.session.changes import open_mesh
+from slideviz.session.state import Frame
 
 
 def square_mesh(n=4):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slideviz import staircase
 from slideviz.case.model import Case, Reduction
+from slideviz.deformation import solver
+from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.staircase import deform
-from slideviz.view.advice import ended, exact_cost, help_for, inverted_words
-from slideviz.view.session.state import Frame, Run
+from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
+from slideviz.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +58,11 @@ def test_a_large_exact_run_is_told_beforehand(monkeypatch):
     line = Marker("wall", Cells.from_blocks([(3, np.stack([nodes[:-1], nodes[1:]], axis=1))]))
     points = np.random.default_rng(1).random((30_000, 2))
     mesh = Mesh(points, Cells.from_blocks([(5, np.array([[0, 1, 2]]))]), (line,))
-    monkeypatch.setattr(staircase, "free_memory", lambda: 12e9)
+    monkeypatch.setattr(solver, "free_memory", lambda: 12e9)
     text = exact_cost(Case(steps=3), mesh)
     assert text.startswith("30,000 control nodes, without data reduction: about 19 GB of memory ")
     assert "(12 GB are free) and 45 minutes, more or less." in text
-    monkeypatch.setattr(staircase, "free_memory", lambda: float("inf"))
+    monkeypatch.setattr(solver, "free_memory", lambda: float("inf"))
     assert "free" not in exact_cost(Case(), mesh)
     for small in (
         Case(reduction=Reduction()),

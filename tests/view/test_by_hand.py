@@ -9,15 +9,15 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Translate
 from slideviz.errors import MeshError
-from slideviz.mesh.files import write
+from slideviz.mesh.io.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up
-from slideviz.view.guess import guess_by_name
-from slideviz.view.motions.period_words import found_text
-from slideviz.view.plots.written import figure_bytes
-from slideviz.view.session import changes
-from slideviz.view.session.runs_table import best
-from slideviz.view.session.state import Frame, Run
-from slideviz.view.window_words import in_window_words
+from slideviz.plots.written import figure_bytes
+from slideviz.session import changes
+from slideviz.session.guess import guess_by_name
+from slideviz.session.period_words import found_text
+from slideviz.session.runs_table import best
+from slideviz.session.state import Frame, Run
+from slideviz.session.window_words import in_window_words
 
 
 @pytest.fixture

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.case.samples import sample
+from slideviz.color_scheme import INVERTED_COLOUR, SELECTED_COLOUR
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.actors import VALUES
-from slideviz.view.drawing.look import INVERTED_COLOUR, SELECTED_COLOUR
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.inspect import nodes_of
-from slideviz.view.layers.chosen import part_shape
-from slideviz.view.layers.mark import DOT, FACES, OUTLINE
-from slideviz.view.scene import Scene
-from slideviz.view.sections.choice import ONLY_INVERTED
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.samples.table import sample
+from slideviz.scene.actors import VALUES
+from slideviz.scene.marked_cell import DOT, FACES, OUTLINE
+from slideviz.scene.pick import to_display
+from slideviz.scene.scene import Scene
+from slideviz.scene.threshold import part_shape
+from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.session import changes
+from slideviz.session.inspect import nodes_of
+from slideviz.session.state import Frame
 
 
 @pytest.fixture

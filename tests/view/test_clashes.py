@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from slideviz.case.model import Case, FromFile, Translate
-from slideviz.view.motions.clashes import clash_key, find_clash, set_clash
-from slideviz.view.session import changes
+from slideviz.session import changes
+from slideviz.session.intersections import clash_key, find_clash, set_clash
 
 
 def look(case, mesh, stopped=False):

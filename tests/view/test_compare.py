@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.samples import sample
 from slideviz.errors import Cancelled, DeformError
-from slideviz.view.compare import combinations as comparing
-from slideviz.view.compare.combinations import (
+from slideviz.samples.table import sample
+from slideviz.study import combinations as comparing
+from slideviz.study.combinations import (
     METHODS,
     Combination,
     bounded,
     compare,
 )
-from slideviz.view.compare.table import csv_text, terminal_head, terminal_line
-from slideviz.view.compare.wanted import (
+from slideviz.study.table import csv_text, terminal_head, terminal_line
+from slideviz.study.wanted import (
     KEYS,
     announcement,
     combinations,

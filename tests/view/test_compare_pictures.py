@@ -10,14 +10,14 @@ import pytest
 from PIL import Image
 
 from slideviz.case.model import Reduction, Translate
-from slideviz.case.samples import sample
 from slideviz.errors import CaseError
-from slideviz.view.compare.combinations import METHODS, MODES, compare
-from slideviz.view.compare.panels import panels, profiler
-from slideviz.view.compare.plots import figures, save_figure, steps_name
-from slideviz.view.compare.sheets import NOT_KEPT, sheet
-from slideviz.view.compare.table import history_text
-from slideviz.view.compare.wanted import combinations
+from slideviz.samples.table import sample
+from slideviz.study.combinations import METHODS, MODES, compare
+from slideviz.study.panels import panels, profiler
+from slideviz.study.plots import figures, save_figure, steps_name
+from slideviz.study.sheets import NOT_KEPT, sheet
+from slideviz.study.table import history_text
+from slideviz.study.wanted import combinations
 
 
 @pytest.fixture(scope="module")

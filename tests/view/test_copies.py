@@ -6,7 +6,9 @@ import pytest
 from slideviz.case.model import Case
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.periodic import match
-from slideviz.view.copies import (
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session.passages import (
     find_period,
     keeps,
     moved,
@@ -14,8 +16,6 @@ from slideviz.view.copies import (
     passages_around,
     show_passages,
 )
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.model import Section
 from tests.builders import cube, grid, passage, ring, sector
 from tests.oracles.sections import cut_cells
 

@@ -9,10 +9,10 @@ import pytest
 from slideviz.case.model import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.view.plots import curves
-from slideviz.view.plots.spanwise import along, along_radius
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.plots import curves
+from slideviz.plots.spanwise import along, along_radius
+from slideviz.session import changes
+from slideviz.session.state import Frame
 
 
 def run_of(session, sizes, history=()):

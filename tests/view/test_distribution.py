@@ -6,13 +6,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle, StepPatch
 
+from slideviz.color_scheme import PAPER
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.drawing.look import PAPER
-from slideviz.view.plots.distribution import BINS, distribution
-from slideviz.view.plots.draw import ON_DARK, PRINT
-from slideviz.view.plots.histogram import BAND, draw_distribution
-from slideviz.view.plots.series import Bars, Distribution, Outline
-from slideviz.view.session.state import Frame
+from slideviz.plots.distribution import BINS, distribution
+from slideviz.plots.draw import ON_DARK, PRINT
+from slideviz.plots.histogram import BAND, draw_distribution
+from slideviz.plots.series import Bars, Distribution, Outline
+from slideviz.session.state import Frame
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.view.drawing.actors import VALUES
-from slideviz.view.drawing.look import DARK, LIGHT, VALUE_EDGE
-from slideviz.view.drawing.stage import Stage
+from slideviz.color_scheme import DARK, LIGHT, VALUE_EDGE
+from slideviz.scene.actors import VALUES
+from slideviz.scene.stage import Stage
 
 SIZE = 240
 

@@ -7,27 +7,26 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
+from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
+from slideviz.export import film, vector
+from slideviz.export import offscreen_renderer as studio_module
+from slideviz.export.mark_words import mark_words
+from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.picture_options import TITLE_ROOM, Figure, panes, title_of, words_of_size
+from slideviz.export.reel import Reel
+from slideviz.export.titles import fitting, pair_titles
+from slideviz.export.vector import draw_vector, require_vector, write_vector
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.mesh import FADED
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session import changes, jobs_export
+from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, left_out
+from slideviz.session.state import Frame
 from slideviz.terms import ROLES
-from slideviz.view import jobs_export
-from slideviz.view.drawing.look import SELECTED_COLOUR
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.formats import MESH_FORMATS, formats_for, holds_quality, left_out
-from slideviz.view.layers.mesh import FADED
-from slideviz.view.pictures import figure_vector, film
-from slideviz.view.pictures import studio as studio_module
-from slideviz.view.pictures.figure import TITLE_ROOM, Figure, panes, title_of, words_of_size
-from slideviz.view.pictures.figure_vector import draw_vector, require_vector, write_vector
-from slideviz.view.pictures.mark_words import mark_words
-from slideviz.view.pictures.reel import Reel
-from slideviz.view.pictures.studio import Studio, sees_all
-from slideviz.view.pictures.titles import fitting, pair_titles
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
 
 PLAIN = Figure((400, 300), legend=False)
 
@@ -270,7 +269,7 @@ def test_what_cannot_be_drawn_or_written_is_told(studio, tmp_path, cube, monkeyp
         require_vector(studio.session, Path("a.png"))
     with pytest.raises(SlidevizError, match="only pictures of 2D meshes"):
         require_vector(session_of(cube), Path("a.svg"))
-    monkeypatch.setattr(figure_vector, "MOST_CELLS", 3)
+    monkeypatch.setattr(vector, "MOST_CELLS", 3)
     with pytest.raises(SlidevizError, match="too many to be drawn one by one"):
         require_vector(studio.session, Path("a.pdf"))
     assert not list(tmp_path.iterdir())

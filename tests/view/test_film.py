@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
+from slideviz.export.film import film, film_of
+from slideviz.export.offscreen import font_scale, offscreen
+from slideviz.export.reel import Reel, check_film
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import PAPER
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.pictures.film import film, film_of
-from slideviz.view.pictures.offscreen import font_scale, offscreen
-from slideviz.view.pictures.reel import Reel, check_film
-from slideviz.view.scene import Scene
-from slideviz.view.session.state import Frame, Run
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.scene import Scene
+from slideviz.session.state import Frame, Run
 
 SMALL = (320, 200)
 
@@ -113,7 +113,7 @@ def test_a_gif_repeats_for_ever_with_the_times_asked_for(tmp_path, frames):
 
 
 def test_a_gif_keeps_the_shades_of_the_colour_map_and_rare_colours():
-    from slideviz.view.pictures.encode import _palette
+    from slideviz.export.encode import _palette
 
     sample = np.full((200, 320, 3), 255, np.uint8)
     sample[:, :256, 0] = np.arange(256)
@@ -153,7 +153,7 @@ def test_few_images_are_shown_longer_and_many_ten_a_second():
 
 
 def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, monkeypatch):
-    from slideviz.view.pictures import film as module
+    from slideviz.export import film as module
 
     seen = []
     draw = module.Portrait.show

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from slideviz.case.samples import sample
+from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
+from slideviz.export import film_pair as module
+from slideviz.export.film_pair import Told, film_pair, pair_size
+from slideviz.export.offscreen import font_scale
+from slideviz.export.reel import Reel
 from slideviz.mesh.quality import quality
-from slideviz.staircase import deform
-from slideviz.view.pictures import film_pair as module
-from slideviz.view.pictures.film_pair import Told, film_pair, pair_size
-from slideviz.view.pictures.offscreen import font_scale
-from slideviz.view.pictures.reel import Reel
-from slideviz.view.session.state import Frame
+from slideviz.samples.table import sample
+from slideviz.session.state import Frame
 
 SIZE = (800, 400)
 USUAL = Reel(SIZE)

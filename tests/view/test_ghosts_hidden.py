@@ -5,10 +5,10 @@ import pytest
 import pyvista as pv
 
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.scene import Scene
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.scene import Scene
+from slideviz.session import changes
+from slideviz.session.state import Frame
 
 
 @pytest.fixture

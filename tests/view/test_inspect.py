@@ -8,9 +8,9 @@ import pytest
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view import inspect
-from slideviz.view.sections.choice import ONLY_INVERTED, chosen_cells
-from slideviz.view.session.state import Frame
+from slideviz.sections.threshold import ONLY_INVERTED, chosen_cells
+from slideviz.session import inspect
+from slideviz.session.state import Frame
 
 
 def frame_of(mesh, move):

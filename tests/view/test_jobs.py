@@ -3,11 +3,11 @@ import pytest
 
 from slideviz import read
 from slideviz.case.model import Case, FromFile, Translate
-from slideviz.case.samples import write_sample
 from slideviz.errors import Cancelled, CaseError, MeshError
-from slideviz.view import jobs
-from slideviz.view.motions.ghosts import Ghosts
-from slideviz.view.session.state import Frame
+from slideviz.samples.table import write_sample
+from slideviz.session import jobs
+from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.state import Frame
 
 
 def never():
@@ -146,8 +146,8 @@ def test_the_view_needs_no_qt():
     import sys
 
     code = (
-        "import sys, slideviz.view.scene, slideviz.view.pictures.picture, slideviz.view.jobs, "
-        "slideviz.view.session.changes, slideviz.view.motions.ghosts\n"
+        "import sys, slideviz.scene.scene, slideviz.export.picture, slideviz.session.jobs, "
+        "slideviz.session.changes, slideviz.session.motion_ghosts\n"
         "bad = [m for m in sys.modules if m.split('.')[0] in ('qtpy', 'PySide6', 'pyvistaqt')]\n"
         "sys.exit(str(bad) if bad else 0)"
     )

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from slideviz.case.model import Case
 from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.keep import keep_view, kept_camera, kept_view
+from slideviz.session.state import ViewState
 from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
-from slideviz.view.session.keep import keep_view, kept_camera, kept_view
-from slideviz.view.session.state import ViewState
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)

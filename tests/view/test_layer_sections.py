@@ -8,28 +8,27 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from slideviz.case.samples import sample
+from slideviz.color_scheme import INVERTED_COLOUR, LIGHT
 from slideviz.errors import Cancelled, CaseError
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
+from slideviz.export.section_job import Paper, save_section, state_words
+from slideviz.export.vector import draw_vector
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.view.copies import find_period, moved
-from slideviz.view.drawing.actors import VALUES
-from slideviz.view.drawing.look import INVERTED_COLOUR, LIGHT
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.drawing.polygon_actor import plain_colour
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.flat_scene import FlatScene
-from slideviz.view.layers.mesh import looks_inside
-from slideviz.view.pictures.figure import Figure
-from slideviz.view.pictures.figure_vector import draw_vector
-from slideviz.view.pictures.studio import Studio
-from slideviz.view.sections import picture as section_picture
-from slideviz.view.sections import start as section_start
-from slideviz.view.sections.cuts import KEPT, Cuts
-from slideviz.view.sections.job import Paper, save_section, state_words
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame, Session
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.plots import section_picture
+from slideviz.samples.table import sample
+from slideviz.scene.actors import VALUES
+from slideviz.scene.flat_scene import FlatScene
+from slideviz.scene.mesh import looks_inside
+from slideviz.scene.pick import to_display
+from slideviz.scene.polygon_actor import plain_colour
+from slideviz.sections.model import Section
+from slideviz.session import changes, section_start
+from slideviz.session.passages import find_period, moved
+from slideviz.session.section_cuts import KEPT, Cuts
+from slideviz.session.state import Frame, Session
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
 

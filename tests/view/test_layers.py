@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.case.samples import sample
+from slideviz.color_scheme import DARK, LIGHT
 from slideviz.mesh.quality import quality
-from slideviz.terms import NODE_TYPES, ROLES
-from slideviz.view.drawing.look import DARK, LIGHT
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.inspect import middles
-from slideviz.view.layers.chosen import ChosenLayer
-from slideviz.view.layers.copies import (
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.samples.table import sample
+from slideviz.scene.passages import (
     CHOSEN,
     PALER,
     CopyLayer,
@@ -20,9 +16,13 @@ from slideviz.view.layers.copies import (
     matrices,
     outermost,
 )
-from slideviz.view.layers.triad import COLOURS, SIZE
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.scene.pick import to_display
+from slideviz.scene.threshold import ChosenLayer
+from slideviz.scene.triad import COLOURS, SIZE
+from slideviz.session import changes
+from slideviz.session.inspect import middles
+from slideviz.session.state import Frame
+from slideviz.terms import NODE_TYPES, ROLES
 
 LEFT = np.array([-0.004, 0.0])
 

@@ -6,8 +6,8 @@ import pytest
 from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
-from slideviz.view.motions import table as motion_table
-from slideviz.view.motions.table import Rows, table_text, write_table
+from slideviz.session import motion_table
+from slideviz.session.motion_table import Rows, table_text, write_table
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Reduction, Translate
-from slideviz.case.samples import sample
+from slideviz.deformation.solver import deform
 from slideviz.mesh.quality import quality
-from slideviz.staircase import deform
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.samples.table import sample
+from slideviz.session import changes
+from slideviz.session.node_types import NOTHING, NodeTypes
+from slideviz.session.state import Frame
 from slideviz.terms import NODE_TYPES
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.node_types import NOTHING, NodeTypes
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
 
 
 def session_of(one, **view):
@@ -66,7 +66,7 @@ def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
 
 
 def test_types_are_worked_out_once_for_a_case(passage, monkeypatch):
-    from slideviz.case import classes as module
+    from slideviz.deformation import classes as module
 
     asked, real = [], module.find_classes
 
@@ -112,7 +112,7 @@ def test_a_mesh_without_boundaries_and_a_case_with_mistakes_have_no_types(passag
 
 
 def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
-    from slideviz.mesh import found as kept
+    from slideviz.mesh import cached_boundary as kept
 
     mesh, found = replace(passage.mesh, name="another"), []
     real = kept.find_boundary

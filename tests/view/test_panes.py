@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.panes import choices, close_pane, panes, show_in
-from slideviz.view.session import changes
-from slideviz.view.session.changes import UNDEFORMED
-from slideviz.view.session.state import Frame, Run
+from slideviz.session import changes
+from slideviz.session.changes import UNDEFORMED
+from slideviz.session.panes import choices, close_pane, panes, show_in
+from slideviz.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
+from slideviz.color_scheme import COLOUR_MAP
 from slideviz.errors import MeshError, SlidevizError
+from slideviz.export.picture import picture
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import COLOUR_MAP
-from slideviz.view.motions.moved import Detail, half_of, tiny_motion
-from slideviz.view.pictures.picture import picture
+from slideviz.scene.moved import Detail, half_of, tiny_motion
 
 
 def pixels(path):

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing import pieces
-from slideviz.view.drawing.pieces import Beside, appearing, here, portions, whole
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.pictures.figure import Figure
-from slideviz.view.pictures.studio import Studio
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.session import changes, pieces
+from slideviz.session.pieces import Beside, appearing, here, portions, whole
+from slideviz.session.state import Frame
 
 PLAIN = Figure((300, 200))
 

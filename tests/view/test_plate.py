@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from slideviz.color_scheme import DARK, LIGHT
+from slideviz.export.offscreen_renderer import Figure, Studio
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import DARK, LIGHT
-from slideviz.view.drawing.plate import OPACITY
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.legend import STRIP
-from slideviz.view.pictures.studio import Figure, Studio
-from slideviz.view.scene import Scene
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.color_legend import STRIP
+from slideviz.scene.plate import OPACITY
+from slideviz.scene.scene import Scene
+from slideviz.session import changes
+from slideviz.session.state import Frame
 
 SIZE = (500, 400)
 

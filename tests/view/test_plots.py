@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from slideviz.view.plots.draw import (
+from slideviz.plots.draw import (
     ON_DARK,
     ON_LIGHT,
     PRINT,

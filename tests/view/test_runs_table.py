@@ -7,20 +7,20 @@ from dataclasses import replace
 import pytest
 
 from slideviz.case.model import Reduction, Rotate
+from slideviz.case.motion_words import describe
+from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
-from slideviz.staircase import deform
-from slideviz.view.motions.words import describe
-from slideviz.view.session import changes
-from slideviz.view.session.runs_table import COLUMNS, best, described, table_text, write_table
-from slideviz.view.session.runs_words import (
+from slideviz.session import changes
+from slideviz.session.runs_table import COLUMNS, best, described, table_text, write_table
+from slideviz.session.runs_words import (
     brief,
     method_words,
     reduction_words,
     seconds_words,
     steps_words,
 )
-from slideviz.view.session.state import Frame, Run
+from slideviz.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")

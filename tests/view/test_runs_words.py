@@ -8,12 +8,12 @@ import pytest
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.case.motion_words import describe, motion_labels
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.panes import choices
-from slideviz.view.motions.words import describe, motion_labels
-from slideviz.view.session import changes
-from slideviz.view.session.runs_words import brief, run_words
-from slideviz.view.session.state import Frame, Run, Session
+from slideviz.session import changes
+from slideviz.session.panes import choices
+from slideviz.session.runs_words import brief, run_words
+from slideviz.session.state import Frame, Run, Session
 
 BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
 

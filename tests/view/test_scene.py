@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from slideviz.color_scheme import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
 from slideviz.mesh.quality import quality
+from slideviz.mesh.surfaces import facet_connectivity, find_surfaces
+from slideviz.scene.mesh import GLASS, enclosed, is_closed
+from slideviz.scene.pick import to_display
+from slideviz.scene.scene import Scene
+from slideviz.session import changes
+from slideviz.session.state import Frame
 from slideviz.terms import ROLES
-from slideviz.view.drawing.look import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
-from slideviz.view.drawing.pick import to_display
-from slideviz.view.drawing.surfaces import facet_connectivity, find_surfaces
-from slideviz.view.layers.mesh import GLASS, enclosed, is_closed
-from slideviz.view.scene import Scene
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
 
 
 def image(scene):
@@ -272,7 +272,7 @@ def test_triangles_and_quadrilaterals_become_vtk_faces():
 
 
 def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session, monkeypatch):
-    from slideviz.view.layers import legend as module
+    from slideviz.scene import legend as module
 
     session, made = opened(scene, session), []
     for name in ("add_role_legend", "add_colour_bar"):

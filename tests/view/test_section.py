@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.view.drawing.polygons import joined
-from slideviz.view.sections.cases import cut_cases
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.model import Section
+from slideviz.sections.cases import cut_cases
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import joined
 from tests.builders import cube, passage, permuted, square
 from tests.oracles.sections import cut_cells, height
 

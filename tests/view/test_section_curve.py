@@ -6,12 +6,12 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from slideviz.color_scheme import COLOUR_MAP
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.drawing.look import COLOUR_MAP
-from slideviz.view.plots.curves import UNDEFORMED, look_of
-from slideviz.view.sections import around as section_around
-from slideviz.view.sections.around import surroundings, window
-from slideviz.view.sections.curve import (
+from slideviz.plots import around as section_around
+from slideviz.plots.around import surroundings, window
+from slideviz.plots.curves import UNDEFORMED, look_of
+from slideviz.plots.section_curve import (
     Colours,
     Curve,
     CurveRow,
@@ -20,14 +20,14 @@ from slideviz.view.sections.curve import (
     position_label,
     steps,
 )
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.cuts import Cuts
-from slideviz.view.sections.model import Section
-from slideviz.view.sections.paint import paint
-from slideviz.view.sections.picture import SectionStyle, draw_section
-from slideviz.view.sections.rows import CurveRows, colours_of, facts_of, labels_of
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.plots.section_paint import paint
+from slideviz.plots.section_picture import SectionStyle, draw_section
+from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Frame
 from tests.builders import cube, square
 
 EYE = {0: np.eye(4)}

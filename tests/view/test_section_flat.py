@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.model import Section
-from slideviz.view.sections.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.sections.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
 from tests.builders import cube, grid, passage, ring
 from tests.view.test_section import areas
 

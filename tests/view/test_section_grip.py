@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from slideviz.view.sections.grip import dragged, grips, nearest
-from slideviz.view.sections.line import along, box_around, line_ends, trace
-from slideviz.view.sections.model import Section
+from slideviz.scene.section_handles import dragged, grips, nearest
+from slideviz.sections.line import along, box_around, line_ends, trace
+from slideviz.sections.model import Section
 
 BOX = np.array([0.0, 0.0]), np.array([4.0, 2.0])
 LINE = Section("plane", (1.0, 0.5, 0.0), (1.0, 0.0, 0.0), whole=True)

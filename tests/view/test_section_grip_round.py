@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.view.sections.cuts import Cuts
-from slideviz.view.sections.grip_round import (
+from slideviz.scene.cylinder_handle import (
     frame_of,
     on_cylinder,
     outside,
@@ -13,7 +12,8 @@ from slideviz.view.sections.grip_round import (
     pull,
     radius_at,
 )
-from slideviz.view.sections.model import Section
+from slideviz.sections.model import Section
+from slideviz.session.section_cuts import Cuts
 from tests.builders import grid, ring
 
 SHAPE = (4, 6, 5)

@@ -8,13 +8,13 @@ from matplotlib.collections import PolyCollection
 from PIL import Image
 
 from slideviz.errors import CaseError
+from slideviz.export.section_job import Paper, save_section
 from slideviz.mesh.quality import quality
-from slideviz.view.sections import picture_pair
-from slideviz.view.sections.job import Paper, save_section
-from slideviz.view.sections.layout_pair import lay_out_pair
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.plots import section_picture_pair
+from slideviz.plots.section_layout_pair import lay_out_pair
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.state import Frame
 from tests.builders import cube, passage, square
 
 PAPERS = [Paper.of_cm(8.5, 6.4), Paper.of_cm(17.0, 10.6), Paper((1600, 1000))]
@@ -38,8 +38,10 @@ def compared(mesh):
 def save(tmp_path, monkeypatch):
     """Save a section and return its figure."""
     drawn = []
-    real = picture_pair.draw_pair
-    monkeypatch.setattr(picture_pair, "draw_pair", lambda *v: drawn.append(real(*v)) or drawn[-1])
+    real = section_picture_pair.draw_pair
+    monkeypatch.setattr(
+        section_picture_pair, "draw_pair", lambda *v: drawn.append(real(*v)) or drawn[-1]
+    )
 
     def run(session, section=LEVEL, paper=PAPERS[1]):
         file = tmp_path / "a.png"

@@ -10,19 +10,19 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from PIL import Image
 
+from slideviz.color_scheme import COLOUR_MAP, INVERTED_COLOUR
 from slideviz.errors import CaseError
 from slideviz.mesh.periodic import match
 from slideviz.mesh.quality import quality
+from slideviz.plots import section_polygons as section_shapes
+from slideviz.plots.section_layout import inches_of, lay_out
+from slideviz.plots.section_paint import paint
+from slideviz.plots.section_picture import SectionStyle, draw_section, section_picture
+from slideviz.plots.section_space import in_space
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session.passages import passages, show_passages
 from slideviz.terms import QUANTITIES
-from slideviz.view.copies import passages, show_passages
-from slideviz.view.drawing.look import COLOUR_MAP, INVERTED_COLOUR
-from slideviz.view.sections import shapes as section_shapes
-from slideviz.view.sections.cut import Cutter
-from slideviz.view.sections.layout import inches_of, lay_out
-from slideviz.view.sections.model import Section
-from slideviz.view.sections.paint import paint
-from slideviz.view.sections.picture import SectionStyle, draw_section, section_picture
-from slideviz.view.sections.space import in_space
 from tests.builders import cube, passage, square
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.quality import quality
-from slideviz.view.sections.start import first_cylinder, first_plane, position, round_middle
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.session import changes
+from slideviz.session.section_start import first_cylinder, first_plane, position, round_middle
+from slideviz.session.state import Frame
 from tests.builders import grid, ring
 
 

@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.quality import quality
-from slideviz.view.plots.draw import ON_LIGHT
-from slideviz.view.plots.session_histogram import MOST, Counts, compared, draw_histogram
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame, Run
+from slideviz.plots.draw import ON_LIGHT
+from slideviz.plots.session_histogram import MOST, Counts, compared, draw_histogram
+from slideviz.session import changes
+from slideviz.session.state import Frame, Run
 
 
 @pytest.fixture(scope="module")

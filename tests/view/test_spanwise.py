@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.view.plots.spanwise import along, along_radius, spanwise
+from slideviz.plots.spanwise import along, along_radius, spanwise
 
 
 def strip(count=4):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slideviz.view.plots.ticks import bar_ticks, rounded_out, tick_format, ticks
+from slideviz.plots.ticks import bar_ticks, rounded_out, tick_format, ticks
 
 ranges = st.tuples(st.floats(-1e3, 1e3), st.floats(1e-4, 1e6)).map(lambda r: (r[0], r[0] + r[1]))
 

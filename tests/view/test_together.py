@@ -5,10 +5,10 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
 from slideviz.case.motion import displacements
-from slideviz.view.motions.ghosts import Ghosts
-from slideviz.view.motions.table import Rows
-from slideviz.view.motions.words import describe, motion_labels
-from slideviz.view.session import changes
+from slideviz.case.motion_words import describe, motion_labels
+from slideviz.session import changes
+from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.motion_table import Rows
 
 PAIR = ("bottom", "left")
 

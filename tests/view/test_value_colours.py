@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from slideviz.color_scheme import INVERTED_COLOUR
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
+from slideviz.export.vector import draw_vector
 from slideviz.mesh.quality import quality
-from slideviz.view.drawing.look import INVERTED_COLOUR
-from slideviz.view.drawing.surfaces import find_surfaces
-from slideviz.view.flat_scene import FlatScene
-from slideviz.view.pictures.figure import Figure
-from slideviz.view.pictures.figure_vector import draw_vector
-from slideviz.view.pictures.studio import Studio
-from slideviz.view.scene import Scene
-from slideviz.view.sections.cuts import Cuts
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame
+from slideviz.mesh.surfaces import find_surfaces
+from slideviz.scene.flat_scene import FlatScene
+from slideviz.scene.scene import Scene
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Frame
 
 
 @pytest.fixture

@@ -6,11 +6,11 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
-from slideviz.view.sections.choice import ONLY_INVERTED
-from slideviz.view.sections.model import Section
-from slideviz.view.session import changes, opening
-from slideviz.view.session.state import Frame, Session, essence
-from slideviz.view.session.store import Store
+from slideviz.sections.model import Section
+from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.session import changes, opening
+from slideviz.session.state import Frame, Session, essence
+from slideviz.session.store import Store
 
 
 def moved(session, by=0.25):
@@ -255,7 +255,7 @@ def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
 
 
 def test_the_range_of_the_displacement_ends_at_a_round_number():
-    from slideviz.view.session.state import round_above
+    from slideviz.session.state import round_above
 
     for value, wanted in ((0.0202, 0.025), (1.0, 1.0), (9.1, 10.0), (3e-7, 3e-7), (0.0, 0.0)):
         assert round_above(value) == pytest.approx(wanted, rel=1e-12)

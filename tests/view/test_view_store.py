@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from slideviz.case.model import Translate
 from slideviz.mesh.quality import quality
+from slideviz.session import changes
+from slideviz.session.state import Frame, Session, ViewState
+from slideviz.session.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
 from slideviz.terms import COLOUR_BY, ROLES
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame, Session, ViewState
-from slideviz.view.session.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
 
 
 class Clock:

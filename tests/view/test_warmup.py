@@ -2,7 +2,7 @@ import pytest
 
 from slideviz.baselines import element_loops, sweeps, weighting
 from slideviz.rbf import closest, compiled
-from slideviz.view import warmup
+from slideviz.session import jit_warmup
 
 
 def signatures():
@@ -15,7 +15,7 @@ def signatures():
 
 
 def test_it_makes_the_loops_ready_that_runs_use():
-    warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, lambda: False)
     ready = signatures()
     for name in ("fill_matrix", "sum_three", "sum_four", "sum_rotational", "_build", "_query"):
         assert ready[name], name
@@ -24,9 +24,9 @@ def test_it_makes_the_loops_ready_that_runs_use():
 
 
 def test_nothing_is_told_when_nothing_is_compiled():
-    warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, lambda: False)
     told = []
-    warmup.warm_up(lambda: told.append(1), lambda: False)
+    jit_warmup.warm_up(lambda: told.append(1), lambda: False)
     assert not told
 
 
@@ -43,8 +43,8 @@ def test_compilation_is_told():
         fresh(len(name))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(warmup, "_deform", deform)
-        warmup.warm_up(lambda: told.append(1), lambda: False)
+        patch.setattr(jit_warmup, "_deform", deform)
+        jit_warmup.warm_up(lambda: told.append(1), lambda: False)
     assert told
 
 
@@ -57,8 +57,8 @@ def test_it_stops_when_asked_and_swallows_what_the_run_would_tell(monkeypatch):
         done.append(name)
         raise CaseError("wrong")
 
-    monkeypatch.setattr(warmup, "_deform", deform)
-    warmup.warm_up(lambda: None, lambda: True)
+    monkeypatch.setattr(jit_warmup, "_deform", deform)
+    jit_warmup.warm_up(lambda: None, lambda: True)
     assert not done
-    warmup.warm_up(lambda: None, lambda: False)
+    jit_warmup.warm_up(lambda: None, lambda: False)
     assert len(done) == 1

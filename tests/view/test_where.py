@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.view.where import Around, coordinates, decimals, nearest_boundary
+from slideviz.session.locate import Around, coordinates, decimals, nearest_boundary
 
 
 def test_places_are_told_about_an_axis():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slideviz.case import samples
 from slideviz.mesh.model import FloatArray
+from slideviz.samples import table
 from tests import builders
 from tools.laws import draw
 from tools.laws.draw import Rng
@@ -139,7 +139,7 @@ def sample(rng: Rng) -> Made:
     """Return the mesh of a sample case, small."""
     name = str(rng.choice([*SAMPLES, "passage"]))
     size = int(rng.integers(*SAMPLES[name])) if name in SAMPLES else int(rng.integers(12, 20))
-    made = samples.sample(name, size)
+    made = table.sample(name, size)
     body, (first, second) = made.case.markers_with("moving"), made.case.markers_with("periodic")
     points = made.mesh.points
     if made.case.periodic_type == "rotational":

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from slideviz.case.cfg import set_key
-from slideviz.case.samples import sample
+from slideviz.deformation.solver import deform
+from slideviz.plots.draw import GreedyRun, convergence
 from slideviz.rbf.problem import Cycle
-from slideviz.staircase import deform
-from slideviz.view.compare.plots import WIDTH, save_figure
-from slideviz.view.plots.draw import GreedyRun, convergence
+from slideviz.samples.table import sample
+from slideviz.study.plots import WIDTH, save_figure
 from tools.study.cases import GREEDY, Greedy
 
 TOLERANCE = 1e-6

@@ -24,10 +24,10 @@ from qtpy.QtWidgets import (
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.tips import wrapped
+from slideviz.session import changes
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
 
 NAME, COUNT, ROLE = 0, 1, 2
 

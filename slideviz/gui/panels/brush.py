@@ -8,8 +8,8 @@ import numpy as np
 from qtpy.QtCore import QRectF, Qt, Signal
 from qtpy.QtGui import QColor, QPainter, QPen
 
+from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
-from slideviz.view.drawing.look import SELECTED_COLOUR
 
 GRIP_PX = 6
 """A press so near to an end of the range moves that end."""

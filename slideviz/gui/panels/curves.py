@@ -10,6 +10,7 @@ import numpy as np
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.plot_canvas import (
@@ -22,15 +23,14 @@ from slideviz.gui.widgets.plot_canvas import (
 )
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.drawing.look import SELECTED_COLOUR
-from slideviz.view.plots import curves
-from slideviz.view.plots.draw import convergence, quality_by_step
-from slideviz.view.plots.spanwise import spanwise
-from slideviz.view.plots.style import add_legend
-from slideviz.view.plots.ticks import rounded_out
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
+from slideviz.plots import curves
+from slideviz.plots.draw import convergence, quality_by_step
+from slideviz.plots.spanwise import spanwise
+from slideviz.plots.style import add_legend
+from slideviz.plots.ticks import rounded_out
+from slideviz.session import changes
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 
 KINDS = {
     "steps": "Quality by step",

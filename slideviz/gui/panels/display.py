@@ -23,13 +23,13 @@ from slideviz.gui.panels.display_fields import Copies, Span, map_icon
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.periodic import Pair
+from slideviz.scene.passages import Period
+from slideviz.session import changes
+from slideviz.session.colors import usual_range
+from slideviz.session.passages import passages_around
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, labels
-from slideviz.view.copies import passages_around
-from slideviz.view.layers.copies import Period
-from slideviz.view.session import changes
-from slideviz.view.session.colours import usual_range
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
 
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",

@@ -12,7 +12,6 @@ from qtpy.QtGui import QKeySequence, QShortcut
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from slideviz.gui.panels.brush import BrushCanvas, Range
-from slideviz.gui.theme import alarm
 from slideviz.gui.widgets.plot_canvas import (
     PLOT_FILTERS,
     PlotArea,
@@ -22,16 +21,17 @@ from slideviz.gui.widgets.plot_canvas import (
     write_plot,
 )
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.view.plots.session_histogram import (
+from slideviz.gui.widgets.theme import alarm
+from slideviz.plots.session_histogram import (
     Counts,
     draw_histogram,
     first_value,
     shown_measure,
 )
-from slideviz.view.sections.choice import ONLY_INVERTED, chosen_cells, range_words
-from slideviz.view.session import changes
-from slideviz.view.session.state import Frame, Session
-from slideviz.view.session.store import Store
+from slideviz.sections.threshold import ONLY_INVERTED, chosen_cells, range_words
+from slideviz.session import changes
+from slideviz.session.state import Frame, Session
+from slideviz.session.store import Store
 
 
 class HistogramPanel(QWidget):

@@ -21,11 +21,11 @@ from slideviz.case.model import Case, Reduction
 from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.panels.method_more import MoreSettings
 from slideviz.gui.widgets.field_watch import FieldWatch
-from slideviz.view.missing import Missing
-from slideviz.view.motions.period_words import found_text
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.period_words import found_text
+from slideviz.session.run_requirements import Missing
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 
 
 class MethodPanel(QWidget):

@@ -18,10 +18,10 @@ from slideviz.case.model import (
     Translate,
     named,
 )
+from slideviz.case.motion_words import direction_words, target_words
 from slideviz.gui.panels.motion_form import ABOUT, MotionForm
 from slideviz.gui.panels.motion_kinds import new_motion
-from slideviz.view.motions.places import Axis, radial
-from slideviz.view.motions.words import direction_words, target_words
+from slideviz.session.motion_places import Axis, radial
 
 Z = (0.0, 0.0, 1.0)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
+from slideviz.session.motion_places import Axis
 from slideviz.terms import MOTION_KINDS
-from slideviz.view.motions.places import Axis
 
 KINDS: dict[type, str] = {
     Translate: MOTION_KINDS["translate"].label,

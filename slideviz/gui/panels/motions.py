@@ -23,24 +23,24 @@ from qtpy.QtWidgets import (
 
 from slideviz.case.model import FromFile, Motion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.motion_words import describe
+from slideviz.color_scheme import Look
 from slideviz.errors import SlidevizError
+from slideviz.gui.dialogs.motion_table import ask_table
 from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_kinds import KINDS, new_motion
-from slideviz.gui.panels.motion_table import ask_table
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import folder_of, main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import Mesh
-from slideviz.view.drawing.look import Look
-from slideviz.view.missing import Missing
-from slideviz.view.motions.places import centroid, machine_axis, new_target, targets
-from slideviz.view.motions.table import Rows
-from slideviz.view.motions.words import describe
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.motion_places import centroid, machine_axis, new_target, targets
+from slideviz.session.motion_table import Rows
+from slideviz.session.run_requirements import Missing
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 
 HEIGHT, LEAST_HEIGHT = 300, 210
 """Pixels that the panel would like, and that its longest form needs."""

@@ -8,16 +8,16 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QIcon
 from qtpy.QtWidgets import QLabel, QMenu, QTreeWidgetItem, QVBoxLayout, QWidget
 
+from slideviz.color_scheme import Look
 from slideviz.gui.panels.runs_actions import RunActions
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.drawing.look import Look
-from slideviz.view.session import changes
-from slideviz.view.session.runs_table import QUALITY, best, described
-from slideviz.view.session.runs_words import brief, run_words
-from slideviz.view.session.state import Run, Session
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.runs_table import QUALITY, best, described
+from slideviz.session.runs_words import brief, run_words
+from slideviz.session.state import Run, Session
+from slideviz.session.store import Store
 
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
 

@@ -9,16 +9,16 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import QApplication, QHBoxLayout, QMenu, QToolButton, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs
 from slideviz.gui.panels.runs_tree import RunTree
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.runs_menu import fill_compare
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.session import changes
-from slideviz.view.session.runs_table import table_text, write_table
-from slideviz.view.session.runs_words import run_words
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.runs_table import table_text, write_table
+from slideviz.session.runs_words import run_words
+from slideviz.session.state import Session
+from slideviz.session.store import Store
 
 TIP_COMPARE = (
     "Show the undeformed mesh or another run beside the run that is shown. "
@@ -172,7 +172,7 @@ class RunActions:
         folder = session.path.parent if session.path is not None else Path.home()
         stem = session.path.stem if session.path is not None else "mesh"
         default = folder / f"{stem}_runs.csv"
-        path = dialogs.ask_save(self.panel, "Export the table of runs", default, TABLE_FILTERS)
+        path = questions.ask_save(self.panel, "Export the table of runs", default, TABLE_FILTERS)
         if path is None:
             return
         try:

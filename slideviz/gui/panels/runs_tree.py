@@ -19,7 +19,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.session.state import Session
+from slideviz.session.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)
 NUMBER = Qt.ItemDataRole.UserRole

@@ -12,8 +12,8 @@ from slideviz.errors import CaseError
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.view.sections import start as section_start
-from slideviz.view.sections.model import Section, Triple
+from slideviz.sections.model import Section, Triple
+from slideviz.session import section_start
 
 STEPS = 1000
 """Places of the slider."""

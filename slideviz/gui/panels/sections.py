@@ -21,22 +21,22 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui import dialogs
+from slideviz.export.section_job import Paper, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.panels.section_words import HINTS, NAMES, TIPS, UNSEEN
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
-from slideviz.view.layers.copies import Period
-from slideviz.view.sections.cuts import can_cut
-from slideviz.view.sections.job import Paper, save_section
-from slideviz.view.sections.model import Section
-from slideviz.view.sections.start import first_cylinder, first_plane
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
+from slideviz.scene.passages import Period
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.section_cuts import can_cut
+from slideviz.session.section_start import first_cylinder, first_plane
+from slideviz.session.state import Session
 
 if TYPE_CHECKING:
-    from slideviz.gui.canvas.cutting import Cutting
+    from slideviz.gui.viewport.cutting import Cutting
 
 PICTURES = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 SIZES = {
@@ -256,7 +256,7 @@ def save_picture(window: Any, paper: Paper) -> None:
         return
     stem = session.path.stem if session.path is not None else "mesh"
     default = window.files.folder() / f"{stem}_section.png"
-    path = dialogs.ask_save(window, "Save picture of the section", default, PICTURES)
+    path = questions.ask_save(window, "Save picture of the section", default, PICTURES)
     if path is None:
         return
     window.settings.setValue("folder", str(path.parent))

@@ -20,21 +20,21 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
-from slideviz.gui.theme import alarm
 from slideviz.gui.widgets.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
+from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
-from slideviz.terms import COLOUR_BY
-from slideviz.view.inspect import (
+from slideviz.session import changes
+from slideviz.session.inspect import (
     cell_info,
     measure,
     table_rows,
     worst_cells,
     write_table,
 )
-from slideviz.view.session import changes
-from slideviz.view.session.state import Session
-from slideviz.view.session.store import Store
-from slideviz.view.where import Around, axis_of, coordinates, nearest_boundary
+from slideviz.session.locate import Around, axis_of, coordinates, nearest_boundary
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+from slideviz.terms import COLOUR_BY
 
 
 class WorstPanel(QWidget):

@@ -9,10 +9,10 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from qtpy.QtGui import QBrush, QColor
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
-from slideviz.gui.theme import alarm
+from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
-from slideviz.view.inspect import WorstCells
-from slideviz.view.where import Around, coordinates, decimals
+from slideviz.session.inspect import WorstCells
+from slideviz.session.locate import Around, coordinates, decimals
 
 SHORT = {"triangle": "tri", "quadrilateral": "quad", "tetrahedron": "tet", "hexahedron": "hex"}
 COLUMNS = ("Cell", "Quality", "Worst\nstep")

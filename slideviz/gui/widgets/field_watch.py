@@ -6,9 +6,9 @@ from qtpy.QtCore import QObject
 from qtpy.QtWidgets import QFormLayout, QWidget
 
 from slideviz.gui.widgets.fields import NumberBox, NumberField
-from slideviz.view.session import changes
-from slideviz.view.session.state import Place
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.state import Place
+from slideviz.session.store import Store
 
 
 class FieldWatch(QObject):

@@ -10,7 +10,7 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
 from qtpy.QtWidgets import QApplication
 
-from slideviz.view.pictures.studio import Studio
+from slideviz.export.offscreen_renderer import Studio
 
 LARGE = 50_000
 """Cells of a mesh whose preview is drawn as large as it is shown."""

@@ -15,13 +15,13 @@ from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QImage, QPainter
 from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
+from slideviz.color_scheme import LIGHT, Look
 from slideviz.errors import SlidevizError
-from slideviz.gui import dialogs
+from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
-from slideviz.mesh.atomic import atomic_write
-from slideviz.view.drawing.look import LIGHT, Look
-from slideviz.view.plots.draw import PRINT, Style
-from slideviz.view.plots.written import figure_bytes
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.plots.draw import PRINT, Style
+from slideviz.plots.written import figure_bytes
 
 REST_MS = 200
 """Between two drawings while steps are played, at least."""
@@ -252,7 +252,7 @@ def ask_and_write(
     parent: QWidget, title: str, default: Path, filters: str, write: Callable[[Path], None]
 ) -> None:
     """Ask for a name and write a file; tell how it went in the window, if there is one."""
-    path = dialogs.ask_save(parent, title, default, filters)
+    path = questions.ask_save(parent, title, default, filters)
     if path is None:
         return
     window = main_window(parent)

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slideviz.gui.worker import stand_back
-from slideviz.view.plots.style import Style
+from slideviz.gui.responsiveness.worker import stand_back
+from slideviz.plots.style import Style
 
 DPI = 100
 """Of a screen whose pixels are not scaled."""

@@ -10,7 +10,7 @@ from qtpy.QtCore import QRectF, Qt
 from qtpy.QtGui import QPainter, QPalette
 from qtpy.QtWidgets import QWidget
 
-from slideviz.view.plots.ticks import ticks
+from slideviz.plots.ticks import ticks
 
 
 class Ruler(QWidget):

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from qtpy.QtGui import QActionGroup
 from qtpy.QtWidgets import QMenu
 
-from slideviz.view.drawing.panes import choices, panes, show_in
-from slideviz.view.session import changes
-from slideviz.view.session.store import Store
+from slideviz.session import changes
+from slideviz.session.panes import choices, panes, show_in
+from slideviz.session.store import Store
 
 
 def fill_pane(menu: QMenu, store: Store, pane: int) -> None:

@@ -1,0 +1,1 @@
+"""The deformation: from a case and a mesh to arrays, steps, and checks of the result."""

@@ -1,0 +1,126 @@
+"""Results that cannot be right: nodes that go far beyond the motion, systems that were not solved.
+
+A smooth function that has to turn from one displacement to another within a thin layer overshoots
+behind it: a wall that moves along itself beside a wall that stays, with cells of 1e-6 between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.deformation.setup import Plan
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.rbf.problem import Solution
+
+GROWTH = 5.0
+"""How many times as far as the motion reaches no node may go. Interpolation with sliding nodes gets
+to 2 on the thesis's cases, and to 4 around a thin sharp profile that slides."""
+
+TAKEN = 1.5
+"""Sliding boundaries that go farther than so many times the largest displacement have overshot
+themselves: what they do to others is no reason for anything."""
+
+STEEP = 100.0
+"""A slope between neighbours explains an overshoot when it is so many times that of the largest
+displacement over the whole mesh."""
+
+HOPELESS = 0.1
+"""A system whose solution misses its own data by this part of the largest was not solved."""
+
+
+def unsoundness(
+    plan: Plan, mesh: Mesh, solution: Solution, moved: FloatArray, part: float
+) -> str | None:
+    """Return a sentence where the result of a step cannot be right: why, and what helps.
+
+    Parameters
+    ----------
+    moved : (n, d)
+        Coordinates in the frame after the step. Angles count with the largest radius, so that a
+        body that turns takes nothing farther than itself.
+    part : float
+        Of the whole displacement, 0 to 1.
+    """
+    largest = part * float(np.linalg.norm(plan.target, axis=1).max(initial=0.0))
+    if solution.lost > HOPELESS * largest:
+        return (
+            f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
+            f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
+            f"{_cause(plan, mesh, moved)}"
+        )
+    shift = moved - plan.coords
+    length = np.linalg.norm(shift, axis=1)
+    if length.max() <= GROWTH * largest:
+        return None  # as nearly always: the motion reaches that far at least
+    # Sliding nodes first, for what they do is data to all others.
+    limit = np.full(
+        len(length), GROWTH * _reach(plan, shift, largest, ("moving", "fixed", "sliding"))
+    )
+    slid = plan.classes.sliding
+    limit[slid] = GROWTH * _reach(plan, shift, largest, ("moving",))
+    beyond = length > limit
+    if not beyond.any():
+        return None
+    on = slid[beyond[slid]]
+    node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
+    where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
+    return (
+        f"node {node} at ({where}) would go {length[node]:.3g} far, {length[node] / largest:.3g} "
+        f"times the largest displacement that is asked for ({largest:.3g}): "
+        f"{_cause(plan, mesh, moved)}"
+    )
+
+
+def _reach(plan: Plan, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
+    """Return how far the displacement of boundaries of some kinds may carry nodes.
+
+    A body that turns or is stretched takes what is smooth around it along, the farther the more:
+    a small profile turned in a large far field, all of it, up to its edge. So does what slides
+    around a small body.
+    """
+    chosen = np.zeros(len(shift), bool)
+    for kind in kinds:
+        chosen[getattr(plan.classes, kind)] = True
+    strains = [0.0]
+    for index in range(len(plan.boundary.names)):
+        nodes = np.unique(plan.boundary.facets[plan.boundary.marker == index])
+        nodes = nodes[chosen[nodes]]
+        farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
+        if len(nodes) > 1 and farthest <= TAKEN * largest:
+            at, moved = plan.coords[nodes], shift[nodes]
+            size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
+            strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)
+    return max(largest, float(max(strains)) * float(np.ptp(plan.coords, axis=0).max()))
+
+
+def _cause(plan: Plan, mesh: Mesh, moved: FloatArray) -> str:
+    """Return why the interpolation fails, and what helps."""
+    nodes = np.concatenate([plan.known, plan.classes.sliding])
+    at, shift = plan.coords[nodes], (moved - plan.coords)[nodes]
+    near = cKDTree(at).query(at, k=min(2, len(nodes)))
+    gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
+    apart = np.linalg.norm(shift - shift[others], axis=1)
+    steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
+    k = int(np.argmax(steep))
+    usual = float(np.linalg.norm(plan.target, axis=1).max()) / mesh.extent
+    if steep[k] < STEEP * usual:
+        return (
+            f"{plan.basis.kernel} is too smooth for nodes so close to each other; use a less "
+            "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "
+            "DATA_REDUCTION= YES"
+        )
+    pair = sorted((int(nodes[k]), int(nodes[others[k]])))
+    named = " and ".join(f"{node} ({_boundaries(plan, node)})" for node in pair)
+    return (
+        f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
+        "smooth function cannot follow; let the boundary that stays go along (role moving, "
+        "internal or periodic), use RBF_KERNEL= wendland-c0, which does not overshoot, or "
+        "DATA_REDUCTION= YES"
+    )
+
+
+def _boundaries(plan: Plan, node: int) -> str:
+    """Return the names of the boundaries that a node is on."""
+    mine = (plan.boundary.facets == node).any(axis=1)
+    return ", ".join(plan.boundary.names[k] for k in np.unique(plan.boundary.marker[mine]))

@@ -1,0 +1,172 @@
+"""Motions that put boundaries through each other: told before anything is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, pi
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.mesh.cached_boundary import boundary_of, shell_of
+from slideviz.mesh.crossing import Crossing, first_crossing, swept_crossing
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import axis_basis, in_axis_frame, pair_up
+from slideviz.mesh.topology import components, facet_vectors, unit
+from slideviz.mesh.winding import winding
+
+LOOKED_AT = 5
+"""Facets of a moved body that are asked whether they are inside; one that is will do."""
+BESIDE = 1e-4
+"""How far off its surface, in sizes of a facet, the mesh beside a body is looked for."""
+OPEN = 0.1
+"""What the winding of markers may miss of 1 where they are closed but for small gaps."""
+HALF = 0.5
+"""Winding between those of inside and outside."""
+
+
+def clash(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
+    """Return a sentence when a moved boundary ends up inside another one or out of the mesh.
+
+    None when all is well. Boundaries that share nodes are not compared: where a blade stands on a
+    sliding hub, both lie on the same curved surface only roughly. Nor are those that move along:
+    internal ones, and periodic ones with periodic displacement.
+
+    Parameters
+    ----------
+    nodes, vectors : (k,), (k, d)
+        The displacement of the moving nodes.
+    """
+    after = np.array(mesh.points)
+    after[nodes] += vectors
+    for name in case.markers_with("moving"):
+        hit = _new_crossing(mesh, after, mesh.marker(name).cells, _others(case, mesh, name))
+        if hit is not None:
+            return (
+                f"the motion puts {name} through {hit.marker} near {_place(hit)}; move {name} "
+                f"less, or let {hit.marker} move with it (role moving, internal or periodic)"
+            )
+    return _outside(case, mesh, nodes, after)
+
+
+def _new_crossing(
+    mesh: Mesh, after: FloatArray, moved: Cells, others: list[tuple[str, Cells]]
+) -> Crossing | None:
+    """Return where a moved boundary goes through one that it did not cross before.
+
+    Twisted quadrilaterals close to each other do, for each is taken for two triangles.
+    """
+    while (hit := first_crossing(after, moved, others)) is not None:
+        wall = [(name, cells) for name, cells in others if name == hit.marker]
+        if first_crossing(mesh.points, moved, wall) is None:
+            return hit
+        others = [(name, cells) for name, cells in others if name != hit.marker]
+    return None
+
+
+def jump(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
+    """Return a sentence when a moved node crosses another boundary on its straight way."""
+    after = np.array(mesh.points)
+    after[nodes] += vectors
+    for name in case.markers_with("moving"):
+        others = _others(case, mesh, name)
+        hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)
+        if hit is not None:
+            return (
+                f"{name} goes through {hit.marker} near {_place(hit)} on its way; cells will be "
+                "inverted there, unless its real path is not straight and goes around"
+            )
+    return None
+
+
+def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str | None:
+    """Return a sentence when a body is beyond the boundaries as a whole, however it came there.
+
+    What only reaches out of them crosses one.
+    """
+    boundary = boundary_of(mesh)
+    for name in case.markers_with("moving"):
+        mine = boundary.facets[boundary.marker == boundary.names.index(name)]
+        mine = mine[np.isin(mine, nodes).all(axis=1)]
+        label = components(len(mesh.points), mine[:, :-1].ravel(), mine[:, 1:].ravel())
+        for body in np.unique(label[mine[:, 0]]):
+            if not _is_lost(case, mesh, after, mine[label[mine[:, 0]] == body]):
+                continue
+            others = _others(case, mesh, name)
+            hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)
+            if hit is None and "internal" in case.roles.values():
+                continue  # it left through one that gives way
+            way = f", through {hit.marker} near {_place(hit)}" if hit else ""
+            return (
+                f"the motion takes {name} out of the mesh{way}; move {name} less, or let the "
+                "boundaries around it move with it"
+            )
+    return None
+
+
+def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> bool:
+    """Tell whether all of a moved body (k, c) is out of the mesh and of its periodic images."""
+    some = facets[np.linspace(0, len(facets) - 1, LOOKED_AT).astype(np.int64)]
+    before, there = (_beside(points, some) for points in (mesh.points, after))
+    whole = boundary_of(mesh).facets
+    # A surface with holes has no inside.
+    if abs(winding(mesh.points, whole, before[:1])[0] - 1.0) > OPEN:
+        whole = shell_of(mesh)
+    # Beside twisted facets, which are taken for triangles, a point may be on the wrong side.
+    there = there[[not _is_out(whole, mesh.points, point[None]) for point in before]]
+    if not len(there) or not _is_out(whole, after, there):
+        return False
+    far = float(np.linalg.norm(after[facets] - mesh.points[facets], axis=-1).max())
+    return all(_is_out(whole, after, image) for image in _images(case, mesh, there, far))
+
+
+def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
+    """Return a point (k, d) of the mesh close to the middle of each facet (k, c)."""
+    # Three corners are in one plane.
+    facets = facets if facets.shape[1] == 2 else facets[:, [0, 1, 2, 2]]
+    vectors = facet_vectors(points, facets)
+    sizes = np.linalg.norm(vectors, axis=1) ** (1.0 / (points.shape[1] - 1))
+    corners = points[facets[:, : points.shape[1]]]
+    return np.asarray(corners.mean(axis=1) - BESIDE * sizes[:, None] * unit(vectors))
+
+
+def _is_out(facets: IntArray, points: FloatArray, at: FloatArray) -> bool:
+    """Tell whether all points are outside of a closed surface."""
+    return all(winding(points, facets, point[None])[0] < HALF for point in at)
+
+
+def _images(case: Case, mesh: Mesh, at: FloatArray, far: float) -> Iterator[FloatArray]:
+    """Yield points in the neighbouring copies of a mesh that repeats, as far as they may be."""
+    names = case.markers_with("periodic")
+    if case.periodic not in ("fixed", "moving") or not names:
+        return
+    pair = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+    if pair.kind == "translational":
+        for count in range(1, ceil(far / pair.period) + 2):
+            yield at + count * pair.vector
+            yield at - count * pair.vector
+        return
+    basis = axis_basis(pair.axis)
+    local = in_axis_frame(at, pair.axis, pair.origin)
+    for count in range(1, ceil(pi / pair.period) + 1):
+        for angle in (count * pair.angle, -count * pair.angle):
+            turned = (local[:, 0] + 1j * local[:, 1]) * np.exp(1j * angle)
+            there = np.stack([turned.real, turned.imag, local[:, 2]], axis=1)
+            yield (there @ basis + np.asarray(pair.origin))[:, : mesh.dim]
+
+
+def _others(case: Case, mesh: Mesh, moved: str) -> list[tuple[str, Cells]]:
+    """Return the boundaries that a moving one must not enter."""
+    own = mesh.marker(moved).nodes
+    passable = ("internal", "periodic") if case.periodic in ("fixed", "moving") else ("internal",)
+    return [
+        (marker.name, marker.cells)
+        for marker in mesh.markers
+        if marker.name != moved
+        and case.roles.get(marker.name, "fixed") not in passable
+        and not np.isin(marker.nodes, own).any()
+    ]
+
+
+def _place(hit: Crossing) -> str:
+    return f"({', '.join(f'{value:.4g}' for value in hit.point)})"

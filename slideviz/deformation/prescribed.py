@@ -1,0 +1,105 @@
+"""The displacements that a case prescribes, at moving nodes and all their images."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, FromFile
+from slideviz.case.motion import ROUNDING, displacements, same
+from slideviz.deformation.classes import find_classes
+from slideviz.deformation.intersection import clash, jump
+from slideviz.errors import CaseError, DeformError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import TOLERANCE, Pair
+from slideviz.mesh.topology import Boundary, Fans, fan_normals
+from slideviz.rbf.axis import corners as corners_of
+from slideviz.rbf.axis import on_axis
+from slideviz.rbf.classify import Classes
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.images import require_free, spread
+
+APART = 100.0
+"""How much more images may differ in their displacement than in their place, both relative."""
+
+
+def displaced(case: Case, mesh: Mesh) -> Displacements:
+    """Return what moving nodes are asked for, with copies in the domain, and none beyond its sides.
+
+    Raises
+    ------
+    CaseError
+        A copy is asked to move otherwise than the node that it is a copy of.
+    """
+    moved, halo = displacements(case, mesh), mesh.halo
+    if halo is None:
+        return moved
+    asked = np.zeros_like(mesh.points)
+    asked[moved.nodes] = moved.vectors
+    follows = np.einsum("hij,hj->hi", halo.rotations, asked[halo.donors])
+    gap = np.abs(follows - asked[halo.receivers]).max(axis=1, initial=0.0)
+    gap[~np.isin(halo.receivers, moved.nodes)] = 0.0
+    if gap.max(initial=0.0) > same(moved.vectors, mesh):
+        k = int(np.argmax(gap))
+        raise CaseError(
+            f"{mesh.name}: node {halo.receivers[k]} is asked to move otherwise than node "
+            f"{halo.donors[k]}, whose copy it is by the mesh's halo, by {gap[k]:.3g}; a boundary "
+            "that moves must move alike on both periodic sides"
+        )
+    asked[halo.receivers] = follows
+    with_copies = np.union1d(moved.nodes, halo.receivers[np.isin(halo.donors, moved.nodes)])
+    nodes = np.setdiff1d(with_copies, halo.outer)
+    return replace(moved, nodes=nodes, vectors=asked[nodes])
+
+
+def alikeness(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
+    """Return by which part of the largest displacement those of periodic images may differ.
+
+    Motions displace images alike but for what these are apart; files have few digits.
+    """
+    if any(isinstance(motion, FromFile) for motion in case.motions):
+        return TOLERANCE
+    mismatch = max((pair.mismatch for pair in pairs), default=0.0)
+    return min(TOLERANCE, APART * mismatch / mesh.extent)
+
+
+def prescribed(
+    case: Case,
+    mesh: Mesh,
+    frame: Frame,
+    surfaces: tuple[Boundary, Fans, Classes],
+    moved: Displacements,
+    alike: float,
+) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
+    """Return the known nodes, their displacement in the frame, and warnings.
+
+    Parameters
+    ----------
+    alike
+        By which part of the largest displacement those of images may differ.
+    """
+    problem = clash(case, mesh, moved.nodes, moved.vectors)
+    if problem:
+        raise CaseError(f"{mesh.name}: {problem}")
+    remark = jump(case, mesh, moved.nodes, moved.vectors)
+    boundary, fans, classes = surfaces
+    known = np.concatenate([classes.moving, classes.fixed])
+    if not len(known):
+        raise DeformError(
+            f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
+        )
+    values = np.zeros(mesh.points.shape)
+    values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
+    largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
+    allowed = alike * largest + ROUNDING * float(np.abs(mesh.points).max())
+    values, source = spread(values, moved.nodes, classes.stands, allowed)
+    follow = np.setdiff1d(classes.moving, moved.nodes)
+    if len(follow):
+        alone = find_classes(case, mesh, (boundary, fans), frame, np.arange(len(values)))
+        coords = frame.coords(mesh.points)
+        corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
+        normals = fan_normals(boundary, fans, coords, corners)
+        require_free(values, source, follow, (alone, normals), allowed)
+    return known, values[known], (*moved.warnings, *((remark,) if remark else ()))

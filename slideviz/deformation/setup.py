@@ -1,0 +1,295 @@
+"""From a case and a mesh to arrays: frame, classes, tracks and prescribed displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.baselines.conditions import Body
+from slideviz.baselines.elastic import deform_elastic
+from slideviz.baselines.idw import Weights, deform_idw
+from slideviz.baselines.shapes import blocks
+from slideviz.case.check import idle_settings
+from slideviz.case.model import Case
+from slideviz.case.motion import require_valid
+from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
+from slideviz.deformation.prescribed import alikeness, displaced, prescribed
+from slideviz.errors import MeshError
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.check import check_size
+from slideviz.mesh.halo import Halo, without_halo
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import Pair
+from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
+from slideviz.rbf.axis import corners as corners_of
+from slideviz.rbf.axis import hold_on_axis, on_axis
+from slideviz.rbf.classify import Classes, directions
+from slideviz.rbf.evaluate import Basis
+from slideviz.rbf.frames import Frame
+from slideviz.rbf.images import COINCIDENT
+from slideviz.rbf.methods import METHODS
+from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
+from slideviz.rbf.projection import Tracks, find_tracks
+
+LOOSE = 0.1
+"""A tolerance above this part of the largest displacement leaves much to the correction."""
+
+REACH = 1.5
+"""How far surfaces are continued at moving boundaries, in largest displacements."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Everything that stays the same over the steps.
+
+    Attributes
+    ----------
+    frame : Frame
+    basis : Basis
+    coords : (n, d) float64
+        Undeformed positions in the frame.
+    classes : Classes
+    known : (a,) int64
+        Moving and fixed nodes.
+    target : (a, d) float64
+        Their displacement in the frame after the last step.
+    same_as : (n,) int64
+        The node that stands for all that coincide with it.
+    images : (p, 2) int64
+        Nodes that stand for their periodic images, and these: they move alike.
+    reduction : Reduction or None
+        Settings of the greedy selection; None: all candidates are control nodes.
+    axis : (n,) bool
+        Nodes on the axis of a cylindrical frame.
+    held : (h,) int64
+        Sliding nodes on the axis that cannot move.
+    boundary, fans, tracks
+        Topology, and where sliding nodes slide.
+    pairs : tuple of Pair
+    solve : callable
+        The method on one step.
+    halo : Halo or None
+        Copies that follow their donors.
+    warnings : tuple of str
+    """
+
+    frame: Frame
+    basis: Basis
+    coords: FloatArray
+    classes: Classes
+    known: IntArray
+    target: FloatArray
+    same_as: IntArray
+    images: IntArray
+    reduction: Reduction | None
+    axis: np.ndarray
+    held: IntArray
+    boundary: Boundary
+    fans: Fans
+    tracks: Tracks
+    pairs: tuple[Pair, ...]
+    solve: Callable[[Problem, Watch], Solution]
+    halo: Halo | None
+    warnings: tuple[str, ...]
+
+    def once(self, nodes: IntArray) -> np.ndarray:
+        """Tell which nodes stand for themselves and all their periodic images."""
+        return np.asarray(self.classes.stands[nodes] == nodes)
+
+    def constraints(self, coords: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return nodes (q,) and unit normals (q, d) of the sliding nodes at these positions.
+
+        Of periodic images only the one that stands for them is there. On flat boundaries the
+        undeformed normals are kept, so that they stay flat to the bit.
+        """
+        at = coords if self.tracks.curved else self.coords
+        corners = corners_of(at, self.boundary.facets, self.axis)
+        nodes, normals = directions(
+            self.classes, fan_normals(self.boundary, self.fans, at, corners)
+        )
+        once = self.once(nodes)
+        return hold_on_axis(nodes[once], normals[once], self.axis)[:2]
+
+    def project(self, coords: FloatArray, nodes: IntArray, free: FloatArray) -> FloatArray:
+        """Return the displacements (m, d) of nodes brought back on their boundary.
+
+        Nodes on the axis stay on it, and in place where another surface meets it.
+        """
+        out = self.tracks.project(coords, nodes, free)
+        self._tie(nodes, out)
+        out[self.axis[nodes], :2] = 0.0
+        out[np.isin(nodes, self.held)] = 0.0
+        return out
+
+    def _tie(self, nodes: IntArray, slid: FloatArray) -> None:
+        """Let copies within the domain slide as the nodes do that a halo ties them to, in place."""
+        if self.halo is None:
+            return
+        row = np.full(len(self.coords), -1)
+        row[nodes] = np.arange(len(nodes))
+        copy, origin = row[self.halo.receivers], row[self.halo.donors]
+        both = (copy >= 0) & (origin >= 0)
+        moved = slid[origin[both]]
+        if not self.frame.cylindrical:
+            moved = np.einsum("hij,hj->hi", self.halo.rotations[both], moved)
+        slid[copy[both]] = moved
+
+
+def make_plan(case: Case, mesh: Mesh) -> Plan:
+    """Return the plan of a deformation.
+
+    Raises
+    ------
+    CaseError
+        The case does not fit the mesh.
+    MeshError
+        Periodic markers do not match, a marker element is no side of a cell, or a coordinate is
+        not finite, or too large to compute with.
+    DeformError
+        Nothing is known: no node has a prescribed displacement.
+    """
+    require_valid(case, mesh)
+    _require_finite(mesh)
+    check_size(mesh)
+    asked, (case, notes) = case, roles_of_copies(case, mesh)
+    boundary = boundary_of(mesh)
+    fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
+    pairs, frame, stands = find_period(case, mesh, boundary)
+    beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
+    coords = frame.coords(mesh.points)
+    free = case.periodic in ("fixed", "moving")
+    classes = find_classes(case, mesh, (boundary, fans), frame, stands)
+    classes = replace(classes, beyond=beyond)
+    axis = on_axis(frame, coords)
+    normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    moved = displaced(asked, mesh)
+    surfaces = boundary, fans, classes
+    alike = alikeness(case, mesh, pairs)
+    known, target, warnings = prescribed(case, mesh, frame, surfaces, moved, alike)
+    largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
+    reduction = _reduction(case, mesh.extent)
+    tracks = find_tracks(
+        boundary,
+        fans,
+        classes,
+        lambda nodes: corners_of(coords, nodes, axis),
+        (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
+        reach=REACH * largest,
+    )
+    second = np.flatnonzero(stands != np.arange(len(stands)))
+    images = np.stack([stands[second], second], axis=1)
+    return Plan(
+        frame=frame,
+        basis=Basis(
+            case.influence_factor * mesh.extent,
+            frame.period if frame.cylindrical else 0.0,
+            case.kernel,
+        ),
+        coords=coords,
+        classes=classes,
+        known=known,
+        target=target,
+        same_as=_coinciding(mesh, boundary.nodes, images),
+        images=images,
+        reduction=reduction,
+        axis=axis,
+        held=hold_on_axis(*directions(classes, normals), axis)[2],
+        boundary=boundary,
+        fans=fans,
+        tracks=tracks,
+        pairs=pairs,
+        solve=_method(case, without_halo(mesh)[0], frame, axis),
+        halo=mesh.halo,
+        warnings=(
+            *mesh.remarks,
+            *notes,
+            *warnings,
+            *_loose(case, reduction, largest, mesh.extent),
+            *idle_settings(case),
+        ),
+    )
+
+
+def _method(
+    case: Case, mesh: Mesh, frame: Frame, axis: np.ndarray
+) -> Callable[[Problem, Watch], Solution]:
+    """Return what METHOD and SLIDING_MODE choose."""
+    if case.method == "idw":
+        power = case.idw_power or float(mesh.dim)
+        return partial(deform_idw, weights=Weights(power, case.idw_fixed_weight))
+    if case.method == "elastic":
+        return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
+    return METHODS[case.sliding]
+
+
+def _require_finite(mesh: Mesh) -> None:
+    """Raise MeshError when a coordinate is NaN or infinite."""
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        where = ", ".join(f"{v:.6g}" for v in mesh.points[bad[0]])
+        raise MeshError(
+            f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
+            f"({len(bad)} nodes are not), so correct the mesh"
+        )
+
+
+def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
+    """Return for each node the first node by position that coincides with it, (n,).
+
+    By position, because it stands for all of them in the selection of control nodes, which
+    must not depend on the numbers of nodes.
+    """
+    tree = cKDTree(mesh.points[boundary_nodes])
+    twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
+    links = np.concatenate([twins.reshape(-1, 2), images])
+    out = np.arange(len(mesh.points))
+    nodes = np.unique(links)
+    nodes = nodes[np.lexsort(mesh.points[nodes].T[::-1])]
+    label = components(len(out), *links.T)[nodes]
+    _, first, group = np.unique(label, return_index=True, return_inverse=True)
+    out[nodes] = nodes[first[group]]
+    return out
+
+
+def _reduction(case: Case, extent: float) -> Reduction | None:
+    """Return the settings of the selection in the solver's terms."""
+    given = case.reduction
+    if given is None or case.method != "rbf":
+        return None
+    level: Literal["none", "size", "ratio"] = "none"
+    if given.multilevel:
+        level = "size" if given.criterion == "size" else "ratio"
+    return Reduction(
+        tolerance=given.relative * extent if given.relative else given.tolerance,
+        pick=given.selection,
+        level=level,
+        level_size=given.level_size,
+        level_ratio=given.level_tolerance,
+        max_nodes=given.max_nodes,
+        gamma=given.gamma,
+    )
+
+
+def _loose(case: Case, reduction: Reduction | None, largest: float, extent: float) -> list[str]:
+    """Return a warning about a tolerance that is not far below the largest displacement."""
+    if reduction is None or not largest > 0.0 or reduction.tolerance <= LOOSE * largest:
+        return []
+    assert case.reduction is not None
+    whole, part = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
+    remedy = f"use DATA_RED_RELATIVE= {part} or less"
+    if not case.reduction.relative:
+        remedy = f"use DATA_RED_TOLERANCE= {whole} or less (or DATA_RED_RELATIVE= {part})"
+    is_, so = "not below", "no control node is needed to meet it, and only the cells"
+    if reduction.tolerance < largest:
+        is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"
+    sentence = (
+        f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
+        f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
+        f"invert them; {remedy}, a hundredth of the displacement"
+    )
+    return [sentence]

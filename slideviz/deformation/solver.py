@@ -1,0 +1,199 @@
+"""The staircase: ``deform(case, mesh)`` yields one deformed mesh for each step.
+
+Whoever pulls the generator owns progress and cancel; the command line, a test and the window's
+worker run the same code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.deformation.setup import Plan, make_plan
+from slideviz.deformation.stepping import Climb, Progress, Step, Trial, renumbered
+from slideviz.errors import DeformError, UnsoundError
+from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, quality
+from slideviz.rbf.problem import Watch
+from slideviz.rbf.rows import Rows, blocks
+
+__all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
+
+COUNTS = (1, 2, 3, 5, 8, 13, 21, 34)
+"""Numbers of steps that STEPS= auto tries, in this order."""
+
+ELASTIC_BYTES = {2: 2_000, 3: 8_000}
+"""Memory that linear elasticity takes for each node, by dimension: measured on quadrilaterals and
+hexahedra, whose matrix has the most entries."""
+
+
+def deform(
+    case: Case,
+    mesh: Mesh,
+    progress: Callable[[Progress], None] | None = None,
+    plan: Plan | None = None,
+) -> Iterator[Step]:
+    """Yield the deformed mesh of each step.
+
+    Parameters
+    ----------
+    case
+        Roles, motions and settings. Its ``mesh_file`` is not read.
+    mesh
+        The undeformed mesh.
+    progress
+        Called often with a ``Progress``; an exception it raises ends the run at once.
+    plan
+        What ``make_plan`` returned for this mesh and a case that differs in the number of steps
+        alone; it is made when there is none.
+
+    Raises
+    ------
+    CaseError, MeshError
+        The case does not fit the mesh.
+    DeformError
+        The system cannot be solved, or needs more memory than there is.
+
+    Notes
+    -----
+    Thesis chapters 2 and 3: the displacement is divided by the number of steps, in the working
+    frame, and every step solves at the positions the one before it left. With ``steps`` 0
+    (STEPS= auto) they come only when their number is settled.
+    """
+    tell = progress or (lambda _: None)
+    watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))
+    if plan is None:
+        with watch.phase("classify"):
+            plan = make_plan(case, mesh)
+    _require_memory(plan, case)
+    climb = Climb(case, mesh, plan, tell, watch.seconds)
+    yield from climb.steps(case.steps) if case.steps else _automatic(climb)
+
+
+def _automatic(climb: Climb) -> Iterator[Step]:
+    """Yield the steps of the smallest number of them that is enough.
+
+    Enough: no cell is inverted, and the next number does not raise the minimum quality by more
+    than the part ``steps_gain``. If none is free of inverted cells, the one with fewest.
+
+    Raises
+    ------
+    DeformError
+        A step cannot be solved, or with two numbers in a row one gives no sound result.
+    """
+    tried: list[Trial] = []
+    best: tuple[Trial, list[Step]] | None = None
+    worse, failure = 0, None
+    for count in COUNTS:
+        if tried and count <= tried[-1].steps:
+            continue  # halving made so many already
+        try:
+            steps = list(climb.steps(count, halve=True))
+        except UnsoundError as problem:
+            worse, failure = worse + 1, problem
+            if worse == 2:
+                break
+            continue
+        found = quality(steps[-1].mesh, climb.mesh, climb.case.quality_metric)
+        trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
+        tried.append(trial)
+        if best is not None and best[0].inverted == 0:
+            gain = climb.case.steps_gain * best[0].min
+            if trial.inverted or trial.min - best[0].min <= gain:
+                break
+        if best is None or (-trial.inverted, trial.min) > (-best[0].inverted, best[0].min):
+            best, worse = (trial, steps), 0
+        else:
+            worse += 1
+        if worse == 2:
+            break  # more steps do not help: two numbers in a row were no better
+    if best is None:
+        assert failure is not None
+        raise failure
+    yield from renumbered(best[1], tuple(tried))
+
+
+def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
+    """Return the number of the step in which each cell was first inverted, (k,).
+
+    Parameters
+    ----------
+    steps
+        Those of a run, all with their meshes.
+    mesh
+        The undeformed mesh.
+    cells : (k,)
+        Cells to follow, such as those inverted in the end. 0 where one never is.
+    """
+    first = np.zeros(len(cells), np.int64)
+    if not len(cells):
+        return first
+    size = np.diff(mesh.cells.offsets)[cells]
+    starts = np.repeat(mesh.cells.offsets[cells] - np.r_[0, np.cumsum(size)[:-1]], size)
+    nodes = mesh.cells.connectivity[starts + np.arange(size.sum())]
+    part = Mesh(mesh.points, Cells.from_types(mesh.cells.types[cells], nodes))
+    for step in steps:
+        status = quality(part.with_points(step.mesh.points), part).status
+        first[(first == 0) & (status == INVERTED)] = step.index
+    return first
+
+
+def _require_memory(plan: Plan, case: Case) -> None:
+    """Raise DeformError when the system would not fit into memory."""
+    if case.method == "elastic":
+        _require_free(
+            ELASTIC_BYTES[plan.coords.shape[1]] * len(plan.coords),
+            f"linear elasticity of {len(plan.coords)} nodes needs",
+            "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
+        )
+    if case.method != "rbf" or plan.reduction is not None:
+        return  # nothing is dense; the selection keeps no matrix of all candidates
+    sizes = _systems(plan, case)
+    _require_free(
+        8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
+        f"{sum(sizes)} unknowns need",
+        "give large boundaries far from the motion the role internal, use SLIDING_MODE= ps, "
+        "DATA_REDUCTION= YES, or a coarser mesh",
+    )
+
+
+def _systems(plan: Plan, case: Case) -> list[int]:
+    """Return the unknowns of the systems whose factors are kept together.
+
+    Direct sliding falls apart into one system for each axis where normals lie along axes, and
+    solves for all boundary nodes again where boundaries are curved.
+    """
+    counts = plan.classes.counts()
+    known = counts["moving"] + counts["fixed"]
+    nodes = known + counts["sliding_edge"] + counts["sliding_surface"]
+    normals = plan.constraints(plan.coords)[1] if case.sliding == "ds" else ()
+    if not len(normals):
+        return [nodes]
+    dim = plan.coords.shape[1]
+    along = np.concatenate([np.eye(dim), normals])
+    block = blocks(Rows(np.arange(len(along)), along, np.zeros((len(along), 1))))
+    each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
+    return [int(n) for n in each if n] + [nodes] * plan.tracks.curved
+
+
+def _require_free(needed: float, what: str, remedy: str) -> None:
+    """Raise DeformError when so many bytes are not free."""
+    free = free_memory()
+    if needed > free:
+        raise DeformError(
+            f"{what} {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free; {remedy}"
+        )
+
+
+def free_memory() -> float:
+    """Return the bytes a process may still take; infinite where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:  # noqa: PTH123
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return float(line.split()[1]) * 1024
+    except OSError:
+        pass
+    return float("inf")

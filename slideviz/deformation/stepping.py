@@ -1,0 +1,319 @@
+"""One climb: the steps of a deformation, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.deformation.bounds import unsoundness
+from slideviz.deformation.setup import Plan
+from slideviz.errors import DeformError, Note, UnsoundError
+from slideviz.mesh.halo import Halo
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import quality
+from slideviz.rbf.images import largest_misfit
+from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
+from slideviz.rbf.rows import AGREE
+
+HALVINGS = 3
+"""How often a step that folds a cell is halved."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the work is.
+
+    Attributes
+    ----------
+    step, total : int
+        The step in work (from 1), and all steps.
+    phase : str
+        ``classify``, ``solve``, ``evaluate`` or ``project``.
+    fraction : float
+        Of the phase, 0 to 1.
+    """
+
+    step: int
+    total: int
+    phase: str
+    fraction: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A number of steps that STEPS= auto tried.
+
+    Attributes
+    ----------
+    planned, steps : int
+        Steps asked for, and made: more where folding steps were halved.
+    min, mean : float
+        Quality of the result.
+    inverted : int
+        Inverted cells of the result.
+    """
+
+    planned: int
+    steps: int
+    min: float
+    mean: float
+    inverted: int
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The mesh after one step.
+
+    Attributes
+    ----------
+    index, total : int
+        Number of the step, from 1, and of all steps.
+    mesh : Mesh
+        The deformed mesh.
+    control_nodes : int
+        Nodes in the interpolation system of this step.
+    max_error : float
+        Largest misfit at nodes of known displacement before they are set exactly, in the mesh's
+        length unit.
+    condition : float
+        Estimated condition number of the interpolation system.
+    node_counts : Mapping of str to int
+        ``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``.
+    seconds : Mapping of str to float
+        Spent in this step, by phase; ``classify`` only in the first.
+    warnings : tuple of str
+        What the user should know; those of all steps so far.
+    history : tuple of Cycle
+        Convergence of the greedy selection in this step; empty without data reduction.
+    tried : tuple of Trial
+        The numbers of steps tried by STEPS= auto, in the last step of the run.
+    control : (c,) int64
+        The control nodes of this step; empty where a method has none.
+    periodic_misfit : float or None
+        Largest difference of the displacements of periodic images so far, in the mesh's length
+        unit: rounding, for more is an error. None where images need not move alike.
+    """
+
+    index: int
+    total: int
+    mesh: Mesh
+    control_nodes: int
+    max_error: float
+    condition: float
+    node_counts: Mapping[str, int]
+    seconds: Mapping[str, float]
+    warnings: tuple[str, ...]
+    history: tuple[Cycle, ...] = ()
+    tried: tuple[Trial, ...] = ()
+    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    periodic_misfit: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Climb:
+    """What a climb needs.
+
+    Attributes
+    ----------
+    case, mesh, plan
+        What is asked, the undeformed mesh, and the arrays made of both.
+    tell : callable
+        Receives ``Progress``; may raise to stop.
+    seconds : dict
+        Spent before the first step.
+    """
+
+    case: Case
+    mesh: Mesh
+    plan: Plan
+    tell: Callable[[Progress], None]
+    seconds: dict[str, float]
+
+    def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
+        """Yield the steps that divide the displacement into ``count`` equal parts.
+
+        Parameters
+        ----------
+        halve : bool
+            Whether a step that folds a cell or is unsound is made in two, up to ``HALVINGS`` times.
+
+        Raises
+        ------
+        DeformError
+            A step cannot be solved, or its result cannot be right.
+        """
+        plan, mesh = self.plan, self.mesh
+        ahead = [(k / count, 0) for k in range(1, count + 1)]
+        coords, done, index, folded = plan.coords, 0.0, 0, 0
+        warnings = [*self.case.warnings, *plan.warnings]
+        told: list[str] = []
+        worst = 0.0
+        seconds = dict(self.seconds)
+        before: Solution | None = None
+        while ahead:
+            part, halvings = ahead[0]
+            total = index + len(ahead)
+            watch = Watch(self._report(index + 1, total), seconds)
+            goal = plan.coords[plan.known] + plan.target * part
+            solution = _step(plan, coords, goal, watch, before)
+            moved = _moved(plan, coords, solution.displacement, goal)
+            points = _cartesian(plan, mesh.points, moved)
+            if mesh.halo is not None:
+                points = mesh.halo.follow(mesh.points, points)
+                moved = _followed(plan, mesh.halo, points, moved)
+            if not np.all(np.isfinite(points)):
+                raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
+            unsound = unsoundness(plan, mesh, solution, moved, part)
+            if halve:
+                now = quality(mesh.with_points(points), mesh).inverted
+                if (now > folded or unsound) and halvings < HALVINGS:
+                    ahead[0] = part, halvings + 1
+                    ahead.insert(0, ((done + part) / 2, halvings + 1))
+                    continue
+                folded = now
+            if unsound:
+                raise UnsoundError(f"step {index + 1}: {unsound}")
+            coords, done, index = moved, part, index + 1
+            before = solution
+            ahead.pop(0)
+            if solution.short and solution.max_error > worst:
+                told, worst = [_short_warning(plan, solution, index)], solution.max_error
+            elif not told:
+                told = _dropped_warning(solution, index, mesh)
+            warnings += [f"step {index}: {text}" for text in solution.warnings]
+            yield self._made(index, total, points, solution, watch, [*warnings, *told])
+            seconds = {}
+
+    def _report(self, index: int, total: int) -> Callable[[str, float], None]:
+        return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))
+
+    def _made(
+        self,
+        index: int,
+        total: int,
+        points: FloatArray,
+        solution: Solution,
+        watch: Watch,
+        warnings: list[str],
+    ) -> Step:
+        plan = self.plan
+        return Step(
+            index,
+            total,
+            self.mesh.with_points(points),
+            solution.control_nodes,
+            solution.max_error,
+            solution.condition,
+            plan.classes.counts(),
+            watch.seconds,
+            tuple(warnings),
+            solution.history,
+            control=solution.control,
+            periodic_misfit=largest_misfit(plan.frame, plan.coords, points, plan.images),
+        )
+
+
+def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
+    """Yield the steps with their final number, and the trials in the last."""
+    for step in steps:
+        last = step is steps[-1]
+        yield replace(step, total=len(steps), tried=tried if last else ())
+
+
+def _step(
+    plan: Plan,
+    coords: FloatArray,
+    goal: FloatArray,
+    watch: Watch,
+    before: Solution | None,
+) -> Solution:
+    """Return the displacement of all nodes from ``coords`` to the next step.
+
+    Of periodic images only the one that stands for them is in the problem, and it is copied to
+    the others.
+    """
+    once = plan.once(plan.known)
+    known, classes = plan.known[once], plan.classes
+    normal_nodes, normals = plan.constraints(coords)
+    problem = Problem(
+        basis=plan.basis,
+        features=plan.frame.features(coords),
+        known=known,
+        values=goal[once] - coords[known],
+        edge=classes.edge[plan.once(classes.edge)],
+        surface=classes.surface[plan.once(classes.surface)],
+        normal_nodes=normal_nodes,
+        normals=normals,
+        same_as=plan.same_as,
+        project=lambda nodes, free: plan.project(coords, nodes, free),
+        curved=plan.tracks.curved,
+        cartesian=plan.frame.points,
+        coords=coords,
+        shift=plan.frame.shift(),
+        reduction=plan.reduction,
+        before=before,
+    )
+    found = plan.solve(problem, watch)
+    first, second = plan.images.T
+    found.displacement[second] = found.displacement[first]
+    return found
+
+
+def _moved(
+    plan: Plan, coords: FloatArray, displacement: FloatArray, goal: FloatArray
+) -> FloatArray:
+    """Return the new coordinates; known nodes are where they must be."""
+    displacement[plan.axis, :2] = 0.0
+    # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
+    moved = np.where(displacement == 0, coords, coords + displacement)
+    moved[plan.known] = np.where(goal == plan.coords[plan.known], plan.coords[plan.known], goal)
+    return moved
+
+
+def _cartesian(plan: Plan, points: FloatArray, coords: FloatArray) -> FloatArray:
+    """Return the Cartesian points; nodes whose coordinates did not change keep every bit."""
+    if not plan.frame.cylindrical:
+        return coords
+    rest = np.all(coords == plan.coords, axis=1, keepdims=True)
+    return np.where(rest, points, plan.frame.points(coords))
+
+
+def _followed(plan: Plan, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
+    """Return the coordinates with those of copies where their donors put them.
+
+    Periodic images are in place already, to the bit, and stay.
+    """
+    copies = np.setdiff1d(halo.receivers, plan.images)
+    out = moved.copy()
+    out[copies] = plan.frame.coords(points[copies])
+    return out
+
+
+def _short_warning(plan: Plan, solution: Solution, index: int) -> str:
+    """Return the sentence about a selection that ended above its tolerance."""
+    assert plan.reduction is not None
+    return (
+        f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
+        f"an error of {solution.max_error:.3g}, above its tolerance of "
+        f"{plan.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
+        "their displacement, but what is near them follows by the correction alone"
+    )
+
+
+def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
+    """Return the sentence about nodes that the pivot guard left out."""
+    if not len(solution.dropped):
+        return []
+    node = int(solution.dropped[0])
+    where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
+    sentence = (
+        f"from step {index} on, {len(solution.dropped)} boundary nodes that nearly coincide with "
+        f"others (first: node {node} at {where}) are no control nodes; they still get exactly "
+        f"their displacement, from which the interpolation is off by {solution.dropped_error:.2g} "
+        "at most, and the cells beside them take that up"
+    )
+    harmless = solution.dropped_error <= AGREE * mesh.extent
+    return [Note(sentence) if harmless else sentence]

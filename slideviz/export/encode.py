@@ -1,0 +1,270 @@
+"""Images in a row written as MP4, as GIF, or as numbered PNG files; whole or not at all.
+
+Each writer is a context manager that gives a function: called with an image and the seconds it
+is shown for, it writes one. When the block raises, or its generator is closed, nothing is left.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import SlidevizError
+from slideviz.export.offscreen import png_bytes
+from slideviz.mesh.io.atomic import atomic_write, require_writable
+from slideviz.mesh.io.inputs import require_no_input
+from slideviz.mesh.undone import draft, ended
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+Pixels = NDArray[np.uint8]
+Add = Callable[[Pixels, float], None]
+"""Writes an image (height, width, 3) that is shown for some seconds."""
+
+SUFFIXES = (".mp4", ".gif", ".png")
+SLOWEST = 10
+"""Images in a second of an MP4 at the least: players stumble over fewer. Longer ones repeat."""
+FASTEST = {".mp4": 60.0, ".gif": 50.0, ".png": float("inf")}
+"""Images a second: what screens show, and what browsers play of a GIF."""
+_NUMBER = re.compile(r"(%(?:0\d)?d)")
+
+
+@dataclass(frozen=True)
+class Take:
+    """What a writer has to know before the first image.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    count : int
+        How many images come.
+    fps : float
+        Images a second.
+    samples : callable
+        Gives a few of the images, from all over the film, to choose common colours by.
+    """
+
+    size: tuple[int, int]
+    count: int
+    fps: float
+    samples: Callable[[], Sequence[Pixels]]
+
+
+def kind_of(file: Path) -> str:
+    """Return ".mp4", ".gif" or ".png" (a folder or a pattern of numbered pictures).
+
+    Raises
+    ------
+    SlidevizError
+        It is none of them.
+    """
+    suffix = file.suffix.lower()
+    if file.is_dir() or not (suffix or file.exists()):
+        return ".png"
+    if not suffix:
+        raise SlidevizError(f"{file} is not a folder; end the name of a film with .mp4 or .gif")
+    if suffix not in SUFFIXES:
+        raise SlidevizError(
+            f"{file}: no film can be written as {file.suffix}; end the name with .mp4 or .gif, or "
+            "give a folder or a pattern such as step_%03d.png for one picture each"
+        )
+    if suffix == ".png" and len(_NUMBER.findall(file.name)) != 1:
+        raise SlidevizError(
+            f"{file}: pictures of a film need one number in their name, such as step_%03d.png"
+        )
+    return suffix
+
+
+def targets(file: Path, count: int) -> list[Path]:
+    """Return the files that a film of ``count`` images will be: one, or one for each image."""
+    if kind_of(file) != ".png":
+        return [file]
+    if file.is_dir() or not file.suffix:
+        file = file / f"step_%0{max(len(str(count - 1)), 2)}d.png"
+    before, number, after = _NUMBER.split(file.name)
+    return [file.with_name(f"{before}{number % i}{after}") for i in range(count)]
+
+
+def writer(file: Path, take: Take) -> AbstractContextManager[Add]:
+    """Return the writer that suits the name of the file."""
+    return _WRITERS[kind_of(file)](file, take)
+
+
+@contextmanager
+def _mp4(file: Path, take: Take) -> Iterator[Add]:
+    """Encode with H.264 as every browser plays it."""
+    fps = Fraction(take.fps).limit_denominator(1000)
+    rate = fps * max(1, -(-SLOWEST // fps))
+    with atomic_write(file, SlidevizError) as out, tempfile.TemporaryFile() as log:
+        process = _start_ffmpeg(out.name, take.size, rate, log)
+        pipe = process.stdin
+        assert pipe is not None
+        shown = Fraction(0)
+
+        def add(image: Pixels, seconds: float) -> None:
+            nonlocal shown
+            before, shown = round(shown * rate), shown + Fraction(seconds).limit_denominator(1000)
+            try:
+                for _ in range(max(1, round(shown * rate) - before)):
+                    pipe.write(image.data)
+            except OSError:
+                _raise_ffmpeg(file, process, log)
+
+        with ended(process):
+            yield add
+            try:
+                pipe.close()
+            except OSError:
+                _raise_ffmpeg(file, process, log)
+            if process.wait():
+                _raise_ffmpeg(file, process, log)
+
+
+def _start_ffmpeg(
+    path: str, size: tuple[int, int], rate: Fraction, log: IO[bytes]
+) -> subprocess.Popen[bytes]:
+    import imageio_ffmpeg
+
+    given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
+    # The colours of high definition, and said so: otherwise players guess by the size.
+    said = ":".join(f"{name}=bt709" for name in ("colorspace", "color_primaries", "color_trc"))
+    colours = f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={said}"
+    made = ["-vf", colours, "-c:v", "libx264", "-preset", "veryfast", "-crf", "16"]
+    made += ["-movflags", "+faststart", "-f", "mp4"]
+    try:
+        return subprocess.Popen(
+            [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *given, "-i", "-", *made, path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            # Ctrl+C is for us: ffmpeg would end the film early as if that were its end.
+            start_new_session=True,
+        )
+    except (OSError, RuntimeError) as problem:
+        raise SlidevizError(
+            f"the program ffmpeg, which makes MP4 films, cannot be started ({problem}); install "
+            "it again with `pip install --force-reinstall imageio-ffmpeg`, or write a .gif"
+        ) from problem
+
+
+def _raise_ffmpeg(file: Path, process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
+    process.kill()
+    process.wait()
+    log.seek(0)
+    lines = log.read().decode(errors="replace").strip().splitlines() or ["it gave no reason"]
+    raise SlidevizError(f"{file}: cannot be written: ffmpeg stopped: {lines[-1]}")
+
+
+@contextmanager
+def _gif(file: Path, take: Take) -> Iterator[Add]:
+    """Write image by image, each only where it differs from the one before."""
+    from PIL import GifImagePlugin, Image
+
+    palette = _palette(take.samples())
+    before: NDArray | None = None
+    shown, ticks = 0.0, 0
+    with atomic_write(file, SlidevizError) as out:
+
+        def add(pixels: Pixels, seconds: float) -> None:
+            nonlocal before, shown, ticks
+            image = Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+            colours = np.asarray(image)
+            if before is None:
+                for block in GifImagePlugin.getheader(image.copy(), info={"loop": 0})[0]:
+                    out.write(block)
+            box = _changed(colours, before)
+            before = colours
+            shown += seconds
+            # A GIF counts hundredths of a second: rounded in sum, not one by one.
+            duration = max(round(100 * shown) - ticks, 2)
+            ticks += duration
+            part, length = image.crop(box), 10 * min(duration, 65535)
+            for block in GifImagePlugin.getdata(part, box[:2], duration=length):
+                out.write(block)
+
+        yield add
+        out.write(b";")
+
+
+def _changed(colours: NDArray, before: NDArray | None) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of what differs; one pixel where nothing does."""
+    if before is None:
+        return 0, 0, colours.shape[1], colours.shape[0]
+    differs = colours != before
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return 0, 0, 1, 1
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+def _palette(samples: Sequence[Pixels]) -> Image:
+    """Return an image with 256 colours that suit all samples.
+
+    One half covers all colours there are, however rare (an inverted cell), the other those that
+    fill most of the images (shades of the colour map), which the first half would make coarse.
+    """
+    from PIL import Image
+
+    sheet = Image.fromarray(np.concatenate([image[::2, ::2] for image in samples]))
+    rare = sheet.quantize(128, method=Image.Quantize.MAXCOVERAGE)
+    many = sheet.quantize(128, method=Image.Quantize.MEDIANCUT, kmeans=3)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette((rare.getpalette() or [])[:384] + (many.getpalette() or [])[:384])
+    return palette
+
+
+@contextmanager
+def _pngs(file: Path, take: Take) -> Iterator[Add]:
+    """Write each image as a picture; those of before stay until the last one is there."""
+    paths = targets(file, take.count)
+    folder = paths[0].parent
+    is_new = not folder.exists()
+    try:
+        with _told(file):
+            folder.mkdir(exist_ok=True)
+        require_writable(paths[0], SlidevizError)
+        for path in paths:
+            require_no_input(path, SlidevizError)
+        with draft(folder, is_folder=True) as drawer:
+            drawn: list[Path] = []
+
+            def add(image: Pixels, _: float) -> None:
+                drawn.append(drawer / str(len(drawn)))
+                with _told(file):
+                    drawn[-1].write_bytes(png_bytes(image))
+
+            yield add
+            with _told(file):
+                for done, path in zip(drawn, paths, strict=True):
+                    done.replace(path)
+    except BaseException:
+        if is_new and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
+
+
+@contextmanager
+def _told(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as problem:
+        raise SlidevizError(f"{file}: cannot be written: {problem.strerror}") from problem
+
+
+_WRITERS: dict[str, Callable[[Path, Take], AbstractContextManager[Add]]] = {
+    ".mp4": _mp4,
+    ".gif": _gif,
+    ".png": _pngs,
+}

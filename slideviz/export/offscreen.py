@@ -1,0 +1,132 @@
+"""An off-screen plotter, its letters, and its image as numbers or as a PNG file."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.color_scheme import Look
+from slideviz.errors import SlidevizError
+from slideviz.export.screen import x_answers
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.scene.color_legend import set_letters
+
+SMALLEST, LARGEST = 64, 8192
+"""Pixels that a picture may be wide or high; graphics drivers draw no larger ones."""
+TITLE = 16
+"""Height of the title's letters in pixels, at normal size."""
+_NORMAL_HEIGHT = 620
+"""A picture this high has letters of normal size."""
+CAPTION_AT = 0.02
+"""Where in the width the words above a picture or a film begin."""
+LETTERS = 1.25
+"""Letters of a film are this much larger than those of the view: it is often shown small."""
+
+
+@contextmanager
+def offscreen(size: tuple[int, int]) -> Iterator[Any]:
+    """Give an off-screen plotter of ``size`` pixels that works without a screen, too.
+
+    Raises
+    ------
+    SlidevizError
+        The size is not one that can be drawn.
+    """
+    import pyvista as pv
+
+    check_size(size)
+    if sys.platform.startswith("linux") and not x_answers():
+        # VTK would first try X, and complain, before it turns to EGL.
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    plotter = pv.Plotter(off_screen=True, window_size=list(size))
+    try:
+        plotter.set_background("white")
+        plotter.enable_anti_aliasing("msaa", multi_samples=8)
+        yield plotter
+    finally:
+        plotter.close()
+
+
+def check_size(size: tuple[int, int]) -> None:
+    """Raise SlidevizError when a picture cannot have this width and height in pixels."""
+    if not all(SMALLEST <= length <= LARGEST for length in size):
+        raise SlidevizError(
+            f"a picture of {size[0]}x{size[1]} pixels cannot be drawn; width and height are "
+            f"{SMALLEST} to {LARGEST}"
+        )
+
+
+def font_scale(size: tuple[int, int]) -> float:
+    """Return how much larger than normal the letters of a picture are."""
+    return max(size[1] / _NORMAL_HEIGHT, 0.6)
+
+
+def write_title(plotter: Any, words: str, look: Look, letters: float = TITLE) -> None:
+    """Write ``words``, a line or two, along the upper edge, in place of what stood there.
+
+    They begin at the left, so that those of a film do not tremble when a digit more comes, and
+    pictures have them where films do. ``letters`` is their height in pixels, at normal size.
+    """
+    import pyvista as pv
+
+    scale = font_scale(tuple(plotter.window_size))
+    title = pv.Text(words)
+    set_letters(title.prop, look, letters * scale)
+    title.prop.SetLineSpacing(1.25)
+    # The mesh of a view that was zoomed into may lie behind.
+    title.prop.SetBackgroundColor(*pv.Color(look.background_top).float_rgb)
+    title.prop.SetBackgroundOpacity(0.7)
+    title.prop.SetVerticalJustificationToCentered()
+    title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+    middle = (10 + 10 * len(words.splitlines())) * scale
+    title.GetPositionCoordinate().SetValue(CAPTION_AT, 1.0 - middle / plotter.window_size[1])
+    plotter.add_actor(title, name="title", reset_camera=False, render=False)
+
+
+def resize(plotter: Any, size: tuple[int, int]) -> None:
+    """Give the next image of a plotter another size; pyvista's way would draw one at once."""
+    plotter.render_window.SetSize(*size)
+
+
+def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
+    """Return what the plotter shows, (height, width, 3), or 4 when ``transparent``."""
+    plotter.render()
+    image = plotter.screenshot(return_img=True, transparent_background=transparent)
+    return np.ascontiguousarray(image, dtype=np.uint8)
+
+
+def png_bytes(image: NDArray[np.uint8]) -> bytes:
+    """Return an image (height, width, 3 or 4) as a PNG file."""
+    from PIL import Image
+
+    data = BytesIO()
+    Image.fromarray(image).save(data, format="PNG", optimize=False)
+    return data.getvalue()
+
+
+def check_png(file: Path) -> None:
+    """Raise SlidevizError when the name of a picture does not end with .png."""
+    if file.suffix.lower() != ".png":
+        raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
+
+
+def write_png(plotter: Any, file: Path, transparent: bool = False) -> None:
+    """Write what the plotter shows as a PNG file, whole or not at all.
+
+    Raises
+    ------
+    SlidevizError
+        The name does not end with .png, or the file cannot be written.
+    """
+    check_png(file)
+    data = png_bytes(image_of(plotter, transparent))
+    with atomic_write(file) as out:
+        out.write(data)

@@ -1,0 +1,283 @@
+"""Draws pictures for papers and slides of what a view shows, off-screen."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import ExitStack
+from io import BytesIO
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slideviz.color_scheme import PAPER, Look
+from slideviz.export.mark_words import name_mark
+from slideviz.export.offscreen import (
+    LETTERS,
+    TITLE,
+    check_png,
+    check_size,
+    image_of,
+    offscreen,
+    resize,
+    write_title,
+)
+from slideviz.export.picture_options import GAP, Figure, panes, title_of, titles_of
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.surfaces import Surface
+from slideviz.session.changes import seen_beside, show_frame
+from slideviz.session.pieces import appearing, whole
+from slideviz.session.state import Session
+
+if TYPE_CHECKING:
+    from slideviz.export.encode import Pixels
+    from slideviz.scene.scene import Scene
+
+
+class Studio:
+    """Draws pictures of a session off-screen, one after the other, into memory or a file.
+
+    Parameters
+    ----------
+    session : Session
+        What is shown and how.
+    surfaces : sequence of Surface
+        The boundaries of its mesh.
+    like : Scene, optional
+        The view whose camera, colours and ghosts are taken.
+    """
+
+    def __init__(
+        self, session: Session, surfaces: Sequence[Surface], like: Scene | None = None
+    ) -> None:
+        self.session = session
+        self.surfaces = surfaces
+        self.like = like
+        self._stack = ExitStack()
+        self._plotter: Any = None
+        self._scene: Any = None
+        self._making = self._make()
+
+    def arranging(self) -> Iterator[None]:
+        """Yield between the pieces of what has to be done before the first picture.
+
+        Where nobody pulls all of it, the first picture does the rest at once.
+        """
+        # Not "yield from": whoever stops pulling would end it.
+        for _ in self._making:
+            yield
+
+    def _make(self) -> Iterator[None]:
+        from slideviz.scene.scene import Scene
+
+        self._plotter = self._stack.enter_context(offscreen((640, 400)))
+        yield
+        self._plotter.render_window.Render()  # begins with the graphics
+        yield
+        self._scene = Scene(self._plotter, PAPER)
+        yield from self._scene.opening(Figure().showing(self.session), self.surfaces)
+        if self.like is not None:
+            self._scene.set_motion_ghosts(self.like.motion_ghosts)
+        yield from appearing(self._plotter)
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the graphics back."""
+        self._stack.close()
+
+    @property
+    def beside(self) -> Session | None:
+        """Return the session that the second view shows, if there is one."""
+        other = self.session.view.beside
+        if other is None or (other and self.session.run(other) is None):
+            return None
+        return seen_beside(self.session)
+
+    def image(self, figure: Figure) -> Pixels:
+        """Return the picture, (height, width, 3), or 4 when it is transparent.
+
+        Raises
+        ------
+        SlidevizError
+            The size cannot be drawn.
+        """
+        return whole(self.picturing(figure))
+
+    def picturing(
+        self, figure: Figure, aim: bool = True, frame: int | None = None
+    ) -> Generator[None, None, Pixels]:
+        """Return what `image` does, and yield between the pieces of that.
+
+        Nothing else may be drawn meanwhile.
+
+        Parameters
+        ----------
+        figure : Figure
+        aim : bool
+            Whether to aim the camera; else it stays where it was for the last picture.
+        frame : int, optional
+            Another step than the session shows.
+        """
+        check_size(figure.size)
+        shown = self.session if frame is None else show_frame(self.session, frame)
+        yield from self.arranging()
+        other = self.beside if figure.both else None
+        if other is None:
+            return (yield from self._pane(shown, figure, aim))
+        pair = ordered(shown, other)
+        gap = max(round(GAP * figure.scale), 1)
+        first, second = panes(figure, gap)
+        titles, part = titles_of(pair, first)
+        left = yield from self._pane(pair[0], first, aim, (titles[0], part))
+        # The same camera, so that a length is as long in both.
+        right = yield from self._pane(pair[1], second, False, (titles[1], part))
+        between = np.repeat(left[:, -1:], gap, axis=1)
+        return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
+
+    def pose(self, figure: Figure, frame: int | None = None) -> Scene:
+        """Return the scene, its camera and colours as for a picture; for a film like it."""
+        shown = self.session if frame is None else show_frame(self.session, frame)
+        for _ in self.arranging():
+            pass
+        self._prepare(shown, figure)
+        scene: Scene = self._scene
+        return scene
+
+    def window(self, figure: Figure) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return from where to where a picture of a 2D mesh reaches in x and in y."""
+        self.pose(figure)
+        camera, (width, height) = self._plotter.camera, figure.size
+        unit = 2.0 * camera.parallel_scale / height
+        found = []
+        for centre, length, shift in zip(
+            camera.focal_point[:2], (width, height), camera.GetWindowCenter(), strict=True
+        ):
+            low = centre - 0.5 * length * (1.0 - shift) * unit
+            found.append((float(low), float(low + length * unit)))
+        return found[0], found[1]
+
+    def write(self, figure: Figure, file: Path) -> None:
+        """Write the picture as a PNG file, whole or not at all.
+
+        Raises
+        ------
+        SlidevizError
+            The size cannot be drawn, the name does not end with .png, or the file cannot be
+            written.
+        """
+        from PIL import Image
+
+        check_png(file)
+        data = BytesIO()
+        known = {} if figure.dpi is None else {"dpi": (figure.dpi, figure.dpi)}
+        Image.fromarray(self.image(figure)).save(data, format="PNG", **known)
+        with atomic_write(file) as out:
+            out.write(data.getvalue())
+
+    def _pane(
+        self,
+        session: Session,
+        figure: Figure,
+        aim: bool = True,
+        title: tuple[str, float] | None = None,
+    ) -> Generator[None, None, Pixels]:
+        self._prepare(session, figure, aim)
+        yield
+        plotter = self._plotter
+        plotter.remove_actor("title", reset_camera=False, render=False)
+        if figure.headed and session.frame is not None:
+            words, part = title or (title_of(session, figure), 1.0)
+            write_title(plotter, words, self._scene.look)
+            # Of the same size as the other letters; of a film as they are there.
+            drawn = plotter.actors["title"]
+            scale = figure.scale / (LETTERS if figure.film else 1.0)
+            drawn.prop.SetFontSize(round(TITLE * scale * part))
+            high = 1.0 - 0.5 * figure.title_room * scale / figure.size[1]
+            drawn.GetPositionCoordinate().SetValue(drawn.GetPosition()[0], high)
+        name_mark(plotter, self._scene, figure.scale)
+        return image_of(plotter, figure.background == "transparent")
+
+    def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
+        plotter, scene = self._plotter, self._scene
+        resize(plotter, figure.size)
+        scene.stage.font_scale = figure.scale
+        scene.stage.has_legend = figure.legend
+        scene.stage.has_plate = figure.background != "transparent"
+        scene.update(figure.showing(session))
+        scene.set_look(self._look(figure))
+        if figure.background == "transparent":
+            plotter.set_background("white")  # a gradient would stay opaque
+        if aim:
+            self._aim(figure)
+        self._keep_room(figure)
+
+    def _look(self, figure: Figure) -> Look:
+        return self.like.look if figure.background == "shown" and self.like is not None else PAPER
+
+    def _aim(self, figure: Figure) -> None:
+        """Look from where the view looks."""
+        scene, camera = self._scene, self._plotter.camera
+        if self.like is not None:
+            scene.take_camera(self.like)
+        if figure.fill:
+            scene.fit()
+        elif self.like is not None:
+            _keep_width(scene, self.like)
+        if camera.parallel_projection:
+            camera.parallel_scale = camera.parallel_scale / (1.0 - self._top(figure))
+
+    def _top(self, figure: Figure) -> float:
+        """Return which part of the height is the title's."""
+        return min(figure.title_room * figure.scale / figure.size[1], 0.3) if figure.headed else 0.0
+
+    def _keep_room(self, figure: Figure) -> None:
+        """Keep the rooms of legend and title free of the mesh."""
+        right = self._scene.stage.strip() / figure.size[0]
+        self._plotter.camera.SetWindowCenter(right, self._top(figure))
+        self._plotter.renderer.ResetCameraClippingRange()
+
+
+def ordered(first: Session, second: Session) -> tuple[Session, Session]:
+    """Return what two views show as they stand, the left one first."""
+    return (second, first) if first.view.swapped else (first, second)
+
+
+def _keep_width(scene: Scene, like: Scene) -> None:
+    """See as much of the width as another view does, in a picture that is less wide."""
+    free = []
+    for one in (scene, like):
+        width, height = one.plotter.window_size
+        free.append(max(width - one.stage.strip(), 1.0) / max(height, 1))
+    if scene.plotter.camera.parallel_projection and free[0] < free[1]:
+        scene.plotter.camera.parallel_scale *= free[1] / free[0]
+
+
+def sees_all(scene: Scene) -> bool:
+    """Tell whether the whole mesh is in a view, so that a picture of it may show it larger."""
+    mesh, plotter = scene.session.mesh, scene.plotter
+    if mesh is None:
+        return True
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    box = np.zeros((2, 3))
+    box[0, : mesh.dim], box[1, : mesh.dim] = low, high
+    renderer = plotter.renderer
+    for corner in np.ndindex(2, 2, 2):
+        place = [*box[corner, range(3)], 1.0]
+        renderer.SetWorldPoint(*place)
+        renderer.WorldToDisplay()
+        x, y, _ = renderer.GetDisplayPoint()
+        width, height = plotter.window_size
+        if not (-0.02 * width <= x <= 1.02 * width and -0.02 * height <= y <= 1.02 * height):
+            return False
+    return True

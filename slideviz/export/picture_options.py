@@ -1,0 +1,161 @@
+"""What a picture of a view has: size, background, legend, title; for papers and slides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from slideviz.export.offscreen import CAPTION_AT, SMALLEST, font_scale
+from slideviz.export.titles import (
+    LETTER_WIDTH,
+    LONGEST,
+    fitting,
+    name_words,
+    pair_titles,
+    place_words,
+    title_words,
+)
+from slideviz.scene.color_legend import STRIP
+from slideviz.session.state import Frame, Session
+
+Background = Literal["white", "shown", "transparent"]
+BACKGROUNDS: dict[Background, str] = {
+    "white": "white",
+    "shown": "as in the view",
+    "transparent": "transparent",
+}
+"""What is behind the mesh, and the words for it."""
+TITLE_ROOM = 40.0
+"""Pixels at the top that are the title's, at normal letter size; a second line has 20 more."""
+GAP = 12.0
+"""Pixels between two pictures beside each other, at normal letter size."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What a picture of a view has.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    background : {"white", "shown", "transparent"}
+    legend, edges, triad : bool
+        The legend of roles or the colour bar; edges of cells; directions of the axes.
+    title : bool
+        A line that says what is shown, with minimum, mean and inverted cells.
+    fill : bool
+        Make the whole mesh fill the picture, instead of showing what the view shows of it.
+    both : bool
+        Draw the run of the second view, too, where there is one.
+    letters : float
+        How large letters are; 1 is 13 pixels in 620 of the height.
+    dpi : float or None
+        Pixels per inch on paper, for programs that place the picture.
+    film : bool
+        Whether it is an image of a film.
+    named : bool
+        Say which run it is also without a title: it stands beside that of another.
+    marked : bool
+        Draw the cell that is marked, if one is, and name it.
+    lines : int
+        Lines of the title.
+    """
+
+    size: tuple[int, int] = (1600, 1000)
+    background: Background = "white"
+    legend: bool = True
+    edges: bool = True
+    triad: bool = False
+    title: bool = False
+    fill: bool = True
+    both: bool = True
+    letters: float = 1.25
+    dpi: float | None = None
+    film: bool = False
+    named: bool = False
+    marked: bool = True
+    lines: int = 1
+
+    @property
+    def headed(self) -> bool:
+        """Tell whether there are words above the picture."""
+        return self.title or self.named
+
+    @property
+    def title_room(self) -> float:
+        """Return how many pixels at the top are the title's, at normal letter size."""
+        return TITLE_ROOM + 20.0 * (self.lines - 1)
+
+    @property
+    def scale(self) -> float:
+        """Return how much larger than 13 pixels the letters are."""
+        return font_scale(self.size) * self.letters
+
+    def within(self, box: tuple[int, int]) -> Figure:
+        """Return the same picture as large as it can be in a box of pixels."""
+        width, height = self.size
+        part = min(box[0] / width, box[1] / height, 1.0)
+        size = tuple(max(round(part * length), SMALLEST) for length in self.size)
+        letters = part * self.scale / font_scale((size[0], size[1]))
+        return replace(self, size=(size[0], size[1]), letters=letters)
+
+    def showing(self, session: Session) -> Session:
+        """Return the session as the picture shows it: nothing selected, no clutter."""
+        view = replace(
+            session.view,
+            legend=self.legend,
+            edges=self.edges,
+            triad=self.triad,
+            # Of a result, it would hide what is to be seen.
+            motion_ghost=session.view.motion_ghost and session.view.colour_by == "role",
+            selected=(),
+            marked=session.view.marked if self.marked else None,
+        )
+        return replace(session, view=view)
+
+
+def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
+    """Return the two pictures beside each other that a picture of two runs is made of.
+
+    The legend is at the right of the second; both have the same room for the mesh.
+    """
+    width, height = figure.size
+    strip = STRIP * figure.scale if figure.legend else 0.0
+    first = max(round((width - strip - gap) / 2.0), 1)
+    sizes = (first, height), (max(width - first - gap, 1), height)
+    # Letters go by the height, which is that of the whole.
+    lines = 2 if figure.title else 1
+    left, right = (replace(figure, size=size, named=True, lines=lines) for size in sizes)
+    return replace(left, legend=False), right
+
+
+def title_of(session: Session, figure: Figure) -> str:
+    """Return the words above a picture: run, step and quality; less where it is narrow."""
+    frame: Frame | None = session.frame
+    assert frame is not None
+    steps = len(session.frames) - 1
+    at, letters = min(session.view.frame, steps), figure.size[0] / (LETTER_WIDTH * figure.scale)
+    if not figure.title:
+        return name_words(session, letters)
+    longest = LONGEST.format(steps) if figure.film else ""
+    return title_words(session, frame, place_words(at, steps), letters, longest)
+
+
+def titles_of(pair: Sequence[Session], figure: Figure) -> tuple[list[str], float]:
+    """Return the words above two pictures beside each other, and how large their letters are.
+
+    ``figure`` is the narrower of both; 1 is the size of other titles.
+    """
+    letters = (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / (LETTER_WIDTH * figure.scale)
+    return fitting(pair_titles(pair, figure.title), letters)
+
+
+def words_of_size(figure: Figure) -> str:
+    """Return how large a picture is on paper, or in pixels, in words."""
+    width, height = figure.size
+    if figure.dpi is None:
+        return f"{width} × {height} pixels"
+    across, high = (2.54 * length / figure.dpi for length in figure.size)
+    return f"{across:.1f} × {high:.1f} cm on paper, {width} × {height} pixels"

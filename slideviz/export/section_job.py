@@ -1,0 +1,134 @@
+"""The picture of a section as a job beside the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.export.titles import pair_names
+from slideviz.plots.around import surroundings
+from slideviz.plots.section_paint import paint
+from slideviz.plots.section_picture import SectionStyle, require_picture_name, section_picture
+from slideviz.plots.section_picture_pair import Shown, pair_picture
+from slideviz.scene.passages import Period, matrices
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.sections.threshold import Choice
+from slideviz.session.changes import UNDEFORMED, seen_beside
+from slideviz.session.jobs import Doing, Report, Stopped, require_going
+from slideviz.session.passages import show_passages
+from slideviz.session.runs_words import run_words
+from slideviz.session.state import Session
+from slideviz.terms import quantity_of
+
+_SHOWN = "shown: "
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Width and most height of a picture in pixels, and pixels per inch where it is for paper."""
+
+    size: tuple[int, int]
+    dpi: float | None = None
+
+    @classmethod
+    def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
+        """Return that of a picture so large on paper."""
+        return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
+
+
+def save_section(
+    path: Path,
+    session: Session,
+    section: Section,
+    paper: Paper,
+    report: Report,
+    stopped: Stopped,
+) -> Path:
+    """Write the picture of a section as the view shows it: step, colours, neighbours.
+
+    Of two views beside each other both are in it.
+
+    Raises
+    ------
+    CaseError
+        No mesh is open, the section cuts no cell that is shown, the name has another end than a
+        picture's, or the file cannot be written.
+    """
+    if session.frame is None:
+        raise CaseError("no mesh is open, so there is no section to draw")
+    require_picture_name(path)
+    report(Doing(f"Cutting for {path.name}"))
+    views = shown_views(session)
+    shown = [_shown(*one, section) for one in zip(views, pair_names(views), strict=True)]
+    if not any(one.drawn for one in shown) and shown[0].note:
+        words = shown[0].note.removeprefix(_SHOWN)
+        raise CaseError(
+            f"{section.describe()}: it cuts no cell that is shown ({words}), so there is "
+            "nothing to draw; show all cells, or a wider range of them"
+        )
+    require_going(stopped)
+    report(Doing(f"Drawing {path.name}"))
+    name = session.path.name if session.path is not None else ""
+    style = SectionStyle(paper.size, True, session.view.edges, name=name, dpi=paper.dpi)
+    if len(shown) == 2:
+        pair_picture((shown[0], shown[1]), section, path, style)
+        return path
+    (one,) = shown
+    style = replace(style, state=state_words(session), note=one.note)
+    section_picture(one.pieces, section, one.paint, path, style, one.around)
+    return path
+
+
+def shown_views(session: Session) -> tuple[Session, ...]:
+    """Return what the views show, the left one first: the session, or that and the one beside."""
+    other = session.view.beside
+    if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return (session,)
+    second = seen_beside(session)
+    return (second, session) if session.view.swapped else (session, second)
+
+
+def _shown(session: Session, name: str, section: Section) -> Shown:
+    """Return what a section shows of a view that is called so."""
+    frame = session.frame
+    assert frame is not None
+    by = session.view.colour_by
+    painted = paint(frame.mesh, frame.quality, quantity_of(by), session.mesh)
+    painted = replace(painted, colour_map=session.view.colour_map)
+    if by != "role":
+        painted = painted.within(*session.colour_range)
+    around = matrices(session, Period().of(session) if session.view.copies else None)
+    every = {0: np.eye(4)} | around
+    cutter, points = Cutter.of(frame.mesh), frame.mesh.points
+    only = _choice(session, section)
+    at = session.view.frame
+    return Shown(
+        show_passages(cutter, points, section, every, only),
+        painted,
+        surroundings(cutter, points, every),
+        name,
+        f"step {min(at, len(session.frames) - 1)}" if at else "",
+        "" if only is None else _SHOWN + only.words,
+    )
+
+
+def _choice(session: Session, section: Section) -> Choice | None:
+    """Return the cells that the range of the view leaves; a curve goes through all of them."""
+    frame, threshold = session.frame, session.view.threshold
+    curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
+    if frame is None or threshold is None or curve:
+        return None
+    return Choice.of(frame.shown_values(session.view.colour_by, session.mesh), threshold)
+
+
+def state_words(session: Session) -> str:
+    """Return which run and step a session shows, and how it was computed."""
+    run = session.run_shown
+    if run is None or session.view.frame == 0:
+        return "undeformed"
+    step = min(session.view.frame, len(run.frames))
+    return f"run {run.number}, {run_words(run)}, step {step}"

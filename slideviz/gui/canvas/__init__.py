@@ -1,1 +1,0 @@
-"""The 3D view and the flat ones beside it, with the handles in them."""

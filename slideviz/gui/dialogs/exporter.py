@@ -1,0 +1,199 @@
+"""What is taken away from a window: pictures, films, tables of quality, meshes of all steps."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from qtpy.QtCore import QObject
+
+from slideviz.errors import SlidevizError
+from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.picture_options import Figure
+from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
+from slideviz.gui.dialogs.film import FilmDialog
+from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
+from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
+from slideviz.session import changes, jobs_export
+
+log = logging.getLogger("slideviz")
+COPIED_WIDTH = 1600
+"""Pixels that a picture on the clipboard is wide at least."""
+
+
+class Exports(QObject):
+    """The exports of a window."""
+
+    def __init__(self, window) -> None:
+        super().__init__(window)
+        self.window = window
+        self.film: FilmDialog | None = None
+
+    @property
+    def _session(self):
+        return self.window.store.session
+
+    def _studio(self) -> Studio:
+        viewing = self.window.viewing
+        return Studio(self._session, viewing.surfaces, viewing.scene)
+
+    # Pictures --------------------------------------------------------------------------
+
+    def picture(self) -> None:
+        """Ask what a picture has and how large it is, then for a name, and write it."""
+        if self._session.mesh is None:
+            return
+        view, settings = self.window.viewing, self.window.settings
+        with self._studio() as studio:
+            kept = str(settings.value("picture", ""))
+            dialog = PictureDialog(self.window, studio, (view.width(), view.height()), kept)
+            accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
+            figure, kept = dialog.figure, dialog.choices
+            dialog.deleteLater()
+            if not accepted:
+                return
+            settings.setValue("picture", kept)
+            default = self.window.files.folder() / f"{self.window.files.stem()}.png"
+            filters = picture_filters(self._session)
+            path = questions.ask_save(self.window, "Export picture", default, filters)
+            if path is not None:
+                self._write_picture(studio, figure, path)
+
+    def _write_picture(self, studio: Studio, figure: Figure, path: Path) -> None:
+        try:
+            with wait_cursor():
+                if path.suffix.lower() in SUFFIXES:
+                    write_vector(studio, figure, path)
+                else:
+                    studio.write(figure, path)
+        except (OSError, SlidevizError) as error:
+            self.window.banner.tell_error(error)
+            return
+        self._written(path)
+
+    def copy_picture(self) -> None:
+        """Put a picture of what is shown on the clipboard, with a white background."""
+        if self._session.mesh is None:
+            return
+        view = self.window.viewing
+        width, height = max(view.width(), 64), max(view.height(), 64)
+        larger = max(COPIED_WIDTH / width, 1.0)
+        size = round(larger * width), round(larger * height)
+        shown = self._session.view
+        with self._studio() as studio, wait_cursor():
+            figure = Figure(
+                size,
+                legend=shown.legend,
+                edges=shown.edges,
+                fill=sees_all(view.scene),
+                letters=LETTERS * size[0] / size[1] / 1.6,
+            )
+            copy_image(to_image(studio.image(figure)))
+        self.window.say(f"Copied a picture of {size[0]} × {size[1]} pixels")
+
+    # Films -----------------------------------------------------------------------------
+
+    def make_film(self) -> None:
+        """Ask how a film of the steps is made, and make it while the window goes on."""
+        if self.film is not None:
+            self.film.raise_()
+            self.film.activateWindow()
+            return
+        if len(self._session.frames) < 2:
+            return
+        dialog = FilmDialog(self.window, self._studio(), self._ask_film)
+        self.film = dialog
+        dialog.made.connect(self._written)
+        dialog.failed.connect(self.window.banner.tell_error)
+        dialog.stopped.connect(lambda: self.window.say("The film was stopped; no file is left"))
+        dialog.finished.connect(self._film_closed)
+        dialog.show()
+
+    def _ask_film(self, kind: str) -> Path | None:
+        files = self.window.files
+        stem = f"{files.stem()}_steps"
+        if kind:
+            filters = {".mp4": "MP4 film (*.mp4)", ".gif": "GIF film (*.gif)"}[kind]
+            path = questions.ask_save(
+                self.film, "Export film", files.folder() / f"{stem}{kind}", filters
+            )
+            return path.with_suffix(kind) if path is not None else None
+        folder = questions.ask_folder(self.film, "Folder for the pictures", files.folder())
+        return new_folder(folder, stem.replace(".", "_")) if folder is not None else None
+
+    def _film_closed(self) -> None:
+        if self.film is not None:
+            self.film.deleteLater()
+            self.film = None
+
+    def end(self) -> None:
+        """Stop what is being filmed: its mesh is closed."""
+        if self.film is not None:
+            self.film.reject()
+
+    # Tables and meshes -----------------------------------------------------------------
+
+    def quality(self) -> None:
+        """Ask for a name and write the quality of every cell of the step that is shown."""
+        frame, files = self._session.frame, self.window.files
+        if frame is None or self.window.runner.busy:
+            return
+        default = files.folder() / f"{files.stem()}_quality.csv"
+        path = questions.ask_save(self.window, "Export quality", default, "CSV table (*.csv)")
+        if path is not None:
+            self.window.start_job(
+                f"Saving {path.name}", self._written, jobs_export.save_quality, path, frame
+            )
+
+    def steps(self) -> None:
+        """Ask for a name and write the mesh of every step, with a number behind the name."""
+        session, files = self._session, self.window.files
+        run = session.run_shown
+        if run is None or not run.frames or self.window.runner.busy:
+            return
+        default = files.folder() / f"{files.stem()}_step.su2"
+        title = f"Save {len(run.frames)} steps: each name gets a number, as in NAME_1.su2"
+        filters = questions.mesh_filters(session.mesh)
+        path = questions.ask_numbered(self.window, title, default, filters)
+        if path is None:
+            return
+        there = [one for one in jobs_export.step_paths(path, len(run.frames)) if one.exists()]
+        if there and not questions.ask_replace(self.window, there):
+            return
+        self.window.start_job(
+            "Saving the steps",
+            lambda paths: self._steps_written(paths, run.number),
+            jobs_export.save_steps,
+            path,
+            run.frames,
+        )
+
+    def _steps_written(self, paths: list[Path], number: int) -> None:
+        run = self._session.run_shown
+        if run is not None and run.number == number and len(run.frames) == len(paths):
+            self.window.store.change(changes.saved_mesh)
+        self._written(paths[-1])
+        self.window.say(f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}")
+
+    def _written(self, path: Path) -> None:
+        self.window.settings.setValue("folder", str(path.parent))
+        log.info("wrote %s", path)
+        self.window.say(f"Saved {path}")
+
+
+def picture_filters(session) -> str:
+    """Return the formats that a picture of a session can be saved in."""
+    mesh = session.mesh
+    if mesh is None or mesh.dim != 2 or len(mesh.cells) > MOST_CELLS:
+        return questions.PICTURE_FILTERS
+    return f"{questions.PICTURE_FILTERS};;SVG drawing (*.svg);;PDF drawing (*.pdf)"
+
+
+def new_folder(parent: Path, name: str) -> Path:
+    """Return a folder of that name that does not exist yet; a number is added where it does."""
+    path, number = parent / name, 1
+    while path.exists():
+        number += 1
+        path = parent / f"{name}_{number}"
+    return path

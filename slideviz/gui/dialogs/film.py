@@ -1,0 +1,203 @@
+"""The dialog for films: how one is made, its first and last image, and its progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+from qtpy.QtCore import QSize, Qt, QTimer, Signal
+from qtpy.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.export.exposure import Drawn
+from slideviz.export.film import filming_of
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
+from slideviz.export.reel import Reel
+from slideviz.gui.dialogs.film_form import FilmForm
+from slideviz.gui.responsiveness.turns import Turns, raise_again
+from slideviz.gui.widgets.bar import QuietBar
+from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, to_image
+from slideviz.scene.scene import Scene
+from slideviz.session.pieces import Beside
+
+PREVIEW = (360, 225)
+
+
+class FilmDialog(QDialog):
+    """Asks how a film is made and makes it, a piece in each turn of the event loop.
+
+    Parameters
+    ----------
+    parent : QWidget
+    studio : Studio
+        Knows the session, whose steps are filmed whatever the window shows meanwhile.
+    ask : callable
+        Returns the file for a kind of `slideviz.gui.dialogs.film_form.KINDS`, or None.
+
+    Signals
+    -------
+    made(Path), failed(Exception), stopped()
+        How a film ended.
+    """
+
+    made = Signal(object)
+    failed = Signal(object)
+    stopped = Signal()
+
+    def __init__(self, parent: QWidget, studio: Studio, ask: Callable[[str], Path | None]) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Export film")
+        self.studio = studio
+        self._ask = ask
+        self._file: Path | None = None
+        self._turns, self._previewing = Turns(self), Turns(self)
+        self._turns.came.connect(self._came)
+        self._turns.done.connect(self._done)
+        self._turns.failed.connect(self._failed)
+        self._previewing.failed.connect(raise_again)
+        self.form = FilmForm(studio)
+        self.form.changed.connect(self._changed)
+        outer = QVBoxLayout(self)
+        outer.addLayout(self._make_previews())
+        outer.addWidget(self.form)
+        self.words = QLabel()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
+        self.words.setWordWrap(True)
+        outer.addWidget(self.words)
+        self.bar = QuietBar()
+        outer.addWidget(self.bar)
+        outer.addWidget(self._make_buttons())
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(120)
+        self._soon.timeout.connect(self._draw)
+        self._changed()
+        self._show_filming(False)
+
+    # Parts -----------------------------------------------------------------------------
+
+    def _make_previews(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self.previews = []
+        for word in ("First image", "Last image"):
+            column, title, picture = QVBoxLayout(), QLabel(word), QLabel()
+            title.setProperty("hint", True)
+            picture.setFixedSize(QSize(PREVIEW[0] + 2, PREVIEW[1] + 2))
+            picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
+            picture.setAccessibleName(word)
+            self.previews.append(picture)
+            column.addWidget(title)
+            column.addWidget(picture)
+            row.addLayout(column)
+        return row
+
+    def _make_buttons(self) -> QDialogButtonBox:
+        buttons = QDialogButtonBox()
+        self.make = buttons.addButton("Make film…", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.stop = buttons.addButton("Stop", QDialogButtonBox.ButtonRole.ActionRole)
+        self.close_button = buttons.addButton(QDialogButtonBox.StandardButton.Close)
+        self.make.clicked.connect(self._start)
+        self.stop.clicked.connect(self.cancel)
+        self.stop.setToolTip("Stop filming; no file is left.")
+        buttons.rejected.connect(self.reject)
+        return buttons
+
+    def _changed(self) -> None:
+        problem = self.form.problem()
+        self.words.setText(problem or self.form.words)
+        self.words.setProperty("bad", bool(problem))
+        self.words.style().polish(self.words)
+        self.make.setEnabled(not problem)
+        self._soon.start()
+
+    def _draw(self) -> None:
+        if not self.filming:
+            self._previewing.start(self._drawing())
+
+    def _drawing(self) -> Generator[object, Any, None]:
+        """Draw the first and the last image, from one place, in pieces."""
+        figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
+        yield from self._pose(figure)
+        for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
+            pixels = yield from self.studio.picturing(figure, aim=False, frame=frame)
+            label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
+
+    def _pose(self, figure: Figure) -> Generator[object, Any, Scene]:
+        """Return the scene as the film sees it: the step that needs most room is seen whole."""
+        yield from self.studio.arranging()
+        frames = self.studio.session.frames
+        widest = yield Beside(
+            lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent)
+        )
+        scene = self.studio.pose(figure, widest)
+        yield None
+        return scene
+
+    # Filming ---------------------------------------------------------------------------
+
+    @property
+    def filming(self) -> bool:
+        """Tell whether a film is being made."""
+        return self._turns.busy
+
+    def _start(self) -> None:
+        file = self._ask(self.form.kind.currentData())
+        if file is None:
+            return
+        self._previewing.stop()
+        self._file = file
+        self._turns.start(self._filming(file, self.form.figure, self.form.reel))
+        self._show_filming(True)
+
+    def _filming(self, file: Path, figure: Figure, reel: Reel) -> Generator[object, Any, None]:
+        session = figure.showing(self.studio.session)
+        scene = yield from self._pose(figure)
+        yield from filming_of(session, self.studio.surfaces, file, reel, like=scene, overwrite=True)
+
+    def _came(self, drawn: Drawn) -> None:
+        self.bar.setRange(0, drawn.total)
+        self.bar.setValue(drawn.done)
+        self.words.setText(f"Image {drawn.done} of {drawn.total} of {self._file.name}")
+
+    def _done(self, _: object) -> None:
+        self._end()
+        self.made.emit(self._file)
+        self.accept()
+
+    def _failed(self, error: Exception) -> None:
+        self._end()
+        self.failed.emit(error)
+
+    def cancel(self) -> None:
+        """Stop filming, if it goes on; no file is left."""
+        if self.filming:
+            self._turns.stop()
+            self._end()
+            self.stopped.emit()
+
+    def _end(self) -> None:
+        self._show_filming(False)
+        self._changed()
+
+    def _show_filming(self, filming: bool) -> None:
+        self.bar.setRange(0, 0)
+        self.bar.setVisible(filming)
+        self.stop.setVisible(filming)
+        self.make.setVisible(not filming)
+        self.form.setEnabled(not filming)
+
+    def done(self, result: int) -> None:
+        """Close; a film that goes on is stopped."""
+        self.cancel()
+        self._soon.stop()
+        self._previewing.stop()
+        super().done(result)
+        self.studio.close()

@@ -1,0 +1,191 @@
+"""How a film is made: kind, size, speed, images in between, background."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QSpinBox,
+    QWidget,
+)
+
+from slideviz.errors import SlidevizError
+from slideviz.export.offscreen import LARGEST, SMALLEST
+from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.picture_options import Figure
+from slideviz.export.reel import FPS, SIZES, Reel, check_film
+from slideviz.gui.widgets.choice import Choice
+
+KINDS = {
+    ".mp4": "MP4, small and plays everywhere",
+    ".gif": "GIF, for slides and web pages",
+    "": "one PNG picture for each image",
+}
+SIZE_WORDS = {
+    "800x500": "800 × 500",
+    "1280x800": "1280 × 800",
+    "1920x1080": "1920 × 1080",
+    "other": "other",
+}
+
+
+class FilmForm(QWidget):
+    """The fields that say how a film is made.
+
+    Parameters
+    ----------
+    studio : Studio
+        Knows the session whose steps are filmed.
+
+    Signals
+    -------
+    changed()
+        Something was chosen or typed.
+    """
+
+    changed = Signal()
+
+    def __init__(self, studio: Studio) -> None:
+        super().__init__()
+        self.studio = studio
+        self.frames = len(studio.session.frames)
+        self._make_size()
+        self._make_pace()
+        self.white = QCheckBox("White background")
+        self.white.setToolTip("Else the background of the view.")
+        self.white.setChecked(True)
+        self.fill = QCheckBox("Fill the images with the mesh")
+        self.fill.setToolTip("Else they show what the view shows of the mesh.")
+        self.fill.setChecked(studio.like is None or sees_all(studio.like))
+        self.mark = QCheckBox("Marked cell")
+        self.mark.setToolTip("Its outline, with its number and its value.")
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.addRow("Kind", self.kind)
+        form.addRow("Size", self.size_choice)
+        form.addRow("", self._pixels)
+        form.addRow("Frames per second", self.fps)
+        form.addRow("Interpolated frames between steps", self.between)
+        form.addRow("Last frame stays", self.hold)
+        for option in (self.white, self.fill, self.mark):
+            option.toggled.connect(self._changed)
+            form.addRow("", option)
+        form.setRowVisible(self.mark, studio.session.view.marked is not None)
+        self._kind_chosen(self.kind.currentData())
+
+    def _make_size(self) -> None:
+        self.kind, self.size_choice = Choice(KINDS), Choice(SIZE_WORDS)
+        self.kind.chosen.connect(self._kind_chosen)
+        self.size_choice.chosen.connect(self._size_chosen)
+        self.width_px, self.height_px = QSpinBox(), QSpinBox()
+        self._pixels = QHBoxLayout()
+        for box in (self.width_px, self.height_px):
+            box.setRange(SMALLEST, LARGEST)
+            box.setSuffix(" px")
+            box.valueChanged.connect(self._pixels_typed)
+            self._pixels.addWidget(box)
+
+    def _make_pace(self) -> None:
+        self.fps, self.hold = QDoubleSpinBox(), QDoubleSpinBox()
+        self.between = QSpinBox()
+        for box, low, high, value, unit in (
+            (self.fps, 0.5, 50.0, FPS, ""),
+            (self.hold, 0.0, 60.0, Reel().hold, " s"),
+        ):
+            box.setRange(low, high)
+            box.setDecimals(1)
+            box.setSuffix(unit)
+            box.setValue(value)
+            box.valueChanged.connect(self._changed)
+        self.between.setRange(0, 100)
+        # Few steps jump; images in between make about three seconds of them.
+        self.between.setValue(0 if self.frames > 15 else round(3 * FPS / self.frames) - 1)
+        self.between.valueChanged.connect(self._changed)
+        self.fps.setToolTip("Images shown in a second.")
+        self.hold.setToolTip("How long the last image stays before the film ends or begins again.")
+        self.between.setToolTip(
+            "Images between two steps, with the nodes on straight lines from one to the next."
+        )
+
+    # What was chosen -------------------------------------------------------------------
+
+    @property
+    def reel(self) -> Reel:
+        """Return how the film is made."""
+        size = self.width_px.value(), self.height_px.value()
+        return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
+
+    @property
+    def figure(self) -> Figure:
+        """Return what its images have."""
+        size = self.width_px.value(), self.height_px.value()
+        view = self.studio.session.view
+        return Figure(
+            size,
+            "white" if self.white.isChecked() else "shown",
+            legend=view.legend,
+            edges=view.edges,
+            triad=view.triad,
+            title=True,
+            fill=self.fill.isChecked(),
+            both=False,
+            letters=1.25,
+            film=True,
+            marked=self.mark.isChecked(),
+        )
+
+    def _kind_chosen(self, kind: str) -> None:
+        width, height = SIZES[kind or ".png"]
+        name = f"{width}x{height}"
+        self.size_choice.show_value(name if name in SIZE_WORDS else "1280x800")
+        self.fps.setEnabled(bool(kind))
+        self.hold.setEnabled(bool(kind))
+        self._size_chosen(self.size_choice.currentData())
+
+    def _size_chosen(self, name: str) -> None:
+        if "x" in name:
+            for box, length in zip((self.width_px, self.height_px), name.split("x"), strict=True):
+                box.blockSignals(True)
+                box.setValue(int(length))
+                box.blockSignals(False)
+        self._changed()
+
+    def _pixels_typed(self) -> None:
+        self.size_choice.show_value("other")
+        self._changed()
+
+    def problem(self) -> str:
+        """Return why no film can be made like that; empty when it can."""
+        kind = self.kind.currentData()
+        try:
+            # Any name in a folder that is there; the real one is asked for later.
+            check_film(Path(f"film{kind}").absolute(), self.reel, overwrite=True)
+        except SlidevizError as error:
+            return str(error)
+        return ""
+
+    @property
+    def words(self) -> str:
+        """Return in words how long the film is."""
+        return length_words(self.reel, self.frames, self.kind.currentData())
+
+    def _changed(self, _: object = None) -> None:
+        self.changed.emit()
+
+
+def length_words(reel: Reel, frames: int, kind: str) -> str:
+    """Return in words how many images a film has, and how long it is."""
+    count = reel.count(frames)
+    steps = f"{frames - 1} step{'s' if frames > 2 else ''}"
+    between = f", {reel.between} image{'s' if reel.between > 1 else ''} between two"
+    text = f"{count} images: the undeformed mesh and {steps}{between if reel.between else ''}"
+    if not kind:
+        return f"{text}; each in a file of its own."
+    pace = reel.pace(frames)
+    seconds = (count - 1) / pace + max(reel.hold, 1.0 / pace)
+    return f"{text}. The film lasts {seconds:.1f} s."

@@ -1,0 +1,272 @@
+"""Help in the window: keyboard shortcuts, case keys, about, details for a bug report."""
+
+from __future__ import annotations
+
+import html
+
+from qtpy.QtCore import QObject, QSize, Qt
+from qtpy.QtGui import QAction, QFontDatabase, QTextCursor, QTextDocument
+from qtpy.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QPlainTextEdit,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.gui.widgets.faults import versions
+from slideviz.gui.widgets.icons import logo
+
+LOG_LINES = 40
+MOUSE = (
+    ("Drag", "turn a 3D mesh, move a 2D one"),
+    ("Shift+Drag, middle button", "move"),
+    ("Wheel", "zoom about the mouse"),
+    ("Rest on a cell", "see its quality, shape and place"),
+    ("Double click, Alt+Click", "mark the cell below the mouse"),
+    ("Click", "select the boundary in front"),
+    ("Ctrl+Click", "select one more, or one less"),
+    ("Ctrl+Click on a run", "show it beside the one that is shown"),
+    ("F2 on a run", "give it a name"),
+    ("Right click", "roles of the boundary, hide, isolate"),
+    ("F2 or Alt+Down on a boundary", "choose its role"),
+    ("Menu key or right click on a motion", "duplicate, copy, paste, order, remove"),
+    ("Drop a file", "open it"),
+)
+
+
+class Help(QObject):
+    """The help of a window."""
+
+    def __init__(self, window) -> None:
+        super().__init__(window)
+        self.window = window
+        self._shown: dict[str, QDialog] = {}
+
+    def shortcuts(self) -> None:
+        """Show all keys and what the mouse does."""
+        self._show("shortcuts", lambda: ShortcutsDialog(self.window))
+
+    def case_keys(self) -> None:
+        """Show the keys of a case file."""
+        from slideviz.case.cfg import describe_keys
+
+        self._show("keys", lambda: TextDialog(self.window, "Case keys", describe_keys()))
+
+    def about(self) -> None:
+        """Show version and licence."""
+        self._show("about", lambda: AboutDialog(self.window))
+
+    def copy_details(self) -> None:
+        """Copy what a bug report needs."""
+        QApplication.clipboard().setText(details(self.window))
+        self.window.say("Copied; paste it into the report and say what you did")
+
+    def _show(self, name: str, make) -> None:
+        dialog = self._shown.get(name)
+        if dialog is None:
+            dialog = self._shown[name] = make()
+        dialog.show()
+        dialog.raise_()
+        dialog.activateWindow()
+
+
+class ShortcutsDialog(QDialog):
+    """Every action with its keys, by menu, and the mouse; a field finds some."""
+
+    def __init__(self, window) -> None:
+        super().__init__(window)
+        self.setWindowTitle("Keyboard and mouse")
+        self.resize(1060, 700)
+        column = QVBoxLayout(self)
+        self.find = QLineEdit()
+        self.find.setPlaceholderText("Find an action or a key")
+        self.find.setClearButtonEnabled(True)
+        self.find.textChanged.connect(self._filter)
+        column.addWidget(self.find)
+        self.tree = QTreeWidget()
+        self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
+        self.tree.setRootIsDecorated(False)
+        self.tree.setIndentation(14)
+        self.tree.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        column.addWidget(self.tree)
+        for title, rows in shortcut_rows(window):
+            self._add(title, rows)
+        self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
+        header = self.tree.header()
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.rejected.connect(self.reject)
+        column.addWidget(buttons)
+        self.find.setFocus()
+
+    def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
+        top = QTreeWidgetItem(self.tree, [title])
+        font = top.font(0)
+        font.setBold(True)
+        top.setFont(0, font)
+        top.setFlags(Qt.ItemFlag.ItemIsEnabled)
+        for text, keys, tip in rows:
+            row = QTreeWidgetItem(top, [text, keys, tip])
+            row.setToolTip(2, tip)
+        top.setExpanded(True)
+
+    def _filter(self, wanted: str) -> None:
+        wanted = wanted.strip().lower()
+        for index in range(self.tree.topLevelItemCount()):
+            top = self.tree.topLevelItem(index)
+            found = 0
+            for k in range(top.childCount()):
+                row = top.child(k)
+                words = " ".join(row.text(column) for column in range(3)).lower()
+                row.setHidden(wanted not in words)
+                found += not row.isHidden()
+            top.setHidden(not found)
+
+
+class TextDialog(QDialog):
+    """A long text, in which words can be found."""
+
+    def __init__(self, parent: QWidget, title: str, text: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.resize(860, 640)
+        column, row = QVBoxLayout(self), QHBoxLayout()
+        self.find = QLineEdit()
+        self.find.setPlaceholderText("Find (Enter: the next one)")
+        self.find.setClearButtonEnabled(True)
+        self.count = QLabel()
+        self.count.setProperty("hint", True)
+        row.addWidget(self.find, 1)
+        row.addWidget(self.count)
+        column.addLayout(row)
+        self.text = QPlainTextEdit(text)
+        self.text.setReadOnly(True)
+        self.text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        column.addWidget(self.text)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        # Enter belongs to the search.
+        buttons.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
+        buttons.rejected.connect(self.reject)
+        column.addWidget(buttons)
+        self.find.textChanged.connect(self._typed)
+        self.find.returnPressed.connect(self.next)
+        self.find.setFocus()
+
+    def _typed(self, wanted: str) -> None:
+        self.text.moveCursor(QTextCursor.MoveOperation.Start)
+        found = self.text.toPlainText().lower().count(wanted.lower()) if wanted else 0
+        self.count.setText(f"{found} found" if wanted else "")
+        self.next()
+
+    def next(self) -> None:
+        """Go to the next place where the words are; from the end on at the beginning."""
+        wanted = self.find.text()
+        if wanted and not self.text.find(wanted, QTextDocument.FindFlag(0)):
+            self.text.moveCursor(QTextCursor.MoveOperation.Start)
+            self.text.find(wanted, QTextDocument.FindFlag(0))
+
+
+class AboutDialog(QDialog):
+    """Version, libraries and licence."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        from slideviz import __version__
+
+        self.setWindowTitle("About slideviz")
+        column, head = QVBoxLayout(self), QHBoxLayout()
+        picture = QLabel()
+        picture.setPixmap(logo().pixmap(QSize(64, 64)))
+        title = QLabel(
+            f"<span style='font-size:18pt; font-weight:600'>slideviz</span> &nbsp;{__version__}<br>"
+            "Deforms CFD meshes with radial basis functions,<br>"
+            "with boundaries that slide and repeat."
+        )
+        head.addWidget(picture)
+        head.addSpacing(8)
+        head.addWidget(title, 1)
+        column.addLayout(head)
+        self.text = QLabel(f"<pre>{html.escape(versions())}</pre>")
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        column.addWidget(self.text)
+        column.addWidget(QLabel("MIT licence: use, change and pass it on freely; no warranty."))
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        self.copy.setAutoDefault(False)
+        self.copy.setToolTip("Copy the versions.")
+        self.copy.clicked.connect(lambda: QApplication.clipboard().setText(versions()))
+        buttons.rejected.connect(self.reject)
+        column.addWidget(buttons)
+
+
+def shortcut_rows(window) -> list[tuple[str, list[tuple[str, str, str]]]]:
+    """Return for each menu the actions that have keys: text, keys, what they do."""
+    found = []
+    for top in window.menuBar().actions():
+        rows = [
+            (_name(action), _keys(action), action.statusTip())
+            for action in _leaves(top.menu())
+            if _keys(action)
+        ]
+        if rows:
+            found.append((top.text().replace("&", ""), rows))
+    return found
+
+
+def _name(action: QAction) -> str:
+    # That of undo and redo says what would be undone just now.
+    changing = action.objectName() in ("undo", "redo")
+    text = action.objectName().capitalize() if changing else action.text()
+    return text.replace("&", "").rstrip("…")
+
+
+def _keys(action: QAction) -> str:
+    return action.shortcut().toString(action.shortcut().SequenceFormat.NativeText)
+
+
+def _leaves(menu: QMenu | None) -> list[QAction]:
+    """Return the actions of a menu and of the menus in it."""
+    found = []
+    for action in menu.actions() if menu is not None else ():
+        if action.menu() is not None:
+            found += _leaves(action.menu())
+        elif not action.isSeparator():
+            found.append(action)
+    return found
+
+
+def details(window) -> str:
+    """Return what a bug report needs: versions, graphics, mesh, settings, the last messages."""
+    session = window.store.session
+    lines = [versions(), _graphics(window)]
+    mesh = session.mesh
+    if mesh is not None:
+        roles = [session.role(name) for name in mesh.marker_names]
+        count = ", ".join(f"{roles.count(role)} {role}" for role in dict.fromkeys(roles))
+        case = session.case
+        lines += [
+            f"mesh: {mesh.dim}D, {len(mesh.cells)} cells, {len(mesh.points)} points",
+            f"boundaries: {count or 'none'}",
+            f"sliding {case.sliding}, periodic {case.periodic}, steps {case.steps or 'automatic'}",
+            f"runs: {len(session.runs)}, steps shown: {max(len(session.frames) - 1, 0)}",
+        ]
+    messages = window.docks_.panels["log"].toPlainText().splitlines()[-LOG_LINES:]
+    return "\n".join([*lines, "", "last messages:", *(messages or ["(none)"]), ""])
+
+
+def _graphics(window) -> str:
+    """Return who draws, as OpenGL tells it."""
+    said = window.view.render_window.ReportCapabilities().splitlines()
+    kept = [" ".join(line.split()) for line in said if line.startswith("OpenGL")]
+    return "\n".join(kept[:3]) or "OpenGL: not known yet"

@@ -1,0 +1,136 @@
+"""The dialog in which a table of displacements is typed or pasted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qtpy.QtCore import QTimer
+from qtpy.QtGui import QFontDatabase
+from qtpy.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QLabel,
+    QPlainTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.errors import SlidevizError
+from slideviz.gui.widgets import questions
+from slideviz.session.motion_table import Rows, table_text, write_table
+
+FILTERS = "Displacements (*.txt)"
+CHECK_MS = 150
+ABOUT = (
+    "A row for each node: its number, counted from 0 as in the mesh file, and its displacement in "
+    "the mesh's length unit. Columns are separated by tabs, spaces, commas or semicolons, so that "
+    "rows of a spreadsheet can be pasted. Nodes without a row stay."
+)
+
+
+class TableDialog(QDialog):
+    """Shows a table and tells at once what it does, or what is wrong with it.
+
+    Parameters
+    ----------
+    parent : QWidget or None
+    rows : Rows
+        What it may list.
+    text : str
+        The table to begin with.
+    """
+
+    def __init__(self, parent: QWidget | None, rows: Rows, text: str = "") -> None:
+        super().__init__(parent)
+        self.rows = rows
+        self.setWindowTitle(f"Displacements of {rows.of}")
+        self.resize(520, 560)
+        about = QLabel(ABOUT)
+        about.setWordWrap(True)
+        self.edit = QPlainTextEdit(text)
+        self.edit.setObjectName("table")
+        self.edit.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.edit.setPlaceholderText(f"{rows.heading}\n…")
+        self.told = QLabel()
+        self.told.setWordWrap(True)
+        self.buttons = QDialogButtonBox()
+        kind = QDialogButtonBox.ButtonRole
+        self.fill = self.buttons.addButton("List all nodes", kind.ActionRole)
+        self.fill.setToolTip("Add a row of zeros for each node that has none yet.")
+        self.fill.setAutoDefault(False)
+        self.save = self.buttons.addButton("Save as…", kind.AcceptRole)
+        self.save.setToolTip("Save the table as a displacement file, which the case then uses.")
+        self.buttons.addButton(QDialogButtonBox.StandardButton.Cancel)
+        column = QVBoxLayout(self)
+        for widget in (about, self.edit, self.told, self.buttons):
+            column.addWidget(widget, 1 if widget is self.edit else 0)
+        self.fill.clicked.connect(self._fill)
+        self.buttons.accepted.connect(self.accept)
+        self.buttons.rejected.connect(self.reject)
+        # Not with each key: a long table takes a while.
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(CHECK_MS)
+        self._soon.timeout.connect(self.check)
+        self.edit.textChanged.connect(self._soon.start)
+        self.edit.setFocus()
+        self.check()
+
+    @property
+    def text(self) -> str:
+        """Return the table."""
+        return self.edit.toPlainText()
+
+    def _fill(self) -> None:
+        self.edit.selectAll()
+        # Inserted, so that it can be undone.
+        self.edit.insertPlainText(self.rows.fill(self.text))
+        self.check()
+
+    def check(self) -> None:
+        """Say what the table does, or what is wrong with it."""
+        self._soon.stop()
+        try:
+            said, wrong = self.rows.check(self.text), False
+        except SlidevizError as error:
+            said, wrong = str(error), True
+        self.told.setText(said)
+        self.told.setProperty("bad", wrong and bool(self.text.strip()))
+        self.told.style().unpolish(self.told)
+        self.told.style().polish(self.told)
+        self.save.setEnabled(not wrong)
+
+    def accept(self) -> None:
+        """Close, if the table is right."""
+        self.check()
+        if self.save.isEnabled():
+            super().accept()
+
+
+def ask_table(parent: QWidget, rows: Rows, path: Path, default: Path) -> Path | None:
+    """Return the displacement file that a table was saved in, or None.
+
+    Parameters
+    ----------
+    parent : QWidget
+    rows : Rows
+        What the table may list.
+    path : Path
+        The file that it begins with, if there is one.
+    default : Path
+        What a new file is called.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be read or written.
+    """
+    dialog = TableDialog(parent, rows, table_text(path))
+    there = path.is_file()
+    while dialog.exec() == QDialog.DialogCode.Accepted:
+        found = questions.ask_save(parent, "Save the table", path if there else default, FILTERS)
+        if found is not None:
+            write_table(found, dialog.text, path)
+            return found
+    return None

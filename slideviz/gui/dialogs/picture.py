@@ -1,0 +1,326 @@
+"""The dialog for pictures: what is in them, how large they are, and a preview of it."""
+
+# ruff: noqa: N802  (Qt's names)
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator
+from dataclasses import asdict, replace
+from typing import Any
+
+from qtpy.QtCore import QSize, Qt, QTimer
+from qtpy.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
+from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.picture_options import BACKGROUNDS, Figure, words_of_size
+from slideviz.export.vector import MOST_CELLS
+from slideviz.gui.responsiveness.turns import Turns, raise_again
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.pixmaps import (
+    copy_image,
+    drawn_for,
+    fitted,
+    framed,
+    to_image,
+    wait_cursor,
+)
+
+PREVIEW = (470, 330)
+PREVIEW_MS = 120
+"""The preview waits for the end of what is typed."""
+SIZES = {
+    "view": "as the view",
+    "1600x1000": "1600 × 1000, for a report",
+    "1920x1080": "1920 × 1080, for slides",
+    "3200x2000": "3200 × 2000, for a poster",
+    "paper": "on paper, in cm",
+    "other": "other",
+}
+TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}
+LETTERS = 1.25
+"""Letters of a picture are this much larger than those of the view: it is often shown small."""
+PAPER = (16.0, 10.0, 300.0)
+"""Width and height in cm, pixels per inch: the text width of a page."""
+PAPER_POINTS = 8.5
+"""Normal letters on paper; journals ask for 8 at least."""
+OPTIONS = {
+    "legend": ("Legend or colour bar", "What the colours mean, at the right."),
+    "edges": ("Mesh edges", "The edges of the cells."),
+    "triad": ("Directions of the axes", "Small arrows in the lower left corner."),
+    "title": ("Title with the quality", "Run and step, with minimum, mean and inverted cells."),
+    "fill": ("Fill the picture with the mesh", "Else it shows what the view shows of the mesh."),
+    "marked": ("Marked cell", "Its outline, with its number and its value."),
+    "both": ("Both runs beside each other", "As the two views, with one legend."),
+}
+
+
+class PictureDialog(QDialog):
+    """Asks for what a picture has and how large it is, and shows what it will be.
+
+    Parameters
+    ----------
+    parent : QWidget
+    studio : Studio
+        Draws it.
+    view_size : (int, int)
+        Pixels of the view.
+    kept : str
+        What `choices` returned the last time.
+    """
+
+    def __init__(self, parent: QWidget, studio: Studio, view_size=(1280, 800), kept="") -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Export picture")
+        self.studio = studio
+        self._view_size = tuple(min(max(length, SMALLEST), LARGEST) for length in view_size)
+        self._make_preview()
+        self._make_size()
+        self._make_options()
+        row = QHBoxLayout()
+        row.setSpacing(16)
+        left, right = QVBoxLayout(), QVBoxLayout()
+        left.addWidget(self.preview)
+        left.addWidget(self.words)
+        left.addWidget(self.kinds)
+        left.addStretch(1)
+        right.addLayout(self._form)
+        right.addStretch(1)
+        row.addLayout(left)
+        row.addLayout(right)
+        outer = QVBoxLayout(self)
+        outer.addLayout(row)
+        outer.addWidget(self._make_buttons())
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(PREVIEW_MS)
+        self._timer.timeout.connect(self._draw)
+        self._turns = Turns(self)
+        self._turns.failed.connect(raise_again)
+        self._take(kept)
+        self._changed()
+
+    # Parts -----------------------------------------------------------------------------
+
+    def _make_preview(self) -> None:
+        self.preview = QLabel()
+        self.preview.setFixedSize(QSize(PREVIEW[0] + 2, PREVIEW[1] + 2))
+        self.preview.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.preview.setObjectName("preview")
+        self.preview.setAccessibleName("Preview of the picture")
+        self.words = QLabel()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
+        self.kinds = QLabel(_kinds(self.studio))
+        self.kinds.setProperty("hint", True)
+        self.kinds.setWordWrap(True)
+        self.kinds.setFixedWidth(PREVIEW[0])
+
+    def _make_size(self) -> None:
+        self.size_choice = Choice(SIZES)
+        self.size_choice.chosen.connect(self._size_chosen)
+        self.width_px, self.height_px = QSpinBox(), QSpinBox()
+        for box in (self.width_px, self.height_px):
+            box.setRange(SMALLEST, LARGEST)
+            box.setSuffix(" px")
+            box.valueChanged.connect(self._pixels_typed)
+        self.width_cm, self.height_cm = QDoubleSpinBox(), QDoubleSpinBox()
+        for box, value in zip((self.width_cm, self.height_cm), PAPER, strict=False):
+            box.setRange(1.0, 200.0)
+            box.setDecimals(1)
+            box.setSuffix(" cm")
+            box.setValue(value)
+            box.valueChanged.connect(self._changed)
+        self.dpi = QSpinBox()
+        self.dpi.setRange(50, 1200)
+        self.dpi.setValue(round(PAPER[2]))
+        self.dpi.setSuffix(" dpi")
+        self.dpi.setToolTip("Pixels per inch on paper; journals ask for 300 or more.")
+        self.dpi.valueChanged.connect(self._changed)
+        self._form = QFormLayout()
+        self._form.addRow("Size", self.size_choice)
+        self._pixels = _row(self.width_px, QLabel("×"), self.height_px)
+        self._paper = _row(self.width_cm, QLabel("×"), self.height_cm, self.dpi)
+        self._form.addRow("", self._pixels)
+        self._form.addRow("", self._paper)
+        self.text = Choice(TEXT)
+        self.text.setToolTip("How large letters are; on paper, normal is 8.5 points.")
+        self.text.chosen.connect(self._changed)
+        self._form.addRow("Letters", self.text)
+
+    def _make_options(self) -> None:
+        self.background = Choice(BACKGROUNDS)
+        self.background.setToolTip("What is behind the mesh.")
+        self.background.chosen.connect(self._changed)
+        self._form.addRow("Background", self.background)
+        self.options: dict[str, QCheckBox] = {}
+        for name, (text, tip) in OPTIONS.items():
+            box = QCheckBox(text)
+            box.setToolTip(tip)
+            box.toggled.connect(self._changed)
+            self.options[name] = box
+            self._form.addRow("", box)
+        self._form.setRowVisible(self.options["both"], self.studio.beside is not None)
+        marked = self.studio.session.view.marked is not None
+        self._form.setRowVisible(self.options["marked"], marked)
+
+    def _make_buttons(self) -> QDialogButtonBox:
+        buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
+        )
+        self.save = buttons.button(QDialogButtonBox.StandardButton.Save)
+        self.save.setText("Save…")
+        self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        self.copy.setToolTip("Copy this picture to the clipboard.")
+        self.copy.clicked.connect(self._copy)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        return buttons
+
+    # What was chosen -------------------------------------------------------------------
+
+    @property
+    def figure(self) -> Figure:
+        """Return what was chosen."""
+        picked = {name: box.isChecked() for name, box in self.options.items()}
+        background, text = self.background.currentData(), float(self.text.currentData())
+        if self.size_choice.currentData() != "paper":
+            size = self.width_px.value(), self.height_px.value()
+            return Figure(size, background, **picked, letters=text * LETTERS)
+        dpi = float(self.dpi.value())
+        size = tuple(round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
+        pixels = text * PAPER_POINTS / 72.0 * dpi
+        letters = pixels / 13.0 / font_scale(size)
+        return Figure(size, background, **picked, letters=letters, dpi=dpi)
+
+    @property
+    def choices(self) -> str:
+        """Return what was chosen as a text, to be offered the next time."""
+        figure = asdict(self.figure)
+        numbers = (self.width_cm.value(), self.height_cm.value(), self.dpi.value())
+        figure.update(
+            preset=self.size_choice.currentData(), text=self.text.currentData(), paper=numbers
+        )
+        # Whether the mesh fills the picture depends on how it is looked at.
+        del figure["fill"], figure["both"]
+        return json.dumps(figure)
+
+    def _take(self, kept: str) -> None:
+        """Show what was chosen the last time, or what makes a good figure."""
+        like = self.studio.like
+        usual = replace(Figure(), fill=like is None or sees_all(like))
+        known = asdict(usual)
+        try:
+            known.update(json.loads(kept) if kept else {})
+            width, height = (int(length) for length in known["size"])
+            across, high, dpi = (float(number) for number in known.get("paper", PAPER))
+        except (TypeError, ValueError, KeyError):
+            known, (width, height), (across, high, dpi) = asdict(usual), usual.size, PAPER
+        self.width_px.setValue(width)
+        self.height_px.setValue(height)
+        self.width_cm.setValue(across)
+        self.height_cm.setValue(high)
+        self.dpi.setValue(round(dpi))
+        for name, box in self.options.items():
+            box.setChecked(bool(known.get(name, getattr(usual, name))))
+        self.background.show_value(known.get("background", usual.background))
+        self.text.setCurrentIndex(1)
+        self.text.show_value(known.get("text", 1.0))
+        self.size_choice.show_value("1600x1000")
+        self.size_choice.show_value(known.get("preset", "1600x1000"))
+        self._size_chosen(self.size_choice.currentData())
+
+    def _size_chosen(self, name: str) -> None:
+        if name not in ("paper", "other"):
+            size = self._view_size if name == "view" else [int(n) for n in name.split("x")]
+            for box, length in zip((self.width_px, self.height_px), size, strict=True):
+                box.blockSignals(True)
+                box.setValue(length)
+                box.blockSignals(False)
+        self._form.setRowVisible(self._paper, name == "paper")
+        self._form.setRowVisible(self._pixels, name != "paper")
+        self._changed()
+
+    def _pixels_typed(self) -> None:
+        self.size_choice.show_value("other")
+        self._changed()
+
+    def _changed(self, _: object = None) -> None:
+        figure = self.figure
+        too_large = max(figure.size) > LARGEST or min(figure.size) < SMALLEST
+        self.words.setText(
+            f"{words_of_size(figure)}: width and height can be {SMALLEST} to {LARGEST} pixels"
+            if too_large
+            else words_of_size(figure)
+        )
+        self.words.setProperty("bad", too_large)
+        self.words.style().polish(self.words)
+        for button in (self.save, self.copy):
+            button.setEnabled(not too_large)
+        if not too_large and self.isVisible():
+            self._timer.start()
+
+    # Picture ---------------------------------------------------------------------------
+
+    def _draw(self) -> None:
+        self._turns.start(self._drawing())
+
+    def _drawing(self) -> Generator[object, Any, None]:
+        """Draw the preview in pieces: of a large mesh, all at once would take a second."""
+        figure = self.figure.within(drawn_for(self.studio, PREVIEW))
+        pixels = yield from self.studio.picturing(figure)
+        self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
+
+    def _copy(self) -> None:
+        if self._turns.busy:  # a preview in pieces: nothing else may be drawn meanwhile
+            self._turns.stop()
+            self._timer.start()
+        with wait_cursor():
+            copy_image(to_image(self.studio.image(self.figure)))
+        self.words.setText("Copied to the clipboard.")
+
+    def showEvent(self, event) -> None:
+        """Draw the first preview; nothing is drawn that nobody sees."""
+        super().showEvent(event)
+        self._changed()
+
+    def done(self, result: int) -> None:
+        """Close; nothing is drawn any more."""
+        self._timer.stop()
+        self._turns.stop()
+        super().done(result)
+
+
+def _row(*widgets: QWidget) -> QWidget:
+    """Return widgets in a row, as one."""
+    whole = QWidget()
+    layout = QHBoxLayout(whole)
+    layout.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        layout.addWidget(widget)
+    layout.addStretch(1)
+    return whole
+
+
+def _kinds(studio: Studio) -> str:
+    """Return which kinds of files there can be, and why not others."""
+    mesh = studio.session.mesh
+    if mesh is None or mesh.dim != 2:
+        return "Saved as PNG; the view of a 3D mesh consists of pixels."
+    if len(mesh.cells) > MOST_CELLS:
+        return f"Saved as PNG; SVG and PDF have room for {MOST_CELLS:,} cells."
+    return (
+        "Saved as PNG, or as SVG or PDF with sharp lines at any size; these two show cells and "
+        "boundaries, without points, neighbouring passages and axes."
+    )

@@ -1,1 +1,0 @@
-"""The dialogs through which pictures, films and meshes leave the window."""

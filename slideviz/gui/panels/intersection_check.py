@@ -1,0 +1,73 @@
+"""Looks for clashes beside the window, soon after the last change of motions or roles."""
+
+from __future__ import annotations
+
+import logging
+
+from qtpy.QtCore import QObject, QTimer
+
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.session import intersections
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+DELAY_MS = 200
+log = logging.getLogger("slideviz")
+
+
+class ClashWatch(QObject):
+    """Keeps ``Session.clash`` up to date; what was found last stays until the next is known."""
+
+    def __init__(self, store: Store, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        # A thread of its own: a run must not wait for it, nor it for a run.
+        self._runner = JobRunner(self)
+        self._runner.finished.connect(self._found)
+        self._runner.cancelled.connect(self._again)
+        self._runner.failed.connect(self._failed)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(DELAY_MS)
+        self._timer.timeout.connect(self._look)
+        self._asked: tuple[object, ...] = ()
+        self._known: tuple[object, ...] = ()
+        store.listen(self._changed)
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether an answer is still to come."""
+        return self._runner.busy or self._timer.isActive()
+
+    def close(self) -> None:
+        """Look no more."""
+        self._timer.stop()
+        self._runner.close()
+
+    def _changed(self, old: Session, new: Session) -> None:
+        if new.mesh is None or (old.mesh is new.mesh and old.case is new.case):
+            return
+        if intersections.clash_key(new) != self._known:
+            self._timer.start()
+
+    def _look(self) -> None:
+        session = self.store.session
+        if self._runner.busy:
+            self._timer.start()
+        elif session.mesh is not None:
+            self._asked = intersections.clash_key(session)
+            self._runner.start(intersections.find_clash, session.case, session.mesh)
+
+    def _found(self, text: str) -> None:
+        self._known = self._asked
+        self.store.change(intersections.set_clash, text, self._asked)
+        self._again()
+
+    def _failed(self, error: Exception) -> None:
+        log.error("looking for clashes failed: %s", error)
+        self._known = self._asked
+
+    def _again(self) -> None:
+        session = self.store.session
+        if session.mesh is not None and intersections.clash_key(session) != self._known:
+            self._timer.start()

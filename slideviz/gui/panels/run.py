@@ -1,0 +1,185 @@
+"""The run panel: start, what is missing, progress, cancel."""
+
+from __future__ import annotations
+
+import html
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.color_scheme import Look
+from slideviz.gui.widgets.bar import QuietBar
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.session import changes
+from slideviz.session.changes import is_missing
+from slideviz.session.jobs import Doing
+from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+LONG = 100
+SETTINGS = "settings"
+"""What the link stands for that takes the settings of the run that is shown."""
+
+
+class RunPanel(QWidget):
+    """Starts and cancels a run; says what a run still needs, as a link to where it is given.
+
+    Signals
+    -------
+    run_wanted(), cancel_wanted(), place_wanted(Missing)
+        The buttons; and the link to where what is missing is put right.
+    """
+
+    run_wanted = Signal()
+    cancel_wanted = Signal()
+    place_wanted = Signal(object)
+
+    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._busy = ""
+        self._missing = ()
+        self._cost = ""
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 6)
+        layout.setSpacing(5)
+        row = QHBoxLayout()
+        self.run = QPushButton(icon("run", "#ffffff"), "Run")
+        self.run.setObjectName("run")
+        self.run.setShortcut("Ctrl+R")
+        self.run.clicked.connect(self.run_wanted)
+        self.cancel = QPushButton(icon("cancel"), "Cancel")
+        self.cancel.setObjectName("cancel")
+        self.cancel.setShortcut("Esc")
+        self.cancel.setToolTip("Stop within a second (Esc); the steps that are done stay.")
+        self.cancel.clicked.connect(self.cancel_wanted)
+        self.text = QLabel()
+        self.text.setWordWrap(True)
+        self.text.setMinimumHeight(34)
+        # A long sentence wraps; it must not make all panels on this side wider.
+        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.text.setTextFormat(Qt.TextFormat.RichText)
+        self.text.linkActivated.connect(self._link)
+        row.addWidget(self.run)
+        row.addWidget(self.cancel)
+        row.addWidget(self.text, 1)
+        layout.addLayout(row)
+        self.bar = QuietBar()
+        self.bar.setRange(0, 1000)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(6)
+        policy = self.bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(policy)
+        layout.addWidget(self.bar)
+        store.listen(lambda _old, new: self.sync(new))
+        self.sync(store.session)
+
+    def sync(self, session: Session) -> None:
+        """Show whether a run can start, and if not what it needs."""
+        # Some checks look at the mesh: not again while only the view changes.
+        key = (session.mesh, session.case, session.clash, session.invalid)
+        if key != getattr(self, "_key", None):
+            self._key = key
+            self._missing = is_missing(session)
+            self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
+        self.cancel.setVisible(bool(self._busy))
+        self.run.setVisible(not self._busy)
+        self.bar.setVisible(bool(self._busy))
+        self.run.setEnabled(not self._missing)
+        if self._busy or self._missing:
+            self._redden(False)
+        if self._busy:
+            return
+        self.bar.setValue(0)
+        if self._missing:
+            first = self._missing[0]
+            more = len(self._missing) - 1
+            text = html.escape(_short(first.text))
+            self.text.setText(
+                f"<a href='{first.place}'>{text}</a>" + (f" (+{more} more)" if more else "")
+            )
+            tip = "\n".join(missing.text for missing in self._missing)
+            self.text.setToolTip(wrapped(tip))
+            self.run.setToolTip(wrapped(tip))
+            return
+        self.run.setToolTip("Deform the mesh with these settings (Ctrl+R).")
+        self.text.setToolTip("")
+        self._tell_run(session)
+
+    def _tell_run(self, session: Session) -> None:
+        """Tell how the run that is shown ended, or that the panels say something else."""
+        run, bad = session.run_shown, ""
+        if run is None:
+            self.text.setText(f"Ready. {self._cost}".rstrip())
+        elif not session.outdated:
+            bad = inverted_words(run)
+            text = html.escape(ended(run))
+            self.text.setText(f"<b>{text}</b>" if bad else text)
+            self.text.setToolTip(wrapped(help_for(run.case)) if bad else "")
+        elif run is session.runs[-1]:
+            text = "Settings changed since the last run."
+            self.text.setText(f"{text} {self._cost}".rstrip())
+        else:
+            link = f"<a href='{SETTINGS}'>Use its settings</a>"
+            self.text.setText(f"The panels differ from run {run.number}. {link}")
+        self._redden(bool(bad))
+
+    def _redden(self, bad: bool) -> None:
+        if self.text.property("bad") != bad:
+            self.text.setProperty("bad", bad)
+            self.text.style().unpolish(self.text)
+            self.text.style().polish(self.text)
+
+    def _link(self, target: str) -> None:
+        if target == SETTINGS:
+            self.store.change(changes.take_settings, self.store.session.shown)
+        else:
+            self.place_wanted.emit(self._missing[0])
+
+    def take_theme(self, _look: Look, _colour: str) -> None:
+        """Show the text in the colours of another theme: those of a link are kept otherwise."""
+        text = self.text.text()
+        self.text.clear()
+        self.text.setText(text)
+
+    def set_busy(self, what: str) -> None:
+        """Show that a job runs (its name), or with an empty text that none does."""
+        self._busy = what
+        self.cancel.setEnabled(True)
+        self.bar.setRange(0, 1000)
+        self.bar.setValue(0)
+        if what:
+            self.text.setText(html.escape(what))
+            self.text.setToolTip("")
+        self.sync(self.store.session)
+
+    def show_doing(self, doing: Doing) -> None:
+        """Show how far the job is."""
+        if not self._busy:
+            return
+        self.text.setText(html.escape(doing.text))
+        if doing.fraction is None:
+            self.bar.setRange(0, 0)
+        else:
+            self.bar.setRange(0, 1000)
+            self.bar.setValue(round(1000 * doing.fraction))
+
+    def show_cancelling(self) -> None:
+        """Show that the job was asked to stop."""
+        self.cancel.setEnabled(False)
+        self.text.setText("Cancelling…")
+
+
+def _short(text: str) -> str:
+    """Return a text that fits beside the button: a long one without its remedy, a tooltip's."""
+    return text if len(text) <= LONG else text.partition("; ")[0].removesuffix(".") + "."

@@ -1,0 +1,1 @@
+"""What steers threads, timers, garbage and repaints of the window."""

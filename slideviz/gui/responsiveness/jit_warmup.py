@@ -1,0 +1,90 @@
+"""Compiles the numerics beside the window, so that the first run need not wait for it."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+from threading import Event, Thread
+from typing import Any
+
+import pyvista as pv
+from qtpy.QtCore import QObject, QTimer, Signal
+
+from slideviz.gui.responsiveness.worker import stand_back
+from slideviz.scene.actors import VALUES
+from slideviz.scene.stage import Stage
+from slideviz.session import jit_warmup
+
+
+def prepare_drawing(view: Any, stage: Stage) -> None:
+    """Draw a face in every way that meshes are drawn, unseen below the start page.
+
+    What the graphics compile for that takes a tenth of a second each time, which would be felt
+    later.
+    """
+    face = pv.Plane(i_resolution=1, j_resolution=1)
+    face.cell_data[VALUES] = [0.5]
+    ways = [(lit, valued) for lit in (True, False) for valued in (False, True)]
+
+    def draw() -> None:
+        if not ways or stage.plotter.renderer.actors:
+            stage.remove("warm-up")
+            return
+        lit, valued = ways.pop()
+        actor = stage.add(face, "warm-up", lighting=lit)
+        actor.mapper.scalar_visibility = valued
+        stage.edges(actor.prop, True)
+        view.repaint()
+        stage.remove("warm-up")
+        QTimer.singleShot(0, draw)
+
+    view.spare_software()
+    draw()
+
+
+class WarmUp(QObject):
+    """Runs `slideviz.session.jit_warmup.warm_up` once, in a thread that no exit waits for.
+
+    Signals
+    -------
+    compiling(bool)
+        True when compilation began, false when all of it is done; neither when nothing had to be.
+    """
+
+    compiling = Signal(bool)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._stop = Event()
+        self._told = False
+        self.thread_: Thread | None = None
+
+    def start(self) -> None:
+        """Start, unless it was started before."""
+        if self.thread_ is None:
+            self.thread_ = Thread(target=self._run, name="slideviz-warm-up", daemon=True)
+            self.thread_.start()
+
+    def close(self) -> None:
+        """Ask it to end, without waiting."""
+        self._stop.set()
+        self.blockSignals(True)
+
+    def _run(self) -> None:
+        # Numba's threads begin here, and stay as far back as this one.
+        stand_back()
+        jit_warmup.warm_up(self._begun, self._stop.is_set)
+        # What was imported stays: to look through all of it for garbage takes 100 ms each time.
+        gc.freeze()
+        if self._told:
+            self._tell(False)
+
+    def _begun(self) -> None:
+        if not self._told:
+            self._told = True
+            self._tell(True)
+
+    def _tell(self, compiling: bool) -> None:
+        # The window may be gone by now.
+        with contextlib.suppress(RuntimeError):
+            self.compiling.emit(compiling)

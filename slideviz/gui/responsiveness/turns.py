@@ -1,0 +1,99 @@
+"""Work in pieces: what draws in turns of the event loop, the rest beside the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from functools import partial
+from typing import Any
+
+from qtpy.QtCore import QObject, QTimer, Signal
+
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.session.jobs import require_going
+from slideviz.session.pieces import Beside
+
+TURN_MS = 1
+"""Between two pieces; not 0, so that other timers and clicks come between them."""
+
+
+class Turns(QObject):
+    """Pulls a generator as `slideviz.session.pieces` describes it, one piece in each turn.
+
+    Signals
+    -------
+    came(object)
+        Something that the generator yielded, neither None nor a `Beside`.
+    done(object)
+        What it returned. Of work that is stopped nothing is told.
+    failed(Exception)
+        What it raised.
+    """
+
+    came = Signal(object)
+    done = Signal(object)
+    failed = Signal(object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._pieces: Generator[object, Any, Any] | None = None
+        self._runner = self._make_runner()
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(TURN_MS)
+        self._timer.timeout.connect(lambda: self._go_on(next))
+
+    def _make_runner(self) -> JobRunner:
+        runner = JobRunner(self)
+        runner.finished.connect(lambda value: self._go_on(lambda pieces: pieces.send(value)))
+        runner.failed.connect(lambda error: self._go_on(lambda pieces: pieces.throw(error)))
+        return runner
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether work goes on."""
+        return self._pieces is not None
+
+    def start(self, pieces: Generator[object, Any, Any]) -> None:
+        """Do this work, and no longer what was being done."""
+        self.stop()
+        self._pieces = pieces
+        self._timer.start()
+
+    def stop(self) -> None:
+        """End the work; the generator cleans up."""
+        self._timer.stop()
+        if self._runner.busy:
+            self._runner.close()
+            self._runner.deleteLater()
+            self._runner = self._make_runner()
+        pieces, self._pieces = self._pieces, None
+        if pieces is not None:
+            pieces.close()
+
+    def _go_on(self, step: Callable[[Generator[object, Any, Any]], object]) -> None:
+        assert self._pieces is not None
+        try:
+            piece = step(self._pieces)
+        except StopIteration as end:
+            self._pieces = None
+            self.done.emit(end.value)
+        except Exception as error:
+            # Whatever it is: a generator that raised would look like one that is done.
+            self._pieces = None
+            self.failed.emit(error)
+        else:
+            if isinstance(piece, Beside):
+                self._runner.start(_call, piece)
+                return
+            self._timer.start()
+            if piece is not None:
+                self.came.emit(piece)
+
+
+def raise_again(error: Exception) -> None:
+    """Raise what went wrong with work that nobody waits for: it is told as any other fault."""
+    raise error
+
+
+def _call(piece: Beside, _report: object, stopped: Callable[[], bool]) -> Any:
+    return piece.call(partial(require_going, stopped))

@@ -1,0 +1,192 @@
+"""Long jobs beside the window: one thread, one job at a time, one end for each.
+
+The sender of the signals lives in the window's thread, so that every slot runs there; the job
+itself runs in a thread and never touches Qt or VTK. What is reported meanwhile goes through a
+mailbox: of `Doing` only the newest is delivered, everything else in full.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from threading import Event, Lock, Thread, get_native_id
+from threading import enumerate as enumerate_threads
+from typing import Any
+
+from qtpy.QtCore import QObject, Qt, QTimer, Signal
+
+from slideviz.errors import Cancelled
+from slideviz.session.jobs import Doing
+
+NEWS_S = 0.1
+"""News are not shown more often: each time the whole window goes to the screen again."""
+CLOSING_S = 1.0
+"""How long a window that closes waits for its job."""
+NICENESS = 5
+"""How far a job stands back behind the window where both want the processor.
+
+Not further: while it keeps the interpreter, the window waits for it, and where other programs are
+busy, too, it would hardly go on.
+"""
+log = logging.getLogger("slideviz")
+
+
+class JobRunner(QObject):
+    """Runs ``function(*values, report, stopped)`` beside the window.
+
+    Signals
+    -------
+    doing(Doing)
+        The newest news.
+    kept(list)
+        Everything else that was reported since the last time, in order.
+    finished(object), cancelled(), failed(Exception)
+        Exactly one of them ends each job, after all that it reported was delivered.
+    """
+
+    doing = Signal(object)
+    kept = Signal(list)
+    finished = Signal(object)
+    cancelled = Signal()
+    failed = Signal(object)
+    _wake = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._thread: Thread | None = None
+        self._lock = Lock()
+        self._stop = Event()
+        self._news: Doing | None = None
+        self._told_s = float("-inf")
+        self._items: list[object] = []
+        self._end: tuple[str, Any] | None = None
+        self._woken = False
+        self._closed = False
+        self.busy = False
+        self._wake.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def alive(self) -> bool:
+        """Tell whether the thread of a job goes on, whatever the window knows of it."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self, function: Callable[..., Any], *values: Any) -> None:
+        """Start a job; there must be none."""
+        assert not self.busy, "a job is running"
+        self.busy = True
+        self._stop = Event()
+        # A daemon: the program must be able to end while a library keeps its thread.
+        self._thread = Thread(
+            target=self._run, args=(self._stop, function, *values), name="slideviz", daemon=True
+        )
+        self._thread.start()
+
+    def cancel(self) -> None:
+        """Ask the job to end; it does within a second, with ``cancelled``."""
+        self._stop.set()
+
+    def close(self) -> bool:
+        """End the job; nothing is signalled any more. Return whether its thread has ended."""
+        self._stop.set()
+        self._closed = True
+        self.blockSignals(True)
+        if self._thread is not None:
+            self._thread.join(CLOSING_S)
+        return not self.alive
+
+    def _run(self, stop: Event, function: Callable[..., Any], *values: Any) -> None:
+        stand_back()
+        try:
+            end = ("finished", function(*values, self._report, stop.is_set))
+        except Cancelled:
+            end = ("cancelled", None)
+        except Exception as error:
+            # Whatever it is, the window must hear of it: a thread swallows it otherwise.
+            end = ("failed", error)
+        with self._lock:
+            self._end = end
+            self._call()
+
+    def _report(self, item: object) -> None:
+        with self._lock:
+            if isinstance(item, Doing):
+                self._news = item
+            else:
+                self._items.append(item)
+            self._call()
+
+    def _call(self) -> None:
+        # The window may be gone when its job is not yet.
+        with contextlib.suppress(RuntimeError):
+            if not self._woken and not self._closed:
+                self._woken = True
+                self._wake.emit()
+
+    def _deliver(self) -> None:
+        if self._closed:
+            return
+        wait = self._told_s + NEWS_S - time.monotonic()
+        with self._lock:
+            if wait > 0 and self._end is None and not self._items:
+                QTimer.singleShot(round(1000 * wait) + 1, self._deliver)
+                return
+            news, self._news = self._news, None
+            items, self._items = self._items, []
+            end, self._end = self._end, None
+            self._woken = False
+        if news is not None:
+            self._told_s = time.monotonic()
+            self.doing.emit(news)
+        if items:
+            self.kept.emit(items)
+        if end is None:
+            return
+        self.busy = False
+        name, value = end
+        if name == "finished":
+            self.finished.emit(value)
+        elif name == "cancelled":
+            self.cancelled.emit()
+        else:
+            log.debug("a job failed", exc_info=value)
+            self.failed.emit(value)
+
+
+def stand_back(thread: int | None = None) -> None:
+    """Let the window go before a thread (default: this one), and before those that it starts.
+
+    Without a graphics card the picture is drawn by the same processor that computes.
+
+    Parameters
+    ----------
+    thread : int, optional
+        Its number in the system.
+    """
+    if sys.platform == "linux":  # only there it is for one thread, not for the whole program
+        thread = get_native_id() if thread is None else thread
+        with contextlib.suppress(OSError):
+            before = os.getpriority(os.PRIO_PROCESS, thread)
+            os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
+
+
+def hold_libraries_back() -> None:
+    """Let the window go before the threads in which libraries compute, BLAS for example.
+
+    They are as many as there are processors, begin when the library is imported, and bear the name
+    of the program, unlike those of Qt and of the graphics. Called once.
+    """
+    tasks = Path("/proc/self/task")
+    if not tasks.is_dir():
+        return
+    pythons = {thread.native_id for thread in enumerate_threads()}
+    name = (tasks / str(get_native_id()) / "comm").read_text()
+    for task in tasks.iterdir():
+        # A thread may have ended meanwhile.
+        with contextlib.suppress(OSError):
+            if int(task.name) not in pythons and (task / "comm").read_text() == name:
+                stand_back(int(task.name))

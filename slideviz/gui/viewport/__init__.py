@@ -1,0 +1,1 @@
+"""The middle of the window: 3D views, handles, flat sections, the player."""

@@ -1,0 +1,130 @@
+"""Two views side by side: what stands above them, and the cameras that move together."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton
+
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.scene.scene import Scene
+
+
+class TitleBar(QFrame):
+    """Says what a view shows, cut short where there is no room, with a button to close it.
+
+    Parameters
+    ----------
+    name : str
+    closable : bool
+        Whether there is the button to close it.
+    fill : callable, optional
+        Puts into a menu what the view can show instead; the title is a drop-down then.
+    """
+
+    closed = Signal()
+
+    def __init__(
+        self, name: str, closable: bool, fill: Callable[[QMenu], None] | None = None
+    ) -> None:
+        super().__init__()
+        self.setObjectName(name)
+        self._text = ""
+        # A long title may not make one view wider than the other.
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(26)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(6, 0, 2, 0)
+        self.label: ElidedLabel | QToolButton = self._drop_down(fill) if fill else ElidedLabel()
+        self.label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        row.addWidget(self.label, 1)
+        self.close_button = QToolButton()
+        self.close_button.setText("✕")
+        self.close_button.setAutoRaise(True)
+        self.close_button.setToolTip("End the comparison; the other view stays")
+        self.close_button.clicked.connect(self.closed)
+        self.close_button.setVisible(closable)
+        row.addWidget(self.close_button)
+        self.hide()
+
+    def _drop_down(self, fill: Callable[[QMenu], None]) -> QToolButton:
+        button = QToolButton()
+        button.setAutoRaise(True)
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.menu = QMenu(button)
+        self.menu.aboutToShow.connect(lambda: fill(self.menu))
+        button.setMenu(self.menu)
+        return button
+
+    @property
+    def text(self) -> str:
+        """Return the whole title."""
+        return self._text
+
+    def set_text(self, text: str) -> None:
+        """Show another title."""
+        self._text = text
+        self._fit()
+
+    def _fit(self) -> None:
+        if isinstance(self.label, ElidedLabel):
+            self.label.setText(self._text)
+            self.setToolTip(self._text)
+            return
+        room = max(self.label.width() - 28, 20)
+        metrics = self.label.fontMetrics()
+        self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room))
+        self.setToolTip(f"{self._text}\nClick to show something else here")
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def showEvent(self, event) -> None:
+        super().showEvent(event)
+        self._fit()
+
+
+class CameraLink:
+    """Keeps the cameras of two views alike, whichever of them is moved.
+
+    Each has a camera of its own: what is near and far enough to be drawn differs between two
+    meshes, and the strip of the legend is kept free in one of them only.
+    """
+
+    def __init__(self, views: tuple[View3D, View3D], scenes: tuple[Scene, Scene]) -> None:
+        self._following = False
+        self._tags = []
+        for leader, follower, view in (
+            (scenes[0], scenes[1], views[1]),
+            (scenes[1], scenes[0], views[0]),
+        ):
+            camera = leader.plotter.camera
+            tag = camera.AddObserver("ModifiedEvent", self._follow(leader, follower, view))
+            self._tags.append((camera, tag))
+
+    def _follow(self, leader: Scene, follower: Scene, view: View3D):
+        def follow(*_) -> None:
+            # Drawing sets near and far planes, which is no movement: without the second
+            # condition the views would make each other draw for ever.
+            if self._following or leader.eye.looks_like(follower.eye):
+                return
+            self._following = True
+            try:
+                follower.take_camera(leader)
+            finally:
+                self._following = False
+            view.render_soon()
+
+        return follow
+
+    def end(self) -> None:
+        """Let each camera go its own way."""
+        for camera, tag in self._tags:
+            camera.RemoveObserver(tag)
+        self._tags = []

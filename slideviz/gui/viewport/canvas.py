@@ -1,0 +1,190 @@
+"""The 3D view: VTK in a Qt widget, with clicks, wheel and camera keys that belong to slideviz."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+import contextlib
+from itertools import chain
+
+import numpy as np
+import pyvista as pv
+from pyvistaqt import QtInteractor
+from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
+from qtpy.QtWidgets import QApplication
+from vtkmodules.vtkRenderingCore import vtkProp
+
+from slideviz.gui.responsiveness.repaint import OnePaint
+from slideviz.session.pieces import PART_CELLS, portions
+
+ONE_LIGHT = 0.95
+"""How bright one light is that stands for five."""
+
+
+def one_light() -> pv.Light:
+    """Return a light that goes with the camera and shades faces much as pyvista's five do."""
+    light = pv.Light(light_type="camera light", intensity=ONE_LIGHT)
+    light.position = (0.1, 0.35, 0.93)
+    return light
+
+
+class ViewSignals(QObject):
+    """What the view tells: a click on a place, a click with the right button, all is shown.
+
+    Positions are pixels of the widget. They sit in an object of their own because the view
+    inherits several hundred names, which new ones must not hide.
+    """
+
+    clicked = Signal(QPoint, Qt.KeyboardModifier)
+    menu_wanted = Signal(QPoint)
+    zoomed = Signal(QPoint, float)
+    resized = Signal()
+    unveiled = Signal()
+
+
+class View3D(QtInteractor):
+    """pyvistaqt's widget, painted only when something changed."""
+
+    def __init__(self, parent=None, multi_samples: int = 4) -> None:
+        super().__init__(parent, auto_update=False, multi_samples=multi_samples)
+        # The window takes the dropped files: this widget would read them in its own way.
+        self.setAcceptDrops(False)
+        self.told = ViewSignals(self)
+        self._pressed: QPoint | None = None
+        self.flat = False
+        self._one_paint = OnePaint(self)
+        self._veiled: list[list[vtkProp]] = []
+        self._resizing = False
+
+    def render(self) -> None:
+        """Schedule one repaint; pyvista calls this everywhere."""
+        if hasattr(self, "_one_paint") and not self._closed:
+            self._rendered = True
+            self._one_paint.ask()
+
+    render_soon = render
+
+    def unveil(self) -> None:
+        """Draw what is new in the scene part by part, one in each turn of the event loop.
+
+        To hand a large mesh to the graphics takes longer than to draw it, and the window must
+        answer meanwhile.
+        """
+        while self._veiled:
+            self._unveil_next()
+        self._veiled = portions(self.renderer.actors.values(), PART_CELLS)[1:]
+        self.render()
+
+    def _veil(self) -> None:
+        for actor in chain(*self._veiled):
+            actor.SetVisibility(False)
+
+    def _unveil_next(self) -> None:
+        if not self._veiled:
+            return
+        for actor in self._veiled.pop(0):
+            actor.SetVisibility(True)
+        if not self._veiled:
+            # Perhaps something was hidden meanwhile.
+            self.told.unveiled.emit()
+        self.render()
+
+    def paintGL(self) -> None:
+        if self._resizing:
+            return
+        # What changed the scene meanwhile knows nothing of the veil.
+        self._veil()
+        super().paintGL()
+        if self._veiled:
+            QTimer.singleShot(0, self._unveil_next)
+
+    def close(self) -> None:
+        """Give the graphics back; nothing is painted any more."""
+        # Its parent may be gone already, and have closed it.
+        with contextlib.suppress(RuntimeError):
+            self._one_paint.end()
+        super().close()
+        # Of Qt's surface, which ends now, PySide knows the address only: as long as it is named
+        # here, whatever has that address later is taken for it, an action for example.
+        self._surface = None
+
+    def snapshot(self) -> np.ndarray:
+        """Return what the view shows now, (height, width, 3)."""
+        while self._veiled:
+            self._unveil_next()
+        self._render()
+        return np.asarray(self.screenshot(return_img=True))
+
+    def spare_software(self) -> None:
+        """Give up what is hardly seen but takes most of the time where no graphics card draws.
+
+        These are smooth edges, order of what is seen through, and four of five lights.
+        """
+        drawn_by = self.render_window.ReportCapabilities().lower()
+        if not any(name in drawn_by for name in ("llvmpipe", "softpipe", "swrast")):
+            return
+        self.render_window.SetMultiSamples(0)
+        self.renderer.SetUseOIT(False)
+        if len(self.renderer.lights) > 1:
+            self.renderer.remove_all_lights()
+            self.renderer.add_light(one_light())
+
+    def set_flat(self, flat: bool) -> None:
+        """Choose the mouse for a 2D mesh (drag moves it) or a 3D one (drag turns it)."""
+        self.flat = flat
+        self.enable_custom_trackball_style(left="pan" if flat else "rotate", shift_left="pan")
+
+    # Keys belong to the window's actions, not to VTK's w, s, r, f, p, j, t and 3.
+    def keyPressEvent(self, event) -> None:
+        event.ignore()
+
+    def keyReleaseEvent(self, event) -> None:
+        event.ignore()
+
+    # A click is a press and a release at one place; a drag turns the view and picks nothing.
+    def mousePressEvent(self, event) -> None:
+        self._pressed = event.position().toPoint()
+        if event.button() == Qt.MouseButton.RightButton:
+            event.accept()
+            return
+        super().mousePressEvent(event)
+
+    def mouseReleaseEvent(self, event) -> None:
+        where = event.position().toPoint()
+        pressed, self._pressed = self._pressed, None
+        still = pressed is not None and (
+            (where - pressed).manhattanLength() < QApplication.startDragDistance()
+        )
+        if event.button() == Qt.MouseButton.RightButton:
+            if still:
+                self.told.menu_wanted.emit(where)
+            return
+        super().mouseReleaseEvent(event)
+        if still and event.button() == Qt.MouseButton.LeftButton:
+            self.told.clicked.emit(where, event.modifiers())
+
+    def contextMenuEvent(self, event) -> None:
+        event.accept()
+
+    def wheelEvent(self, event) -> None:
+        steps = event.angleDelta().y() / 120.0
+        if steps:
+            self.told.zoomed.emit(event.position().toPoint(), 1.2**steps)
+        event.accept()
+
+    def resizeEvent(self, event) -> None:
+        # Qt paints at once, and again when the widgets around have their places: on the way there
+        # a view has several sizes that nobody sees.
+        self._resizing = True
+        try:
+            super().resizeEvent(event)
+        finally:
+            self._resizing = False
+        self.update()
+        if hasattr(self, "told"):
+            self.told.resized.emit()
+
+    def to_pixels(self, where: QPoint) -> tuple[float, float]:
+        """Return a position in the widget as VTK counts it: device pixels from the lower left."""
+        ratio = self.devicePixelRatioF()
+        return where.x() * ratio, (self.height() - 1 - where.y()) * ratio

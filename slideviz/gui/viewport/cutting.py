@@ -1,0 +1,257 @@
+"""What belongs to the section that is chosen: its handles in the views, and its flat picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QSplitter
+
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.flats import FRAME_PX, Flats, beside
+from slideviz.gui.viewport.handles import Handles
+from slideviz.gui.viewport.viewing import Viewing
+from slideviz.mesh.model import Mesh
+from slideviz.scene.cylinder_handle import outside, patch_in
+from slideviz.scene.scene import Scene
+from slideviz.sections.model import Section
+from slideviz.sections.unroll import plane_axes
+from slideviz.session import changes
+from slideviz.session.section_cuts import can_cut
+from slideviz.session.state import Session
+
+BESIDE_PX = 1000
+"""Width from which on the flat view is put beside the 3D view; below it otherwise."""
+_SHARE = 9 / 20
+"""Part of the window's middle that the flat view gets."""
+_LONG = 1.5
+"""A section that is so many times larger below the view than beside it is put there."""
+
+
+class Cutting(QSplitter):
+    """The 3D view, and beside or below it the flat view of the section that is chosen.
+
+    Attributes
+    ----------
+    chosen : int or None
+        The place of the section in the list of the view.
+    wants_handle : bool
+        Whether the chosen section gets a handle.
+    handles
+        Of the section, one in each view while they are wanted.
+    flats
+        None while nobody wants them.
+    look : Look
+        Their colours.
+    """
+
+    changed = Signal()
+
+    def __init__(self, viewing: Viewing, multi_samples: int, parent=None) -> None:
+        super().__init__(Qt.Orientation.Vertical, parent)
+        self.setChildrenCollapsible(False)
+        self.viewing, self.store = viewing, viewing.store
+        self.addWidget(viewing)
+        self._multi_samples = multi_samples
+        self.chosen: int | None = None
+        self.wants_handle = False
+        self.handles = Handles(self._replaced, self.store.hold)
+        self.flats: Flats | None = None
+        self._kind: tuple[object, ...] = ()
+        self.look = viewing.scene.look
+        self.store.listen(self._session_changed)
+        viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
+        viewing.second_leaves.connect(lambda: self.handles.drop(viewing.second))
+
+    # What is wanted --------------------------------------------------------------------
+
+    @property
+    def section(self) -> Section | None:
+        """Return the section that is chosen."""
+        sections = self.store.session.view.sections
+        if self.chosen is None or self.chosen >= len(sections):
+            return None
+        return sections[self.chosen]
+
+    @property
+    def flat(self):
+        """Return the flat view of the first view, if there is one; of a 2D mesh the curve."""
+        return None if self.flats is None else self.flats.first
+
+    @property
+    def is_flat(self) -> bool:
+        """Tell whether the section that is chosen is laid flat."""
+        return self.section is not None and self.section.flat
+
+    def choose(self, index: int | None) -> None:
+        """Choose a section."""
+        if index != self.chosen:
+            self.chosen = index
+            self._sync()
+
+    def want_handle(self, wanted: bool) -> None:
+        """Show the handle of the section that is chosen, or do not."""
+        self.wants_handle = wanted
+        self._sync()
+
+    def want_flat(self, wanted: bool) -> None:
+        """Lay the chosen section flat beside the 3D view, or do not."""
+        if wanted != self.is_flat or not wanted:
+            self.store.change(changes.lay_flat, self.chosen if wanted else None)
+
+    def look_along(self) -> None:
+        """Look at the plane that is chosen along its normal, or at the cylinder from outside."""
+        section, session = self.section, self.store.session
+        if section is None or session.frame is None or session.frame.mesh.dim == 2:
+            return
+        scene = self.viewing.scene
+        if section.kind == "plane":
+            rows = plane_axes(section).rows
+        else:
+            rows = outside(section, patch_in(section, session.frame.mesh, scene.sections.cuts))
+        camera = scene.plotter.camera
+        camera.position = np.asarray(camera.focal_point) + rows[2] * camera.distance
+        camera.up = rows[1]
+        self.viewing.fit()
+
+    # What is shown ---------------------------------------------------------------------
+
+    def _session_changed(self, old: Session, new: Session) -> None:
+        if old.mesh is not new.mesh:
+            # What a 3D mesh needs is of another kind than what a 2D one does.
+            self._drop_flats()
+            flat = flat_one(new.view.sections)
+            self.chosen = flat if flat is not None else 0 if new.view.sections else None
+            self.wants_handle = False
+        elif old.view.sections != new.view.sections:
+            self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
+        elif self.flats is None and not self.handles:
+            return
+        self._sync()
+
+    def _sync(self) -> None:
+        session = self.store.session
+        self._sync_handles(session)
+        self._sync_flat(session)
+        self.changed.emit()
+
+    def _sync_handles(self, session: Session) -> None:
+        mesh, section = session.mesh, self.section
+        usable = section is not None and section.shown and can_cut(mesh, section)
+        if self.wants_handle and usable and session.frame is not None:
+            self.handles.show(self._shown(session), section, mesh, self.look)
+        else:
+            self.handles.clear()
+
+    def _shown(self, session: Session) -> list[tuple[View3D, Scene, Mesh]]:
+        """Return the views, each with what it draws and the mesh it shows."""
+        sessions = (session, beside(session) or session)
+        pairs = zip(self.viewing.pairs(), sessions, strict=False)
+        return [(view, scene, one.frame.mesh) for (view, scene), one in pairs if one.frame]
+
+    def _replaced(self, section: Section) -> None:
+        if self.section is not None and section != self.section:
+            self.store.change(changes.replace_section, self.chosen, section)
+
+    def _sync_flat(self, session: Session) -> None:
+        at = flat_one(session.view.sections)
+        section = session.view.sections[at] if at is not None else None
+        if section is None or session.frame is None or not can_cut(session.mesh, section):
+            self._drop_flats()
+            return
+        made = self.flats is None
+        if self.flats is None:
+            self.flats = Flats(self.viewing, self.look, self._multi_samples)
+            self.flats.closed.connect(lambda: self.want_flat(False))
+        whole = self.viewing.scene.sees_all()
+        if made:
+            self.addWidget(self.flats)
+        self.flats.show_section(session, section)
+        # Another radius may not make the views change places.
+        compared = beside(session) is not None
+        kind = (session.mesh, compared, section.kind, section.direction, session.view.copies)
+        if made or kind != self._kind:
+            self._kind = kind
+            self._arrange(self.flats.extent, compared)
+            if whole:
+                self.viewing.fit()
+
+    def _arrange(self, extent: tuple[float, float] | None, compared: bool) -> None:
+        """Put the flat view where its section is large; below two views, and so a curve."""
+        wide, share = False, _SHARE
+        if extent is not None and not compared:
+            wide, share = place_for(extent, (self.width(), self.height()))
+        self.setOrientation(Qt.Orientation.Horizontal if wide else Qt.Orientation.Vertical)
+        size = self.width() if wide else self.height()
+        flat = round(share * size)
+        self.setSizes([size - flat, flat])
+
+    def _drop_flats(self) -> None:
+        flats, self.flats = self.flats, None
+        if flats is None:
+            return
+        whole = self.viewing.scene.sees_all()
+        flats.close_views()
+        flats.setParent(None)
+        flats.deleteLater()
+        if whole:
+            self.viewing.fit()
+
+    def set_look(self, look) -> None:
+        """Take other colours."""
+        self.look = look
+        if self.flats is not None:
+            self.flats.set_look(look)
+        self._sync()
+
+    def close_views(self) -> None:
+        """Give the graphics back, before those of the 3D view."""
+        self.handles.clear()
+        if self.flats is not None:
+            self.flats.close_views()
+            self.flats = None
+        self.wants_handle = False
+
+
+def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
+    """Tell whether a flat section goes beside the 3D view, else below, and its part of the room.
+
+    Parameters
+    ----------
+    extent : (float, float)
+        Width and height of the section, in the mesh's length unit.
+    room : (int, int)
+        Those of both views together, in pixels.
+    """
+    (wide, high), (width, height) = np.maximum(extent, 1e-300), np.maximum(room, 1)
+    beside_scale = min(_SHARE * width / wide, height / high)
+    below_scale = min(width / wide, _SHARE * height / high)
+    if width >= BESIDE_PX and below_scale < _LONG * beside_scale:
+        return True, _SHARE
+    # What a strip cannot fill is left to the view.
+    needed = (high / wide * width + FRAME_PX) / height
+    return False, float(np.clip(needed, 0.6 * _SHARE, _SHARE))
+
+
+def flat_one(sections: Sequence[Section]) -> int | None:
+    """Return the place of the section that is laid flat and shown, if one is."""
+    return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
+
+
+def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
+    """Return where the chosen section is after one was added, taken away or changed.
+
+    One that was added is chosen; after the chosen one is gone, its neighbour is.
+    """
+    if not new:
+        return None
+    if len(new) == len(old) and index is not None:
+        return index
+    first = next(
+        (i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b),
+        min(len(old), len(new)),
+    )
+    if len(new) > len(old) or index is None:
+        return min(first, len(new) - 1)
+    return min(index - (index > first), len(new) - 1)

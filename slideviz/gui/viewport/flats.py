@@ -1,0 +1,156 @@
+"""What is laid flat beside the view: one section, of one run or of two that are compared."""
+
+from __future__ import annotations
+
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QHBoxLayout, QWidget
+
+from slideviz.color_scheme import Look
+from slideviz.gui.viewport.section_curve import CurveView
+from slideviz.gui.viewport.unrolled import FlatView
+from slideviz.gui.viewport.viewing import Viewing
+from slideviz.sections.model import Section
+from slideviz.session.changes import UNDEFORMED, seen_beside
+from slideviz.session.state import Session
+
+FRAME_PX = 110
+"""Height of title, rulers and air around a flat section."""
+
+
+class Flats(QWidget):
+    """A flat view for each view of a 3D mesh, linked; or the curves along a line through a 2D one.
+
+    Parameters
+    ----------
+    viewing : Viewing
+        The views, with what they have cut already.
+    look : Look
+    multi_samples : int
+
+    Attributes
+    ----------
+    first, second
+        The flat views of the first and the second view; the curve is the first. None: none.
+    """
+
+    closed = Signal()
+
+    def __init__(self, viewing: Viewing, look: Look, multi_samples: int) -> None:
+        super().__init__()
+        self.setObjectName("flats")
+        self.viewing, self.look = viewing, look
+        self._multi_samples = multi_samples
+        self.first: FlatView | CurveView | None = None
+        self.second: FlatView | None = None
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(2)
+
+    def show_section(self, session: Session, section: Section) -> None:
+        """Show a section of all that the views show."""
+        assert session.mesh is not None
+        other = beside(session)
+        own = session, self.viewing.scene.sections.cuts
+        theirs = None if other is None else (other, self.viewing.second_cuts)
+        if session.mesh.dim == 2:
+            self._show_curve([own] if theirs is None else [own, theirs], section)
+            return
+        if not isinstance(self.first, FlatView):
+            self.first = self._make(own[1])
+        if theirs is None:
+            self._drop_second()
+        elif self.second is None:
+            self.second = self._make(theirs[1])
+            self.first.link(self.second)
+        if theirs is None or self.second is None:
+            self.first.show_section(session, section)
+            return
+        self.first.show_section(session, section, called(session))
+        self.second.show_section(theirs[0], section, called(theirs[0]))
+        stacked = self.extent is not None and stack(self.extent, (self.width(), self.height()))
+        self._row.setDirection(_direction(session.view.swapped, stacked))
+        self.first.refit()
+
+    @property
+    def extent(self) -> tuple[float, float] | None:
+        """Return width and height of the flat section; None of a curve, or where nothing is cut."""
+        box = self.first.scene.bounds() if isinstance(self.first, FlatView) else None
+        if box is None:
+            return None
+        width, height = (box[1] - box[0]).tolist()
+        return width, height
+
+    def _show_curve(self, shown: list, section: Section) -> None:
+        if not isinstance(self.first, CurveView):
+            self.first = CurveView(self.viewing.store, self.look)
+            self.first.closed.connect(self.closed)
+            self._row.addWidget(self.first, 1)
+        self.first.show_section(shown, section)
+
+    def _make(self, cuts) -> FlatView:
+        view = FlatView(self.viewing.store, cuts, self.look, self._multi_samples)
+        view.closed.connect(self.closed)
+        self._row.addWidget(view, 1)
+        view.show()
+        view.view.spare_software()
+        return view
+
+    def _drop_second(self) -> None:
+        second, self.second = self.second, None
+        if second is not None and isinstance(self.first, FlatView):
+            self.first.link(None)
+            second.close_view()
+            self._row.removeWidget(second)
+            second.setParent(None)
+            second.deleteLater()
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours."""
+        self.look = look
+        for view in (self.first, self.second):
+            if view is not None:
+                view.set_look(look)
+
+    def close_views(self) -> None:
+        """Give the graphics back."""
+        self._drop_second()
+        if self.first is not None:
+            self.first.close_view()
+
+
+def beside(session: Session) -> Session | None:
+    """Return the session as the second view shows it; None while there is one view."""
+    other = session.view.beside
+    if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return None
+    return seen_beside(session)
+
+
+def called(session: Session) -> str:
+    """Return what a view shows, in a few words."""
+    return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
+
+
+def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
+    """Tell whether two flat sections are larger one above the other than side by side.
+
+    Parameters
+    ----------
+    extent : (float, float)
+        Width and height of one, in the mesh's length unit.
+    room : (int, int)
+        Those of both views together, in pixels.
+    """
+    wide, high = (max(length, 1e-300) for length in extent)
+    width, height = room
+    beside = min(0.5 * width / wide, (height - FRAME_PX) / high)
+    above = min(width / wide, (0.5 * height - FRAME_PX) / high)
+    return above > beside
+
+
+def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
+    """Return from where to where the first and the second view stand."""
+    ways = QHBoxLayout.Direction
+    if stacked:
+        return ways.BottomToTop if swapped else ways.TopToBottom
+    return ways.RightToLeft if swapped else ways.LeftToRight

@@ -1,0 +1,125 @@
+"""The handle of a plane section in the 3D view: drag the plane, or its normal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pyvista as pv
+from qtpy.QtCore import QTimer
+from vtkmodules.vtkInteractionWidgets import (
+    vtkImplicitPlaneRepresentation,
+    vtkImplicitPlaneWidget2,
+)
+
+from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.sections.model import Section, Triple
+
+HANDLE_COLOUR = "#2f6fb5"
+HANDLE_PX = 11.0
+"""Size of the ball and of the arrow's tips."""
+
+Bounds = tuple[float, float, float, float, float, float]
+
+
+class PlaneHandle:
+    """A frame, an arrow and a ball that move a plane.
+
+    Parameters
+    ----------
+    view : View3D
+    moved : callable
+        Gets origin and normal while they are dragged, at most once per turn of the event loop.
+    held : callable
+        Gets whether the mouse begins to drag, or ends it.
+    """
+
+    def __init__(
+        self,
+        view: View3D,
+        moved: Callable[[Triple, Triple], None],
+        held: Callable[[bool], None] = lambda _held: None,
+    ) -> None:
+        self.view = view
+        self._moved, self._held = moved, held
+        self.shape = vtkImplicitPlaneRepresentation()
+        self.shape.SetPlaceFactor(1.0)
+        self.shape.OutlineTranslationOff()
+        self.shape.ScaleEnabledOff()
+        self.shape.OutsideBoundsOff()
+        self.shape.SetDrawOutline(False)
+        self.shape.SetHandleSize(HANDLE_PX)
+        self.widget = vtkImplicitPlaneWidget2()
+        self.widget.SetRepresentation(self.shape)
+        self.widget.SetInteractor(view.iren.interactor)
+        self._bounds: Bounds | None = None
+        self.dragging = False
+        self._soon = QTimer()
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(0)
+        self._soon.timeout.connect(self.tell)
+        self._observers = [
+            self.widget.AddObserver("StartInteractionEvent", lambda *_: self._grab(True)),
+            self.widget.AddObserver("InteractionEvent", lambda *_: self._soon.start()),
+            self.widget.AddObserver("EndInteractionEvent", lambda *_: self._grab(False)),
+        ]
+
+    def show(self, section: Section, bounds: Bounds, look: Look) -> None:
+        """Stand where the section is; while it is dragged, it knows better."""
+        self._colour(look)
+        if bounds != self._bounds:
+            self._bounds = bounds
+            self.shape.PlaceWidget(bounds)
+        if not self.dragging:
+            self.shape.SetOrigin(*section.origin)
+            self.shape.SetNormal(*section.basis[2])
+        if not self.widget.GetEnabled():
+            self.widget.On()
+
+    def hide(self) -> None:
+        """Vanish from the view."""
+        self._soon.stop()
+        self.dragging = False
+        if self.widget.GetEnabled():
+            self.widget.Off()
+
+    def close(self) -> None:
+        """Leave the view for ever."""
+        self.hide()
+        for observer in self._observers:
+            self.widget.RemoveObserver(observer)
+        self._observers = []
+        self.widget.SetInteractor(None)
+
+    def tell(self) -> None:
+        """Tell where the plane is now."""
+        origin, normal = np.array(self.shape.GetOrigin()), np.array(self.shape.GetNormal())
+        # More digits than anybody can aim for would be all one reads.
+        normal = normal.round(4) + 0.0
+        self._moved(tuple(origin.tolist()), tuple(normal.tolist()))
+
+    def _grab(self, dragging: bool) -> None:
+        self.dragging = dragging
+        if (
+            dragging
+            and self.shape.GetInteractionState() == vtkImplicitPlaneRepresentation.MovingOrigin
+        ):
+            # The ball would be dragged within the plane, and nothing would be seen to change.
+            self.shape.SetInteractionState(vtkImplicitPlaneRepresentation.Pushing)
+        if not dragging:
+            self._soon.stop()
+            self.tell()
+        self._held(dragging)
+
+    def _colour(self, look: Look) -> None:
+        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, look.text))
+        shape = self.shape
+        shape.SetForegroundColor(*plain)
+        shape.SetEdgeColor(*plain)
+        shape.SetHandleColor(*pv.Color(HANDLE_COLOUR).float_rgb)
+        shape.SetInteractionColor(*strong)
+        shape.GetPlaneProperty().SetColor(*plain)
+        shape.GetPlaneProperty().SetOpacity(0.06)
+        shape.GetSelectedPlaneProperty().SetColor(*strong)
+        shape.GetSelectedPlaneProperty().SetOpacity(0.12)

@@ -1,0 +1,147 @@
+"""The handle of a section of a 2D mesh: a line with points to move and turn it, or a circle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from qtpy.QtCore import QPoint
+
+from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.handle import HANDLE_COLOUR
+from slideviz.gui.viewport.pulled import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, Pulled
+from slideviz.mesh.model import FloatArray
+from slideviz.scene.pick import to_display
+from slideviz.scene.pick_cell import on_plane
+from slideviz.scene.section_handles import Grips, Part, dragged, grips, nearest
+from slideviz.sections.line import Box
+from slideviz.sections.model import Section
+
+NAMES = ("handle:rim", "handle:points", "handle:held")
+
+
+class FlatHandle(Pulled[tuple[Section, Box]]):
+    """Points on a line or circle that the mouse moves it by.
+
+    Parameters
+    ----------
+    view, *others
+        As for `slideviz.gui.viewport.pulled.Pulled`.
+    """
+
+    def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
+        super().__init__(view, *others)
+        self._look: Look | None = None
+        self._lift = 0.0
+        self._grips: Grips | None = None
+        self._placed: tuple[object, ...] = ()
+        self._watching = view.camera.AddObserver("ModifiedEvent", lambda *_: self.put())
+
+    def show(self, section: Section, lift: float, look: Look) -> None:
+        """Stand where the section is, so far above the mesh."""
+        self.section, self._lift, self._look = section, lift, look
+        self.put()
+
+    def close(self) -> None:
+        """Leave the view for ever."""
+        self.view.camera.RemoveObserver(self._watching)
+        for name in NAMES:
+            self.view.remove_actor(name, reset_camera=False, render=False)
+        super().close()
+
+    # Drawing ---------------------------------------------------------------------------
+
+    def seen(self) -> Box:
+        """Return what the view shows of the mesh's plane, without its edges."""
+        wide, high = self.view.window_size
+        corners = (
+            on_plane(self.view, EDGE_PX, EDGE_PX),
+            on_plane(self.view, wide - self._strip() - EDGE_PX, high - EDGE_PX),
+        )
+        return np.min(corners, axis=0), np.max(corners, axis=0)
+
+    def put(self) -> None:
+        """Put the points where they are in reach."""
+        if self.section is None:
+            return
+        seen = self.seen()
+        # To draw moves the near and far planes of the camera, too.
+        key = (self.section, self._lift, self._look, self._part, *seen[0], *seen[1])
+        if key == self._placed:
+            return
+        self._placed = key
+        self._grips = grips(self.section, seen)
+        empty = np.empty((0, 2))
+        points = empty
+        if self._grips is not None:
+            points = np.concatenate([self._grips.middle, self._grips.ends])
+        held = {"middle": self._grips.middle, "end": self._grips.ends} if self._grips else {}
+        look = self._look
+        assert look is not None
+        # Points are balls to VTK: one above another must be more than its radius higher.
+        ball = RIM_PX * float((seen[1] - seen[0]).max()) / max(self.view.window_size)
+        self._draw(NAMES[0], points, ball, (look.text, RIM_PX))
+        self._draw(NAMES[1], points, 2.0 * ball, (HANDLE_COLOUR, POINT_PX))
+        taken = held.get(self._part or "", empty)
+        self._draw(NAMES[2], taken, 3.0 * ball, (SELECTED_COLOUR, POINT_PX))
+
+    def _draw(self, name: str, points: FloatArray, above: float, style: tuple[str, float]) -> None:
+        actor = self.view.actors.get(name)
+        if not len(points):
+            if actor is not None:
+                actor.visibility = False
+            return
+        height = np.full(len(points), self._lift + above)
+        shape = pv.PolyData(np.column_stack([points, height]))
+        colour, size = style
+        if actor is None:
+            actor = self.view.add_mesh(
+                shape,
+                name=name,
+                point_size=size * self.view.devicePixelRatioF(),
+                render_points_as_spheres=True,
+                lighting=False,
+                reset_camera=False,
+                render=False,
+                pickable=False,
+            )
+        actor.mapper.dataset = shape
+        actor.prop.color = colour
+        actor.visibility = True
+
+    # Mouse -----------------------------------------------------------------------------
+
+    def part_at(self, where: QPoint) -> str | None:
+        """Return what the mouse would take at a position of the widget."""
+        if self._grips is None or self.section is None:
+            return None
+        shown: list[tuple[Part, FloatArray]] = [
+            ("end", self._pixels(self._grips.ends)),
+            ("middle", self._pixels(self._grips.middle)),
+            *(("line", self._pixels(line)) for line in self._grips.lines),
+        ]
+        reach = REACH_PX * self.view.devicePixelRatioF()
+        return nearest(shown, np.array(self.view.to_pixels(where)), reach)
+
+    def _pixels(self, points: FloatArray) -> FloatArray:
+        if not len(points):
+            return points
+        return to_display(self.view, np.column_stack([points, np.zeros(len(points))]))
+
+    def place_of(self, where: QPoint) -> FloatArray:
+        """Return a position of the widget in the plane of the mesh, (2,)."""
+        return np.array(on_plane(self.view, *self.view.to_pixels(where)))
+
+    def grasp(self) -> tuple[Section, Box]:
+        """Return the section, and what the view shows of the plane."""
+        assert self.section is not None
+        return self.section, self.seen()
+
+    def pulled(self, grasp: tuple[Section, Box], start: FloatArray, end: FloatArray) -> Section:
+        """Return the line or circle moved, turned or widened."""
+        section, box = grasp
+        assert self._part is not None
+        return dragged(section, self._part, (start, end), box)

@@ -1,0 +1,119 @@
+"""The handle of a cylinder through a 3D mesh: a frame around the cut, and a ball to pull it by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from qtpy.QtCore import QPoint
+
+from slideviz.color_scheme import Look
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.pull_mark import PullMark
+from slideviz.gui.viewport.pulled import EDGE_PX, REACH_PX, Pulled
+from slideviz.mesh.model import FloatArray
+from slideviz.scene.cylinder_handle import (
+    Patch,
+    Place,
+    frame_of,
+    on_cylinder,
+    pull,
+    radius_at,
+)
+from slideviz.scene.pick import to_display
+from slideviz.scene.section_handles import rounded
+from slideviz.sections.model import Section
+
+
+class RoundHandle(Pulled[tuple[Section, Place]]):
+    """A ball on a cylinder that the mouse changes its radius by.
+
+    It lies on what is cut of the mesh, where that is seen, and in front of everything.
+
+    Parameters
+    ----------
+    view, *others
+        As for `slideviz.gui.viewport.pulled.Pulled`.
+    """
+
+    def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
+        super().__init__(view, *others)
+        self._patch: Patch | None = None
+        self.place: Place | None = None
+        self._mark = PullMark(view)
+        # Before each drawing, whatever moved the camera or changed the size of the view.
+        self._watching = view.renderer.AddObserver("StartEvent", lambda *_: self.put())
+
+    def show(self, section: Section, patch: Patch, look: Look) -> None:
+        """Stand where the section is, around that part of it."""
+        self.section, self._patch = section, patch
+        self._mark.colour(look, self._part is not None)
+        self._mark.draw_frame(frame_of(section, patch))
+        self.put()
+
+    def close(self) -> None:
+        """Leave the view for ever."""
+        self.view.renderer.RemoveObserver(self._watching)
+        self._patch = None
+        self._mark.remove()
+        super().close()
+
+    def seen(self, points: FloatArray) -> FloatArray:
+        """Return where points (n, 3) are seen, (n, 2) in pixels from the lower left."""
+        return to_display(self.view, points)
+
+    def put(self) -> None:
+        """Put the ball where it is in reach, and what points to where it can be pulled."""
+        if self.section is None or self._patch is None:
+            return
+        self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
+        at, way, _ = pull(self.seen, self.section, self.place, self.section.radius)
+        self._mark.draw_ball(at, way / np.linalg.norm(way))
+        self._mark.highlight(self._part is not None)
+        if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
+            # It went from below the mouse, which stayed.
+            self._point_at(None)
+
+    def _in_reach(self, patch: Patch) -> Place:
+        """Return where the ball lies: in the middle, or beside it in a detail of the view."""
+        assert self.section is not None
+        places = np.concatenate([np.array([patch.middle]), patch.places])
+        pixels = self.seen(on_cylinder(self.section, places, self.section.radius))
+        wide, high = self.view.window_size
+        end = np.array([wide - self._strip() - EDGE_PX, high - EDGE_PX])
+        within = ((pixels >= EDGE_PX) & (pixels <= end)).all(axis=1)
+        if within[0] or not within.any():
+            return patch.middle
+        off = np.linalg.norm(pixels - (EDGE_PX + end) / 2.0, axis=1)
+        angle, along = places[int(np.argmin(np.where(within, off, np.inf)))].tolist()
+        return angle, along
+
+    # Mouse -----------------------------------------------------------------------------
+
+    def place_of(self, where: QPoint) -> FloatArray:
+        """Return a position of the widget in pixels from the lower left, (2,)."""
+        return np.array(self.view.to_pixels(where))
+
+    def part_at(self, where: QPoint) -> str | None:
+        """Return whether the mouse would take the ball at a position of the widget."""
+        if self.section is None or self.place is None:
+            return None
+        ball = on_cylinder(self.section, np.array([self.place]), self.section.radius)
+        reach = REACH_PX * self.view.devicePixelRatioF()
+        return (
+            "ball" if np.linalg.norm(self.seen(ball)[0] - self.place_of(where)) <= reach else None
+        )
+
+    def grasp(self) -> tuple[Section, Place]:
+        """Return the section, and where the ball lies."""
+        assert self.section is not None
+        assert self.place is not None
+        return self.section, self.place
+
+    def pulled(self, grasp: tuple[Section, Place], start: FloatArray, end: FloatArray) -> Section:
+        """Return the cylinder with another radius."""
+        section, place = grasp
+        radius = radius_at(self.seen, section, place, (start, end))
+        return replace(section, radius=rounded(radius, section.radius))

@@ -1,0 +1,121 @@
+"""The handles of the section that is chosen: one in each view, to move it by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from slideviz.color_scheme import Look
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.handle import Bounds, PlaneHandle
+from slideviz.gui.viewport.handle_flat import FlatHandle
+from slideviz.gui.viewport.handle_round import RoundHandle
+from slideviz.mesh.model import Mesh
+from slideviz.scene.cylinder_handle import patch_in
+from slideviz.scene.scene import Scene
+from slideviz.sections.model import Section, Triple
+
+Handle = PlaneHandle | FlatHandle | RoundHandle
+
+_ROOM = 0.03
+"""The plane's frame is so much larger than the mesh, as a part of its length."""
+
+
+class Handles:
+    """Shows where a section is in the views, and tells where it is dragged to.
+
+    Parameters
+    ----------
+    moved : callable
+        Gets the section while it is dragged.
+    held : callable
+        Gets whether the mouse begins to drag, or ends it.
+    """
+
+    def __init__(self, moved: Callable[[Section], None], held: Callable[[bool], None]) -> None:
+        self._moved, self._held = moved, held
+        self._section: Section | None = None
+        self._of: dict[View3D, Handle] = {}
+
+    def of(self, view: View3D) -> Handle | None:
+        """Return the handle in a view, if it has one."""
+        return self._of.get(view)
+
+    def __bool__(self) -> bool:
+        return bool(self._of)
+
+    def show(
+        self, views: list[tuple[View3D, Scene, Mesh]], section: Section, mesh: Mesh, look: Look
+    ) -> None:
+        """Let every view have a handle of a section.
+
+        Parameters
+        ----------
+        views : list of (View3D, Scene, Mesh)
+            Each with the mesh as it is shown there.
+        section : Section
+        mesh : Mesh
+            As it was opened.
+        look : Look
+        """
+        self._section = section
+        for view, scene, shown in views:
+            handle = self._of.get(view)
+            wanted = kind_of(section, mesh)
+            if handle is not None and not isinstance(handle, wanted):
+                self.drop(view)
+                handle = None
+            if handle is None:
+                handle = self._of[view] = self._make(wanted, view, scene)
+            if isinstance(handle, FlatHandle):
+                handle.show(section, scene.stage.lift(mesh), look)
+            elif isinstance(handle, RoundHandle):
+                handle.show(section, patch_in(section, shown, scene.sections.cuts), look)
+            else:
+                handle.show(section, _around(mesh), look)
+            view.render_soon()
+
+    def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:
+        if kind is PlaneHandle:
+            return PlaneHandle(view, self._dragged, self._held)
+        made = FlatHandle if kind is FlatHandle else RoundHandle
+        return made(view, scene.stage.strip, self._moved, self._held)
+
+    def drop(self, view: View3D) -> None:
+        """Take the handle from a view."""
+        handle = self._of.pop(view, None)
+        if handle is not None:
+            handle.close()
+            view.render_soon()
+
+    def clear(self) -> None:
+        """Take the handles from all views."""
+        for view in list(self._of):
+            self.drop(view)
+
+    def _dragged(self, origin: Triple, normal: Triple) -> None:
+        section = self._section
+        if section is None or section.kind != "plane":
+            return
+        moved = replace(section, origin=origin, direction=normal)
+        if not np.allclose(moved.origin, section.origin) or not np.allclose(
+            moved.basis[2], section.basis[2]
+        ):
+            self._moved(moved)
+
+
+def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
+    """Return what moves a section of a mesh."""
+    if mesh.dim == 2:
+        return FlatHandle
+    return PlaneHandle if section.kind == "plane" else RoundHandle
+
+
+def _around(mesh: Mesh) -> Bounds:
+    """Return a box around a 3D mesh."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    room = _ROOM * (high - low).max()
+    x, y, z = np.stack([low - room, high + room], axis=1).tolist()
+    return (*x, *y, *z)

@@ -1,0 +1,156 @@
+"""What handles have in common that the mouse pulls: which part it would take, and where it goes."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from qtpy.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.mesh.model import FloatArray
+from slideviz.sections.model import Section
+
+POINT_PX, RIM_PX = 11.0, 15.0
+"""Sizes of what is pulled, and of what sets it off."""
+REACH_PX = 10.0
+EDGE_PX = 22.0
+"""What is pulled keeps so far from the edges of the view, and from the legend."""
+
+Grasp = TypeVar("Grasp")
+"""What was when the mouse took it, the section first."""
+
+
+class Pulled(QObject, Generic[Grasp]):
+    """A handle of a section in a view; who draws it says what the mouse takes and does.
+
+    Parameters
+    ----------
+    view : View3D
+    strip : callable
+        Returns the pixels at the right that are the legend's.
+    moved : callable
+        Gets the section while it is dragged, at most once per turn of the event loop.
+    held : callable
+        Gets whether the mouse begins to drag, or ends it.
+    """
+
+    def __init__(
+        self,
+        view: View3D,
+        strip: Callable[[], float],
+        moved: Callable[[Section], None],
+        held: Callable[[bool], None] = lambda _held: None,
+    ) -> None:
+        super().__init__(view)
+        self.view, self._strip = view, strip
+        self._moved, self._held = moved, held
+        self.section: Section | None = None
+        self._part: str | None = None
+        self._mouse = QPoint(-1, -1)
+        self._start: tuple[Grasp, FloatArray] | None = None
+        self._at: FloatArray | None = None
+        self._soon = QTimer(self)
+        self._soon.setSingleShot(True)
+        self._soon.setInterval(0)
+        self._soon.timeout.connect(self.tell)
+        view.installEventFilter(self)
+
+    @property
+    def dragging(self) -> bool:
+        """Tell whether the mouse holds it."""
+        return self._start is not None
+
+    def close(self) -> None:
+        """Leave the view for ever."""
+        self._soon.stop()
+        self.view.removeEventFilter(self)
+        self.view.unsetCursor()
+        self._start = self.section = None
+        self.deleteLater()
+
+    # What differs ----------------------------------------------------------------------
+
+    def part_at(self, where: QPoint) -> str | None:
+        """Return what the mouse would take at a position of the widget."""
+        raise NotImplementedError
+
+    def place_of(self, where: QPoint) -> FloatArray:
+        """Return a position of the widget as the handle counts it."""
+        raise NotImplementedError
+
+    def grasp(self) -> Grasp:
+        """Return what must be known of the moment at which the mouse takes it."""
+        raise NotImplementedError
+
+    def put(self) -> None:
+        """Draw it where it is, and what the mouse would take."""
+        raise NotImplementedError
+
+    def pulled(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
+        """Return the section pulled from one place to another."""
+        raise NotImplementedError
+
+    # Mouse -----------------------------------------------------------------------------
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if kind == QEvent.Type.MouseButtonPress and event.button() == Qt.MouseButton.LeftButton:
+            return self._press(event.position().toPoint())
+        if kind == QEvent.Type.MouseMove:
+            return self._move(event.position().toPoint(), bool(event.buttons()))
+        if kind == QEvent.Type.MouseButtonRelease and self.dragging:
+            return self._release(event.position().toPoint())
+        return False
+
+    def _press(self, where: QPoint) -> bool:
+        part = self.part_at(where)
+        if part is None:
+            return False
+        self._point_at(part)
+        self._start = self.grasp(), self.place_of(where)
+        self._at = None
+        self._held(True)
+        return True
+
+    def _move(self, where: QPoint, pressed: bool) -> bool:
+        self._mouse = where
+        if self.dragging:
+            self._at = self.place_of(where)
+            self._soon.start()
+            return True
+        if not pressed:
+            self._point_at(self.part_at(where))
+        return False
+
+    def _release(self, where: QPoint) -> bool:
+        self._soon.stop()
+        self._mouse = where
+        if self._at is not None:
+            self._at = self.place_of(where)
+            self.tell()
+        self._start = self._at = None
+        self._held(False)
+        self.put()
+        self._point_at(self.part_at(where))
+        self.view.render_soon()
+        return True
+
+    def _point_at(self, part: str | None) -> None:
+        """Show what the mouse would take, or has taken."""
+        if part == self._part:
+            return
+        self._part = part
+        if part is None:
+            self.view.unsetCursor()
+        else:
+            self.view.setCursor(Qt.CursorShape.SizeAllCursor)
+        self.put()
+        self.view.render_soon()
+
+    def tell(self) -> None:
+        """Tell where the section is now."""
+        if self._start is not None and self._at is not None:
+            self._moved(self.pulled(*self._start, self._at))

@@ -1,0 +1,127 @@
+"""The curve of a line or circle through a 2D mesh, beside the view: quality along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from matplotlib.figure import Figure
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import QToolButton, QVBoxLayout, QWidget
+
+from slideviz.color_scheme import Look
+from slideviz.gui.panels.curves import CurveCanvas
+from slideviz.gui.viewport.beside import TitleBar
+from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.plot_canvas import (
+    PLOT_FILTERS,
+    PlotArea,
+    ask_and_write,
+    folder_of,
+    write_plot,
+)
+from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.theme import icon_colour
+from slideviz.plots.section_curve import Colours, CurveRow, draw_curves
+from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
+from slideviz.plots.style import Style
+from slideviz.sections.model import Section
+from slideviz.session import changes
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+NOTHING = "The section cuts no cell."
+
+
+class CurveView(QWidget):
+    """The numbers along one section, of all runs that are shown and of the undeformed mesh.
+
+    Parameters
+    ----------
+    store : Store
+    look : Look
+    """
+
+    closed = Signal()
+
+    def __init__(self, store: Store, look: Look) -> None:
+        super().__init__()
+        self.setObjectName("curve_view")
+        self.store = store
+        self.title = TitleBar("curve_title", closable=True)
+        self.title.close_button.setToolTip("Close the curve")
+        self.title.closed.connect(self.closed)
+        self.title.show()
+        self.save_button = QToolButton()
+        self.save_button.setAutoRaise(True)
+        self.save_button.setToolTip("Save the curve as PNG, SVG or PDF…")
+        self.save_button.clicked.connect(self._save)
+        self.title.layout().insertWidget(1, self.save_button)
+        self.facts = ElidedLabel()
+        self.facts.setObjectName("curve_facts")
+        self.area = PlotArea(self.drawing, CurveCanvas)
+        self.area.canvas.picked = self._picked
+        self.area.canvas.setToolTip("Click to mark the cell at a place.")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        for widget in (self.title, self.facts):
+            column.addWidget(widget)
+        column.addWidget(self.area, 1)
+        self._made = CurveRows()
+        self.rows: tuple[CurveRow, ...] = ()
+        self._labels, self._colours = ("", ""), Colours()
+        self.set_look(look)
+
+    def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
+        """Show a section of what the views show, the first one first."""
+        session, cuts = shown[0]
+        self.rows = self._made.of(shown, section)
+        self._labels, self._colours = labels_of(session, section), colours_of(session)
+        self.title.set_text(section.describe(2))
+        facts = facts_of(session, cuts, section)
+        self.facts.setText(facts)
+        self.facts.setToolTip(facts)
+        self.save_button.setEnabled(bool(self.rows))
+        if self.rows:
+            self.area.plot()
+        else:
+            self.area.say(NOTHING)
+
+    def drawing(self) -> Draw:
+        """Return what draws the curves there are now."""
+        return partial(_draw, self.rows, self._labels, self._colours)
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours."""
+        self.area.canvas.set_look(look)
+        self.save_button.setIcon(icon("picture", icon_colour(look)))
+
+    def close_view(self) -> None:
+        """Draw no more."""
+        self.rows = ()
+
+    def _picked(self, position: float) -> None:
+        """Mark the cell at a position of the curve that is looked at; beside it: none."""
+        if self.rows and not self.area.empty:
+            self.store.change(changes.mark, self.rows[-1].curve.cell_at(position))
+
+    def _save(self) -> None:
+        default = folder_of(self) / "along_section.png"
+        draw = self.drawing()
+        ask_and_write(
+            self, "Save curve", default, PLOT_FILTERS, lambda path: write_plot(path, draw)
+        )
+
+
+def _draw(
+    rows: Sequence[CurveRow],
+    labels: tuple[str, str],
+    colours: Colours,
+    figure: Figure,
+    style: Style,
+) -> None:
+    if rows:
+        draw_curves(figure.add_subplot(), rows, labels, style, colours)

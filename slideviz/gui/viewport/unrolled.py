@@ -1,0 +1,169 @@
+"""The flat view of a section beside the 3D view: a cylinder unrolled to (z, r theta)."""
+
+from __future__ import annotations
+
+from qtpy.QtCore import QPoint, QTimer, Signal
+from qtpy.QtWidgets import QGridLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from slideviz.color_scheme import Look
+from slideviz.gui.viewport.beside import TitleBar
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.hover import CellHover
+from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.ruler import Ruler
+from slideviz.gui.widgets.theme import icon_colour
+from slideviz.scene.flat_scene import FlatScene
+from slideviz.sections.model import Section
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+
+class FlatView(QWidget):
+    """One section laid flat, with rulers, what is told of it, and buttons to fit and close.
+
+    Parameters
+    ----------
+    store : Store
+    cuts : Cuts
+        Those of the 3D view.
+    look : Look
+    multi_samples : int
+    """
+
+    closed = Signal()
+
+    def __init__(self, store: Store, cuts: Cuts, look: Look, multi_samples: int = 4) -> None:
+        super().__init__()
+        self.setObjectName("flat_view")
+        self.title = TitleBar("flat_title", closable=True)
+        self.title.close_button.setToolTip("Close the flat view")
+        self.title.closed.connect(self.closed)
+        self.title.show()
+        self.fit_button = QToolButton()
+        self.fit_button.setAutoRaise(True)
+        self.fit_button.setToolTip("Make the section fill this view")
+        self.fit_button.clicked.connect(self.fit)
+        self.title.layout().insertWidget(1, self.fit_button)
+        self.facts = ElidedLabel()
+        self.facts.setObjectName("flat_facts")
+        self.view = View3D(self, multi_samples=multi_samples)
+        self.view.setMinimumSize(120, 80)
+        self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        self.view.set_flat(True)
+        self.scene = FlatScene(self.view, cuts, look)
+        self.across, self.upright = Ruler(False), Ruler(True)
+        self._partner: FlatView | None = None
+        self._fitted: tuple[object, ...] = ()
+        self._ranges: tuple[object, ...] = ()
+        self._place()
+        self._connect(store)
+        self.set_look(look)
+
+    def _place(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.title)
+        column.addWidget(self.facts)
+        grid = QGridLayout()
+        grid.setSpacing(0)
+        grid.addWidget(self.upright, 0, 0)
+        grid.addWidget(self.view, 0, 1)
+        grid.addWidget(self.across, 1, 1)
+        grid.setColumnStretch(1, 1)
+        grid.setRowStretch(0, 1)
+        column.addLayout(grid, 1)
+
+    def _connect(self, store: Store) -> None:
+        self.view.told.zoomed.connect(self._zoomed)
+        self.view.told.resized.connect(self._resized)
+        self._refit = QTimer(self)
+        self._refit.setSingleShot(True)
+        self._refit.setInterval(0)
+        self._refit.timeout.connect(self.fit)
+        CellHover(self.view, self.scene, store)
+        # The camera moves by the mouse too: the rulers follow whatever moves it.
+        self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
+
+    def link(self, other: FlatView | None) -> None:
+        """Show from now on what another view shows of its section, and it what this one does."""
+        for one, partner in ((self._partner, None), (self, other), (other, self)):
+            if one is not None:
+                one._partner = partner
+                one.scene.beside = partner.scene if partner is not None else None
+
+    def show_section(self, session: Session, section: Section, called: str = "") -> None:
+        """Show a section of the frame that is shown; another one fills the view."""
+        self.scene.update(session, section)
+        words = section.describe()
+        self.title.set_text(f"{called}: {words}" if called else words)
+        self.facts.setText(self.scene.summary)
+        self.facts.setToolTip(self.scene.summary)
+        kind = (session.mesh, section.kind, section.direction, session.view.copies)
+        if kind != self._fitted:
+            self._fitted = kind
+            self._refit.start()
+        elif self.scene.ranges() == self._ranges:
+            # Nobody has chosen a detail: what grows with the radius is still seen whole.
+            self._fit()
+        self._sync_rulers()
+        self.view.render_soon()
+
+    def fit(self) -> None:
+        """Make the section fill the view."""
+        self._fit()
+        self._sync_rulers()
+        self.view.render()
+
+    def refit(self) -> None:
+        """Make the section fill the view, where nobody has chosen a detail."""
+        if self.scene.ranges() == self._ranges:
+            self.fit()
+
+    def _fit(self) -> None:
+        self.scene.fit()
+        for one in (self, self._partner):
+            if one is not None:
+                one._ranges = one.scene.ranges()
+
+    def _looked(self) -> None:
+        """Follow the camera, whatever moves it."""
+        self._sync_rulers()
+        partner = self._partner
+        # Drawing moves the near and far planes, which is no movement.
+        if partner is not None and not partner.scene.looks_like(self.scene):
+            partner.scene.take_camera(self.scene)
+            partner.view.render_soon()
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours."""
+        self.scene.set_look(look)
+        self.fit_button.setIcon(icon("fit", icon_colour(look)))
+        self.view.render()
+
+    def close_view(self) -> None:
+        """Give the graphics back."""
+        self._refit.stop()
+        self.view.camera.RemoveObserver(self._watching)
+        self.view.close()
+
+    def _resized(self) -> None:
+        if self.scene.section is not None:
+            self._refit.start()
+
+    def _zoomed(self, where: QPoint, factor: float) -> None:
+        x, y = self.view.to_pixels(where)
+        self.scene.zoom_at(x, y, factor)
+        self.view.render()
+
+    def _sync_rulers(self) -> None:
+        if self.scene.section is None:
+            return
+        spans = self.scene.ranges()
+        rulers = (self.across, self.upright)
+        for ruler, reach, label in zip(rulers, spans, self.scene.labels, strict=True):
+            length = ruler.height() if ruler.upright else ruler.width()
+            fits = ruler.fontMetrics().horizontalAdvance(label.full) < length
+            ruler.show_range(*reach, label.full if fits else label.short)

@@ -1,0 +1,334 @@
+"""The middle of the window: the view of the mesh, and a second one beside it to compare runs."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from qtpy.QtCore import QPoint, Qt, Signal
+from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
+
+from slideviz.color_scheme import Look
+from slideviz.gui.panels.boundaries import boundary_menu
+from slideviz.gui.viewport.beside import CameraLink, TitleBar
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.hover import CellHover
+from slideviz.gui.widgets.runs_menu import fill_pane
+from slideviz.scene.color_legend import STRIP
+from slideviz.scene.scene import Scene
+from slideviz.session import changes, jobs
+from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.panes import choices, close_pane, panes
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Session
+from slideviz.session.store import Store
+
+
+class Viewing(QWidget):
+    """One view, or two side by side with one camera and one range of colours.
+
+    Attributes
+    ----------
+    view, scene
+        The first view and what it draws.
+    second, second_scene
+        The other, None while one is enough.
+    titles
+        What stands above each while there are two.
+
+    Signals
+    -------
+    second_made(), second_leaves()
+        The second view is there; it is still there, but will be closed.
+    """
+
+    second_made = Signal()
+    second_leaves = Signal()
+
+    def __init__(self, store: Store, multi_samples: int = 4, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.store = store
+        self._multi_samples = multi_samples
+        self._ghosts: Ghosts | None = None
+        self.surfaces: tuple = ()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(2)
+        self.titles = [self._title(column) for column in (0, 1)]
+        self.view = self._make_view()
+        self._grid.addWidget(self.view, 1, 0)
+        self.scene = Scene(self.view)
+        self._connect(self.view, self.scene)
+        self.second: View3D | None = None
+        self.second_scene: Scene | None = None
+        # For whoever shows the same beside it.
+        self.second_cuts = Cuts()
+        self._before: tuple[float, ...] | None = None
+        self._link: CameraLink | None = None
+
+    # Parts -----------------------------------------------------------------------------
+
+    def _title(self, column: int) -> TitleBar:
+        title = TitleBar(
+            f"view_title_{column}", True, lambda menu: fill_pane(menu, self.store, column)
+        )
+        title.closed.connect(lambda: self.store.change(close_pane, column))
+        self._grid.addWidget(title, 0, column)
+        self._grid.setColumnStretch(column, 0 if column else 1)
+        return title
+
+    def _make_view(self) -> View3D:
+        view = View3D(self, multi_samples=self._multi_samples)
+        view.setMinimumSize(160, 120)
+        # Of two, each gets half, whatever sizes they had before.
+        view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        return view
+
+    def _connect(self, view: View3D, scene: Scene) -> None:
+        view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
+        view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
+        view.told.resized.connect(lambda: self._resized(scene))
+        view.told.unveiled.connect(lambda: scene.update(scene.session))
+        CellHover(view, scene, self.store)
+        view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
+
+    def _make_second(self, session: Session) -> None:
+        """Make the second view; from now on what moves one camera moves the other."""
+        detail = self._before is not None or self.scene.eye.sees_detail()
+        self.second = self._make_view()
+        self._place(session.view.swapped)
+        self.second.setVisible(True)
+        self.second_scene = Scene(self.second, self.scene.look)
+        self.second_scene.sections.cuts = self.second_cuts
+        self._connect(self.second, self.second_scene)
+        self.second.spare_software()
+        self.second.set_flat(session.mesh.dim == 2)
+        self.second_scene.open(changes.seen_beside(session), self.surfaces)
+        self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
+        self.second_scene.take_camera(self.scene)
+        self._share_legend(session.view.swapped)
+        self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
+        self.scene.eye.beside, self.second_scene.eye.beside = self.second_scene.eye, self.scene.eye
+        self._rearranged(not detail)
+        self.second.unveil()
+        self.second_made.emit()
+
+    def _swap(self, swapped: bool) -> None:
+        """Let the two views change places where they stand the other way round."""
+        if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
+            return
+        fitted = self._leader.eye.fitted
+        self._place(swapped)
+        self._share_legend(swapped)
+        if fitted:
+            self.fit()
+
+    def _share_legend(self, swapped: bool) -> None:
+        """Draw the legend in the view to the right only, which is wider by its strip."""
+        self.scene.set_legend(swapped)
+        self.second_scene.set_legend(not swapped)
+        self._share_width()
+
+    def _share_width(self) -> None:
+        """Give both meshes the same room, beside the legend."""
+        if self.second is None:
+            return
+        strip = round(STRIP / self.devicePixelRatioF())
+        rest = max(self.width() - self._grid.spacing() - strip, 2)
+        for column, width in enumerate((rest // 2, rest - rest // 2 + strip)):
+            self._grid.setColumnStretch(column, width)
+
+    def _place(self, swapped: bool) -> None:
+        """Put the second view to the right of the first, or to the left."""
+        pair = (self.second, self.view) if swapped else (self.view, self.second)
+        for view in pair:
+            self._grid.removeWidget(view)
+        for column, view in enumerate(pair):
+            self._grid.addWidget(view, 1, column)
+
+    def _resized(self, scene: Scene) -> None:
+        """Draw a view of another size; where everything filled it, everything does again."""
+        fitted = self._leader.eye.fitted
+        scene.resized()
+        if fitted:
+            self._leader.fit()
+
+    @property
+    def _leader(self) -> Scene:
+        """Return what is fitted: of two views the one with the legend."""
+        having = (scene for scene in reversed(self._scenes()) if scene.stage.has_legend)
+        return next(having, self.scene)
+
+    def _rearranged(self, whole: bool) -> None:
+        """Draw views of another width; who saw the whole mesh still does, who a detail too."""
+        self._grid.activate()
+        if whole:
+            self.fit()
+        self.render()
+
+    def _drop_second(self) -> None:
+        if self.second is None:
+            return
+        self.second_leaves.emit()
+        second, self.second, self.second_scene = self.second, None, None
+        whole = self.scene.sees_all()
+        self._link.end()
+        self._link = None
+        self.scene.eye.beside = None
+        for view in (second, self.view):
+            self._grid.removeWidget(view)
+        self._grid.addWidget(self.view, 1, 0)
+        for column, stretch in enumerate((1, 0)):
+            self._grid.setColumnStretch(column, stretch)
+        second.close()
+        second.deleteLater()
+        for title in self.titles:
+            title.hide()
+        self.scene.set_legend(True)
+        self._rearranged(whole)
+
+    # The session -----------------------------------------------------------------------
+
+    def open(self, opened: jobs.Opened, session: Session) -> None:
+        """Show another mesh, from where its case was looked at if that is known."""
+        self._drop_second()
+        self._before = None
+        self.surfaces = opened.surfaces
+        self._ghosts = opened.ghosts
+        self.view.spare_software()
+        self.view.set_flat(session.mesh.dim == 2)
+        self.scene.open(session, opened.surfaces)
+        if opened.camera is not None:
+            self.scene.eye.go(opened.camera)
+        self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
+        self.view.unveil()
+
+    def sync(self, old: Session, new: Session) -> None:
+        """Show what changed."""
+        if old.case != new.case and self._ghosts is not None and self._ghosts.mesh is new.mesh:
+            moved = self._ghosts.moved(new.case)
+            for scene in self._scenes():
+                scene.set_motion_ghosts(moved)
+        if old.mesh is not new.mesh:
+            return
+        try:
+            self.scene.update(new)
+        finally:
+            # What can be drawn is drawn.
+            self.view.render_soon()
+            self._sync_beside(new)
+        if old.view.copies != new.view.copies:
+            # Neighbours that were asked for should be seen, and the mesh again when they go.
+            self.fit()
+
+    def _sync_beside(self, session: Session) -> None:
+        beside = session.view.beside
+        other = session.run(beside)
+        if other is None and beside != changes.UNDEFORMED:
+            self._drop_second()
+            return
+        names = choices(session)
+        for title, number in zip(self.titles, panes(session), strict=True):
+            title.setVisible(True)
+            title.set_text(names.get(number, f"Run {number}"))
+        if self.second is None:
+            self._make_second(session)
+        else:
+            self._swap(session.view.swapped)
+            self.second_scene.update(changes.seen_beside(session))
+            self.second.render_soon()
+
+    def pairs(self) -> list[tuple[View3D, Scene]]:
+        """Return the views with what each draws, one or two."""
+        views = (self.view,) if self.second is None else (self.view, self.second)
+        return list(zip(views, self._scenes(), strict=True))
+
+    def _scenes(self) -> tuple[Scene, ...]:
+        """Return what is drawn, of one view or two."""
+        return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
+
+    # Mouse -----------------------------------------------------------------------------
+
+    def _clicked(self, view: View3D, scene: Scene, where: QPoint, modifiers) -> None:
+        if modifiers & Qt.KeyboardModifier.AltModifier:
+            return  # means a cell
+        name = scene.pick(*view.to_pixels(where))
+        chosen = self.store.session.view.selected
+        if modifiers & Qt.KeyboardModifier.ControlModifier and name:
+            rest = tuple(other for other in chosen if other != name)
+            self.store.change(changes.select, rest if name in chosen else (*chosen, name))
+        else:
+            self.store.change(changes.select, (name,) if name else ())
+
+    def _menu(self, view: View3D, scene: Scene, where: QPoint) -> None:
+        if self.store.session.mesh is None:
+            return
+        name = scene.pick(*view.to_pixels(where))
+        chosen = self.store.session.view.selected
+        if name is not None and name not in chosen:
+            self.store.change(changes.select, (name,))
+            chosen = (name,)
+        if chosen:
+            boundary_menu(self.window(), self.store, chosen).popup(view.mapToGlobal(where))
+
+    def _zoomed(self, view: View3D, scene: Scene, where: QPoint, factor: float) -> None:
+        scene.zoom_at(*view.to_pixels(where), factor)
+        self.render()
+
+    def resizeEvent(self, event) -> None:
+        super().resizeEvent(event)
+        self._share_width()
+
+    # Camera and pictures ---------------------------------------------------------------
+
+    def render(self) -> None:
+        """Draw again what is shown."""
+        self.view.render()
+        if self.second is not None:
+            self.second.render()
+
+    def fit(self) -> None:
+        """Make everything fill the view."""
+        self._before = None
+        self._leader.fit()
+        self.render()
+
+    def refit(self) -> None:
+        """Show everything again, where some left a view for which nobody chose another camera.
+
+        While everything is seen the camera stays: a jump would look like a motion of the mesh.
+        """
+        fitted = self._leader.eye.fitted
+        if fitted and any(scene.eye.loses_some() for scene in self._scenes()):
+            self.fit()
+
+    def fly_to(self, cell: int) -> None:
+        """Look at a cell of the mesh that is shown; `fly_back` returns."""
+        if self._before is None:
+            self._before = self.scene.eye.place
+        self.scene.fly_to(cell)
+        self.render()
+
+    def fly_back(self) -> None:
+        """Look from where one looked before flying to cells; at all of the mesh if one did not."""
+        before, self._before = self._before, None
+        if before is None:
+            self.fit()
+        else:
+            self.scene.eye.go(before)
+            self.render()
+
+    def look_from(self, side: str) -> None:
+        """Look from a side."""
+        self._leader.look_from(side)
+        self.render()
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours."""
+        for scene in self._scenes():
+            scene.set_look(look)
+        self.render()
+
+    def close_views(self) -> None:
+        """Give the views' graphics back."""
+        self._drop_second()
+        self.view.close()

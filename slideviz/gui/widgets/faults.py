@@ -1,0 +1,215 @@
+"""What nobody expected: told once, counted after that, with details to copy; the window goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import logging
+import os
+import platform
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from qtpy.QtCore import QObject, QTimer, QtMsgType, Signal, qInstallMessageHandler, qVersion
+from qtpy.QtWidgets import QApplication
+
+from slideviz.mesh.io.private import private_file, private_folder
+from slideviz.mesh.undone import is_alive
+
+REST_S = 5.0
+"""An error that was told is told again when it has not come for so long."""
+COUNTING_MS = 300
+PACKAGES = (
+    "slideviz",
+    "numpy",
+    "scipy",
+    "numba",
+    "vtk",
+    "pyvista",
+    "pyvistaqt",
+    "PySide6_Essentials",
+)
+_LEVELS = {
+    QtMsgType.QtDebugMsg: logging.DEBUG,
+    QtMsgType.QtInfoMsg: logging.INFO,
+    QtMsgType.QtWarningMsg: logging.WARNING,
+    QtMsgType.QtCriticalMsg: logging.ERROR,
+    QtMsgType.QtFatalMsg: logging.CRITICAL,
+}
+log = logging.getLogger("slideviz")
+
+
+class Faults(QObject):
+    """Tells of errors in the banner of a window: each once, with how often it came.
+
+    Attributes
+    ----------
+    count : int
+        How many there were.
+    """
+
+    _came = Signal(object)
+
+    def __init__(
+        self,
+        banner: Any,
+        parent: QObject | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(parent)
+        self.count = 0
+        self._banner = banner
+        self._clock = clock
+        self._known: dict[tuple[object, ...], tuple[int, float]] = {}
+        self._shown: tuple[object, ...] = ()
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(COUNTING_MS)
+        self._timer.timeout.connect(self._count_again)
+        self._came.connect(self._take)
+
+    def tell(self, error: BaseException) -> None:
+        """Tell of an error, from any thread."""
+        with contextlib.suppress(RuntimeError):  # the window may be gone
+            self._came.emit(error)
+
+    def _take(self, error: BaseException) -> None:
+        self.count += 1
+        key, now = _place(error), self._clock()
+        times, last = self._known.get(key, (0, float("-inf")))
+        fresh = now - last >= REST_S
+        self._known[key] = (1 if fresh else times + 1, now)
+        if fresh:
+            log.error("unexpected", exc_info=error)
+            self._shown = key
+            self._banner.tell_error(error)
+        elif key == self._shown and not self._timer.isActive():
+            # Not at once: an error while something is painted would go round and round.
+            self._timer.start()
+
+    def _count_again(self) -> None:
+        self._banner.count(self._known[self._shown][0])
+
+
+def _place(error: BaseException) -> tuple[object, ...]:
+    """Return what two errors have in common that are the same: kind, and where it was raised."""
+    trace = traceback.extract_tb(error.__traceback__)
+    last = (trace[-1].filename, trace[-1].lineno) if trace else (str(error),)
+    return (type(error).__name__, *last)
+
+
+def details_of(error: BaseException) -> str:
+    """Return what somebody who looks for the mistake needs: trace, versions, platform."""
+    trace = "".join(traceback.format_exception(error))
+    return f"{trace}\n{versions()}\n"
+
+
+def versions() -> str:
+    """Return the versions of what takes part, and the platform, a line for each."""
+    lines = [f"Python {platform.python_version()}", f"Qt {qVersion()}"]
+    for name in PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            lines.append(f"{name} {metadata.version(name)}")
+    return "\n".join([*lines, platform.platform()])
+
+
+@contextlib.contextmanager
+def caught(faults: Faults) -> Iterator[None]:
+    """Tell of every error that nobody catches; what Qt, VTK and Python warn of goes to the log."""
+    with ExitStack() as stack:
+        stack.callback(setattr, sys, "excepthook", sys.excepthook)
+        stack.callback(setattr, threading, "excepthook", threading.excepthook)
+        stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
+        sys.excepthook = lambda _, error, __: _uncaught(faults, error)
+        threading.excepthook = lambda what: what.exc_value and faults.tell(what.exc_value)
+        sys.unraisablehook = lambda what: log.warning("ignored: %r", what.exc_value)
+        qInstallMessageHandler(_qt_says)
+        stack.callback(qInstallMessageHandler, None)
+        stack.enter_context(_vtk_heard())
+        logging.captureWarnings(True)
+        stack.callback(logging.captureWarnings, False)
+        yield
+
+
+def _uncaught(faults: Faults, error: BaseException) -> None:
+    if isinstance(error, KeyboardInterrupt):
+        QApplication.quit()
+    else:
+        faults.tell(error)
+
+
+def _qt_says(kind: QtMsgType, _context: object, text: str) -> None:
+    logging.getLogger("slideviz.qt").log(_LEVELS.get(kind, logging.WARNING), "Qt: %s", text)
+
+
+@contextlib.contextmanager
+def _vtk_heard() -> Iterator[None]:
+    """Put VTK's errors and warnings into the log, instead of the terminal."""
+    from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+
+    before = vtkOutputWindow.GetInstance()
+    heard = vtkStringOutputWindow()
+    logger = logging.getLogger("slideviz.vtk")
+    for event, level in (("ErrorEvent", logging.ERROR), ("WarningEvent", logging.WARNING)):
+
+        def says(_window: object, _event: str, text: str, level: int = level) -> None:
+            logger.log(level, "VTK: %s", " ".join(text.split()))
+            heard.Initialize()
+
+        says.CallDataType = "string0"  # type: ignore[attr-defined]
+        heard.AddObserver(event, says)
+    vtkOutputWindow.SetInstance(heard)
+    try:
+        yield
+    finally:
+        vtkOutputWindow.SetInstance(before)
+
+
+# Crashes of the whole program ------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def crash_log(folder: Path) -> Iterator[None]:
+    """Write where every thread was to ``crash-PID.log`` in a folder, should the program crash."""
+    path = folder / f"crash-{os.getpid()}.log"
+    try:
+        private_folder(folder)
+        private_file(path)
+        file = path.open("w", encoding="utf-8")
+    except OSError as problem:
+        log.warning("a crash would leave no trace: %s", problem)
+        yield
+        return
+    with file:
+        faulthandler.enable(file)
+        try:
+            yield
+        finally:
+            faulthandler.disable()
+    path.unlink(missing_ok=True)
+
+
+def old_crashes(folder: Path) -> list[Path]:
+    """Return the traces of programs that crashed since this was last asked, newest last.
+
+    They are renamed to ``crash-DATE.txt``; empty ones, of programs that were killed, go.
+    """
+    found = []
+    for path in sorted(folder.glob("crash-*.log"), key=lambda path: path.stat().st_mtime):
+        if is_alive(path.stem.partition("-")[2]):
+            continue
+        with contextlib.suppress(OSError):
+            if not path.stat().st_size:
+                path.unlink()
+                continue
+            when = datetime.fromtimestamp(path.stat().st_mtime)
+            found.append(path.replace(folder / f"crash-{when:%Y%m%d-%H%M%S}-{path.stem[6:]}.txt"))
+    return found

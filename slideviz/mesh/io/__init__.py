@@ -1,0 +1,1 @@
+"""Mesh files: SU2 text, formats of meshio, VTU; writing whole or not at all."""

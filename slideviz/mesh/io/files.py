@@ -1,0 +1,185 @@
+"""Mesh files: SU2 by our own reader and writer, all others through meshio."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import path_error
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.opened import require_ordinary
+from slideviz.mesh.io.su2 import read_su2
+from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.model import Mesh
+
+_READ_BYTES = 1 << 22
+_READING = 0.1
+"""Fraction of the time for reading that getting the bytes takes."""
+_SNIFFED_BYTES = 1 << 16
+_UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
+_NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
+
+
+def read(path: str | Path, zone: int | None = None, progress: Progress | None = None) -> Mesh:
+    """Return the mesh of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        An SU2 file, or one of a format that meshio reads (by its ending).
+    zone : int, optional
+        The zone of an SU2 file, from 1; the first when left out.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1; what it raises stops the reading and passes on.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or has a mistake: the place and the remedy.
+    """
+    path = Path(path)
+    tick = progress or (lambda _: None)
+    try:
+        if _is_su2(path):
+            data = _read_bytes(path, tick)
+            return read_su2(path, data, zone, lambda done: tick(_READING + (1 - _READING) * done))
+        if zone not in (None, 1):
+            raise path_error(
+                path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
+            )
+        from slideviz.mesh.io.subprocess_reader import read_apart
+
+        return read_apart(path, tick)
+    except MemoryError as problem:
+        raise path_error(
+            path, "there is not enough memory to read it; use a machine with more"
+        ) from problem
+
+
+def _is_su2(path: Path) -> bool:
+    """Tell whether it is an SU2 file, by ending or, where that says nothing, by content."""
+    try:
+        require_ordinary(path, MeshError)
+        if path.suffix.lower() not in _UNSURE:
+            return path.suffix.lower() == ".su2"
+        with path.open("rb") as file:
+            return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None
+    except (OSError, ValueError) as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def _read_bytes(path: Path, progress: Progress) -> bytes:
+    """Return the content, block by block so that it can be stopped."""
+    blocks, done = [], 0
+    for size, block in _blocks(path):
+        blocks.append(block)
+        done += len(block)
+        progress(_READING * min(done / size, 1.0))
+    return b"".join(blocks)
+
+
+def _blocks(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield the size of the file and a block of it, again and again."""
+    try:
+        with path.open("rb") as file:
+            size = max(path.stat().st_size, 1)
+            while block := file.read(_READ_BYTES):
+                yield size, block
+    except OSError as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def _unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
+    """Return the error for a file that the system does not give."""
+    if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
+        return path_error(path, "there is no such file; check the name and the folder")
+    if isinstance(problem, IsADirectoryError):
+        return path_error(path, "this is a folder; choose a mesh file in it")
+    if isinstance(problem, PermissionError):
+        remedy = "no permission; change its permissions or copy it to another folder"
+    else:
+        remedy = f"{problem.strerror or problem}; check the disk, or copy the file elsewhere"
+    return path_error(path, f"cannot be read: {remedy}")
+
+
+def write(
+    path: str | Path,
+    mesh: Mesh,
+    overwrite: bool = False,
+    cell_data: Mapping[str, ArrayLike] | None = None,
+    base: Mesh | None = None,
+    going_on: Callable[[], object] | None = None,
+) -> None:
+    """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; one that exists is replaced.
+    mesh : Mesh
+        What to write. From SU2 to SU2 everything else in the file is kept.
+    overwrite : bool
+        Whether ``path`` may be the file that the mesh was read from.
+    cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
+        Values on the cells by name; not for SU2, which has no place for them.
+    base : Mesh, optional
+        The undeformed mesh: VTU files get the displacement of every point, as vectors.
+    going_on : callable, optional
+        Called between the blocks of an SU2 file; what it raises stops the writing, and what was
+        at ``path`` stays.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be written, or the mesh does not fit the format.
+    """
+    path = Path(path)
+    if not overwrite and _is_source(path, mesh):
+        raise path_error(
+            path,
+            "this is the file that the mesh was read from; choose another name, or ask "
+            "for overwriting",
+        )
+    replaces = path if overwrite else None
+    values = _checked(mesh, cell_data or {})
+    if path.suffix.lower() != ".su2":
+        from slideviz.mesh.io.meshio_write import write_foreign
+
+        moved = {} if base is None else {"displacement": mesh.points - base.points}
+        write_foreign(path, mesh, values, moved, replaces)
+        return
+    if values:
+        raise path_error(
+            path, f"an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu file"
+        )
+    with atomic_write(path, replaces=replaces) as file:
+        for block in su2_blocks(mesh):
+            file.write(block)
+            if going_on is not None:
+                going_on()
+
+
+def _is_source(path: Path, mesh: Mesh) -> bool:
+    try:
+        return mesh.source is not None and path.samefile(mesh.source)
+    except OSError:
+        # One of the two does not exist (any more), so there is nothing to protect.
+        return False
+
+
+def _checked(mesh: Mesh, cell_data: Mapping[str, ArrayLike]) -> dict[str, NDArray]:
+    """Return the cell data as arrays of the right length."""
+    values = {name: np.asarray(given) for name, given in cell_data.items()}
+    for name, array in values.items():
+        if array.ndim not in (1, 2) or len(array) != len(mesh.cells):
+            raise MeshError(
+                f"cell data {name!r} has shape {array.shape}, but the mesh has {len(mesh.cells)} "
+                "cells; give one value or one row for each cell"
+            )
+    return values

@@ -1,0 +1,126 @@
+"""Meshes in other formats, read through meshio."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.mesh.check import check_mesh, first_fault, path_error, printable
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.meshio_links import require_own
+from slideviz.mesh.io.meshio_markers import Block, find_markers
+from slideviz.mesh.io.quiet_meshio import formats_of, load, quiet
+from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.model import Cells, FloatArray, Mesh
+
+if TYPE_CHECKING:
+    import meshio
+
+MESHIO_TYPES = {
+    "vertex": 1,
+    "line": 3,
+    "triangle": 5,
+    "quad": 9,
+    "tetra": 10,
+    "hexahedron": 12,
+    "wedge": 13,
+    "pyramid": 14,
+}
+_FLAT = 1e-9
+"""A mesh is flat when it is thinner than this fraction of its extent."""
+
+
+def read_foreign(path: Path, progress: Progress) -> Mesh:
+    """Return the mesh of a file that meshio reads.
+
+    Cells of the highest dimension are the mesh; those of one dimension less are its boundaries,
+    named as the file names them. A file without named boundaries gets its outer surface, divided
+    at its edges: ``boundary_1``, ``boundary_2`` and so on, the largest first.
+
+    Raises
+    ------
+    MeshError
+        meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
+    """
+    progress(0.0)
+    with quiet(path, "read"):
+        require_own(path)
+    data = load(path, formats_of(path))
+    progress(0.5)
+    with quiet(path, "understood"):
+        mesh = _mesh(path, data)
+    progress(1.0)
+    return mesh
+
+
+def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
+    """Return our mesh of meshio's."""
+    blocks = [
+        _block(path, cells.type, cells.data, index)
+        for index, cells in enumerate(data.cells)
+        if len(cells.data) and cells.type != "empty"
+    ]
+    dim = max((ELEMENTS[block.vtk].dim for block in blocks), default=0)
+    if dim < 2:
+        raise path_error(path, "there are no cells, only points and lines; export the mesh")
+    cells = Cells.from_blocks(
+        (block.vtk, block.nodes) for block in blocks if ELEMENTS[block.vtk].dim == dim
+    )
+    points = _points(path, data, cells)
+    if dim == 2 and points.shape[1] == 3:
+        points = _flattened(path, points, cells)
+    mesh = Mesh(points=points, cells=cells, name=printable(path.name), source=path.resolve())
+    # The outer surface can be looked for only in sound cells.
+    check_mesh(mesh)
+    sides = [block for block in blocks if ELEMENTS[block.vtk].dim == dim - 1]
+    mesh = replace(mesh, markers=find_markers(mesh, data, sides))
+    check_mesh(mesh)
+    return mesh
+
+
+def _block(path: Path, name: str, nodes: object, index: int) -> Block:
+    """Return a block of cells of one type that slideviz knows."""
+    if name not in MESHIO_TYPES:
+        kind = "has many sides" if name.startswith(("poly", "pixel")) else "is of high order"
+        raise path_error(
+            path,
+            f"the element type {name!r} {kind}, but slideviz needs linear elements "
+            f"({', '.join(list(MESHIO_TYPES)[1:])}); export the mesh with these",
+        )
+    table = np.asarray(nodes)
+    vtk = MESHIO_TYPES[name]
+    if table.ndim != 2 or table.shape[1] != ELEMENTS[vtk].n_nodes or table.dtype.kind not in "iu":
+        raise path_error(
+            path,
+            f"the nodes of its {ELEMENTS[vtk].name} cells cannot be understood; export "
+            "the mesh again",
+        )
+    return Block(index, vtk, table.astype(np.int64))
+
+
+def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
+    """Return the points (n, 2) or (n, 3), of which the cells use no others."""
+    points = np.asarray(data.points, float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise path_error(
+            path, f"the points have shape {points.shape}, not (n, 2) or (n, 3); export it again"
+        )
+    fault = first_fault(cells, len(points))
+    if fault:
+        raise path_error(path, f"cell {fault[0]}: {fault[1]}")
+    return points
+
+
+def _flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
+    """Return the first two columns of points that all have one z."""
+    used = points[cells.nodes]
+    if np.ptp(used[:, 2]) > _FLAT * np.ptp(used, axis=0).max():
+        raise path_error(
+            path,
+            "this is a surface in space, but a mesh of triangles and quadrilaterals must "
+            "lie in the xy-plane; export the volume mesh, or turn the surface into that plane",
+        )
+    return points[:, :2]

@@ -1,0 +1,178 @@
+"""Writing meshes in other formats than SU2: VTU by ourselves, the rest through meshio."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import check_mesh, path_error
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
+from slideviz.mesh.io.quiet_meshio import formats_of, load, quiet
+from slideviz.mesh.io.vtu import vtu_blocks
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.undone import draft
+
+if TYPE_CHECKING:
+    import meshio
+
+_NAMES = {vtk: name for name, vtk in MESHIO_TYPES.items()}
+_TAG = {
+    "gmsh": "gmsh:physical",
+    "med": "cell_tags",
+    "medit": "medit:ref",
+    "nastran": "nastran:ref",
+    "netgen": "netgen:index",
+    "ugrid": "ugrid:ref",
+}
+_NAMED = ("gmsh", "netgen")
+"""The formats in which a table names the numbers."""
+_WRITTEN_AS = {"gmsh": "gmsh22"}
+"""The older form of Gmsh's files has a group on each element, and more programs read it."""
+_EXACT = 1e-12
+"""Coordinates may differ by this fraction of the extent: the last digits of a text format."""
+
+
+def write_foreign(
+    path: Path,
+    mesh: Mesh,
+    cell_data: Mapping[str, NDArray],
+    point_data: Mapping[str, NDArray] | None = None,
+    replaces: Path | None = None,
+) -> None:
+    """Write a mesh in the format that the ending names.
+
+    Only VTU files get the point data. Names of boundaries are kept in VTU, Gmsh, MED and Abaqus
+    files; other formats get numbers at most. What meshio wrote is read again and compared, for it
+    leaves out what a format cannot hold.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be written, or the format cannot hold the mesh.
+    """
+    check_mesh(mesh)
+    if path.suffix.lower() == ".vtu":
+        with atomic_write(path, replaces=replaces) as file:
+            for block in vtu_blocks(mesh, cell_data, point_data):
+                file.write(block)
+        return
+    name = formats_of(path)[0]
+    data = _to_meshio(mesh, cell_data, name)
+    with atomic_write(path, replaces=replaces) as file:
+        # meshio wants a name, and some formats write several files.
+        try:
+            with draft(path.parent, is_folder=True) as folder:
+                trial = folder / path.name
+                _write(path, trial, data, name)
+                _compare(path, trial, data, name)
+                with trial.open("rb") as source:
+                    shutil.copyfileobj(source, file)
+        except OSError as problem:
+            raise path_error(
+                path,
+                f"cannot be written: {problem.strerror or problem}; free some space or "
+                "choose another folder",
+            ) from problem
+
+
+def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    import meshio
+
+    # Without this XDMF puts the numbers in a second file.
+    options = {"data_format": "XML"} if name == "xdmf" else {}
+    with quiet(path, f"written as {name}"):
+        meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
+    if len(list(trial.parent.iterdir())) != 1:
+        raise path_error(
+            path,
+            f"cannot be written: the format {name} needs several files; use another, such as .vtu",
+        )
+
+
+def _compare(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
+    """Raise when the file does not hold all that should be in it."""
+    try:
+        found = load(trial, [name])
+    except MeshError as problem:
+        raise path_error(
+            path,
+            f"cannot be written: meshio cannot read again what it writes as {name}; use "
+            "another format, such as .vtu",
+        ) from problem
+    lost = []
+    if found.points.shape != data.points.shape:
+        lost.append("points")
+    elif np.abs(found.points - data.points).max() > _EXACT * np.ptp(data.points, axis=0).max():
+        lost.append("digits of the coordinates")
+    counts = [
+        {kind: sum(len(c.data) for c in m.cells if c.type == kind) for kind in _NAMES.values()}
+        for m in (data, found)
+    ]
+    lost += [f"{kind} cells" for kind in _NAMES.values() if counts[0][kind] != counts[1][kind]]
+    lost += [f"cell data {key!r}" for key in data.cell_data if key not in found.cell_data]
+    if lost:
+        raise path_error(
+            path,
+            f"cannot be written: the format {name} does not hold the {', '.join(lost)} of "
+            "this mesh; use another, such as .vtu",
+        )
+
+
+def _to_meshio(mesh: Mesh, cell_data: Mapping[str, NDArray], name: str) -> meshio.Mesh:
+    """Return meshio's form of the mesh, one block for each type of element."""
+    import meshio
+
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.dim] = mesh.points
+    blocks, tags = [], []
+    values: dict[str, list[NDArray]] = {key: [] for key in cell_data}
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        blocks.append((_NAMES[vtk], nodes))
+        tags.append(np.zeros(len(nodes), np.int32))
+        for key, array in cell_data.items():
+            values[key].append(array[ids].astype(float))
+    for vtk, nodes, numbers in _boundary_blocks(mesh):
+        blocks.append((_NAMES[vtk], nodes))
+        tags.append(numbers.astype(np.int32))
+        for key, array in cell_data.items():
+            values[key].append(np.full((len(nodes), *array.shape[1:]), np.nan))
+    names = dict(enumerate(mesh.marker_names, 1))
+    # Only MED keeps two coordinates.
+    data = meshio.Mesh(points if name != "med" else mesh.points, blocks, cell_data=values)
+    if name == "abaqus":
+        data.cell_sets = {
+            marker: [np.flatnonzero(t == number) for t in tags] for number, marker in names.items()
+        }
+        return data
+    if name == "med":
+        # Families of elements have negative numbers there.
+        tags = [-t for t in tags]
+        data.cell_tags = {-number: [marker] for number, marker in names.items()}
+    if name in _NAMED:
+        data.field_data = {
+            marker: np.array([number, mesh.dim - 1]) for number, marker in names.items()
+        }
+    if name == "gmsh":
+        data.cell_data["gmsh:geometrical"] = tags
+    if names:
+        data.cell_data[_TAG.get(name, "marker")] = tags
+    return data
+
+
+def _boundary_blocks(mesh: Mesh) -> list[tuple[int, NDArray, NDArray]]:
+    """Return for each type of boundary element: type, nodes (m, n), number of marker (m,)."""
+    found: dict[int, list[tuple[NDArray, NDArray]]] = {}
+    for number, marker in enumerate(mesh.markers, 1):
+        for vtk, (_, nodes) in marker.cells.by_type.items():
+            found.setdefault(vtk, []).append((nodes, np.full(len(nodes), number)))
+    return [
+        (vtk, np.concatenate([n for n, _ in parts]), np.concatenate([t for _, t in parts]))
+        for vtk, parts in found.items()
+    ]

@@ -1,0 +1,124 @@
+"""SU2 meshes: reading, and what of the file is kept for writing it again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+from slideviz.mesh.check import printable
+from slideviz.mesh.io.su2_halo import find_halo
+from slideviz.mesh.io.su2_numbers import parse_cells, parse_points
+from slideviz.mesh.io.su2_scan import Lines, Progress, scan
+from slideviz.mesh.io.su2_sections import find_bounds, find_sections
+from slideviz.mesh.io.su2_zone import find_zone
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+
+_SCANNED = 0.4
+"""Fraction of the time for reading that finding the lines takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """An SU2 file as it was read, with the places of the coordinates in it.
+
+    Attributes
+    ----------
+    raw : bytes
+        The whole file.
+    begins, ends : (n, d) int64
+        First byte of each coordinate, and the byte after its last.
+    points : (n, d) float64
+        The points as read.
+    cells : Cells
+        The cells as read.
+    markers : tuple of Marker
+        The boundaries as read.
+    zone : (int, int)
+        First byte and end of the zone, without its ``IZONE`` line.
+    sends, kept : tuple of (int, int)
+        First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
+    """
+
+    raw: bytes
+    begins: IntArray
+    ends: IntArray
+    points: FloatArray
+    cells: Cells
+    markers: tuple[Marker, ...]
+    zone: tuple[int, int]
+    sends: tuple[tuple[int, int], ...]
+    kept: tuple[tuple[int, int], ...]
+
+
+def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> Mesh:
+    """Return one zone of an SU2 file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    data : bytes
+        Its content.
+    zone : int or None
+        The zone, from 1; None for the first.
+    progress : callable
+        Called with the fraction done; may raise to stop.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake; the message has the line.
+    """
+    lines = scan(data, printable(path), lambda done: progress(_SCANNED * done))
+    sections = find_sections(lines)
+    found = find_zone(lines, sections, find_bounds(lines, sections, zone))
+    sizes = [len(found.elements), len(found.points), *(len(m.rows) for m in found.markers)]
+    first, second, *rest = _shares(sizes, progress)
+    cells = parse_cells(lines, found.elements, found.dim, len(found.points), first)
+    points, begins, ends = parse_points(lines, found.points, found.dim, second)
+    markers = tuple(
+        Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, len(points), share))
+        for part, share in zip(found.markers, rest, strict=True)
+    )
+    points = frozen_array(points, float)
+    progress(1.0)
+    document = Document(
+        raw=data,
+        begins=frozen_array(begins, int),
+        ends=frozen_array(ends, int),
+        points=points,
+        cells=cells,
+        markers=markers,
+        zone=_bytes(lines, ((found.bounds.begin, found.bounds.end),))[0],
+        sends=_bytes(lines, tuple((part.begin, part.end) for part in found.sends)),
+        kept=_bytes(lines, tuple((part.line, part.stop) for part in found.kept)),
+    )
+    mesh = Mesh(
+        points=points,
+        cells=cells,
+        markers=markers,
+        document=document,
+        name=printable(path.name),
+        zone=found.bounds.number,
+        zones=found.bounds.zones,
+        source=path.resolve(),
+    )
+    halo, remarks = find_halo(lines, found, mesh)
+    return replace(mesh, halo=halo, remarks=remarks)
+
+
+def _bytes(lines: Lines, ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """Return the bounds in bytes of ranges of lines."""
+    return tuple((int(lines.starts[a]), int(lines.starts[b])) for a, b in ranges)
+
+
+def _shares(sizes: list[int], progress: Progress) -> list[Progress]:
+    """Return for each part, of these sizes, a callable that turns its progress into the whole's."""
+    total = max(sum(sizes), 1)
+    edges = [_SCANNED + (1.0 - _SCANNED) * sum(sizes[:k]) / total for k in range(len(sizes) + 1)]
+
+    def share(begin: float, end: float) -> Progress:
+        return lambda done: progress(begin + done * (end - begin))
+
+    return [share(begin, end) for begin, end in pairwise(edges)]

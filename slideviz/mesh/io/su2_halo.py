@@ -1,0 +1,148 @@
+"""The halo of an SU2 file: ``SEND_RECEIVE`` markers and the transforms of ``NPERIODIC``.
+
+The marker with ``SEND_TO= 1`` lists donors, the one with ``SEND_TO= -1`` receivers, in the same
+order; a row is ``1 node k``, k the ``PERIODIC_INDEX`` of a centre of rotation, angles and a
+translation. Files differ in direction, order and unit of these, so the undeformed coordinates of
+both decide. What does not fit is no error, for the mesh can be used all the same: it is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+import numpy as np
+
+from slideviz.mesh.halo import FITS, Halo, Turn, fit_turn, make_halo
+from slideviz.mesh.io.su2_scan import Lines
+from slideviz.mesh.io.su2_zone import SendRows, Zone
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+Found = tuple[Halo | None, tuple[str, ...]]
+
+
+def find_halo(lines: Lines, zone: Zone, mesh: Mesh) -> Found:
+    """Return the halo that a zone's markers describe, if they do, and what is odd about it."""
+    if not zone.sends:
+        return None, ()
+    sends, receives = ([s for s in zone.sends if s.domain == to] for to in (b"1", b"-1"))
+    tables = [_table(lines, part, len(mesh.points)) for part in (sends, receives)]
+    if any(t is None for t in tables) or len(zone.sends) != len(sends) + len(receives):
+        return None, (_unused("their rows are no `1 node transform`, or of another partition"),)
+    donors, receivers = (np.asarray(t) for t in tables)
+    if len(donors) != len(receivers):
+        return None, (_unused(f"{len(donors)} nodes send and {len(receivers)} receive"),)
+    if len(np.unique(receivers[:, 0])) != len(receivers):
+        return None, (_unused("a node receives twice"),)
+    return _tied(mesh, donors[:, 0], receivers, _transforms(lines, zone))
+
+
+def _unused(why: str) -> str:
+    return (
+        f"the SEND_RECEIVE markers tie no halo to its donors ({why}); they are kept, but the nodes "
+        "are treated like all others, so make the halo anew"
+    )
+
+
+def _tied(mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]) -> Found:
+    """Return the halo of pairs whose motion is found, and what is odd."""
+    remarks: list[str] = []
+    turns: list[Turn] = []
+    which = np.full(len(donors), -1)
+    for index in np.unique(receivers[:, 1]).tolist():
+        mine = receivers[:, 1] == index
+        nodes = receivers[mine, 0]
+        tries = list(_readings(given[index], mesh.dim)) if index in given else []
+        turn, remark = _best(mesh, index, (donors[mine], nodes), tries)
+        remarks += [remark] if remark else []
+        if turn is not None:
+            which[mine] = len(turns)
+            turns.append(turn)
+    used = which >= 0
+    if not used.any():
+        return None, tuple(remarks)
+    return make_halo(mesh, receivers[used, 0], donors[used], turns, which[used]), tuple(remarks)
+
+
+def _best(
+    mesh: Mesh, index: int, pairs: tuple[IntArray, IntArray], tries: Sequence[Turn]
+) -> tuple[Turn | None, str]:
+    """Return the motion that fits donors and receivers best, and what is odd about it."""
+    before, after = (mesh.points[nodes] for nodes in pairs)
+    allowed = FITS * float(np.ptp(mesh.points, axis=0).max())
+
+    def misfit(turn: Turn) -> FloatArray:
+        return np.asarray(np.linalg.norm(turn.at(before) - after, axis=1))
+
+    def rank(turn: Turn) -> tuple[int, float]:
+        far = misfit(turn)
+        return int(np.count_nonzero(far > allowed)), float(far.max())
+
+    fitted = fit_turn(before, after)
+    # What the file says goes before what is fitted, as long as it fits.
+    turn = min(tries, key=rank, default=fitted)
+    if rank(turn)[0]:
+        turn = min(turn, fitted, key=rank)
+    far, name = misfit(turn), f"PERIODIC_INDEX= {index}"
+    wrong = int(np.count_nonzero(far > allowed))
+    if 2 * wrong > len(far):
+        return None, _unused(f"no motion brings the donors of {name} onto their receivers")
+    if wrong:
+        worst = int(np.argmax(far))
+        return turn, (
+            f"{wrong} of {len(far)} halo nodes are not where {name} puts them (node "
+            f"{pairs[1][worst]} is {far[worst]:.3g} off); they follow their donors from where they "
+            "are, so make the halo anew if the solver needs it exact"
+        )
+    if turn is fitted:
+        what = "does not fit its halo" if tries else "is missing"
+        return turn, f"{name} {what}; the motion found by matching the nodes is used"
+    return turn, ""
+
+
+def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
+    """Return node and transform of each row, (r, 2), or None where a row is no such thing."""
+    rows = [lines.line(int(row)).split()[:3] for part in parts for row in part.rows]
+    if not rows or any(len(row) < 3 or not all(w.isdigit() for w in row) for row in rows):
+        return None
+    table = np.array(rows, dtype="S18").astype(np.int64)
+    return table[:, 1:] if table[:, 1].max() < count else None
+
+
+def _transforms(lines: Lines, zone: Zone) -> dict[int, FloatArray]:
+    """Return centre, angles and translation, (3, 3), by PERIODIC_INDEX."""
+    found = {}
+    for section in zone.kept:
+        if section.key == "PERIODIC_INDEX" and section.value.isdigit():
+            words = b" ".join(lines.line(k) for k in range(section.line + 1, section.stop)).split()
+            try:
+                numbers = np.array([float(word) for word in words[:9]])
+            except ValueError:
+                continue
+            if len(numbers) == 9 and np.isfinite(numbers).all():
+                found[int(section.value)] = numbers.reshape(3, 3)
+    return found
+
+
+def _readings(transform: FloatArray, dim: int) -> Iterator[Turn]:
+    """Yield the motions that centre, angles and translation (3, 3) may mean."""
+    centre, angles, shift = transform[0], transform[1], transform[2]
+    for unit, order in product((1.0, np.pi / 180.0), ((2, 1, 0), (0, 1, 2))):
+        rotation = np.eye(3)
+        for axis in order:
+            rotation = rotation @ _about(axis, unit * float(angles[axis]))
+        for before in (0.0, 1.0):  # is the translation made after, or before the rotation
+            moved = rotation @ (before * shift - centre) + centre + (1.0 - before) * shift
+            yield Turn(rotation[:dim, :dim], moved[:dim])
+            back = rotation.T
+            yield Turn(back[:dim, :dim], (-back @ moved)[:dim])
+
+
+def _about(axis: int, angle: float) -> FloatArray:
+    """Return the rotation (3, 3) about a Cartesian axis."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.eye(3)
+    out[i, i] = out[j, j] = np.cos(angle)
+    out[j, i] = np.sin(angle)
+    out[i, j] = -out[j, i]
+    return out

@@ -1,0 +1,143 @@
+"""The keyword lines of an SU2 file, and the zones they divide it into.
+
+A section is a keyword line and what follows it up to the next keyword line.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from slideviz.errors import MeshError
+from slideviz.mesh.io.su2_scan import Lines, show
+
+_KEY = re.compile(rb"[A-Za-z_]\w*")
+_COUNT = re.compile(rb"\+?\d{1,18}")
+KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A keyword line and the lines up to ``stop``, the next keyword line."""
+
+    key: str
+    value: bytes
+    line: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Zone ``number`` (from 1) of ``zones`` is the lines ``begin:end``, without ``IZONE``."""
+
+    number: int
+    zones: int
+    begin: int
+    end: int
+
+
+def find_sections(lines: Lines) -> list[Section]:
+    """Return all sections of the file, in order."""
+    heads = []
+    for index in lines.equals.tolist():
+        key, _, value = lines.line(index).partition(b"=")
+        if _KEY.fullmatch(key.strip()):
+            heads.append((key.strip().decode().upper(), value.strip(), index))
+    stops = [line for _, _, line in heads] + [len(lines)]
+    return [Section(*head, stop) for head, stop in zip(heads, stops[1:], strict=True)]
+
+
+def find_bounds(lines: Lines, sections: list[Section], number: int | None) -> Bounds:
+    """Return where a zone stands.
+
+    Parameters
+    ----------
+    number : int or None
+        The zone, from 1; None for the first.
+
+    Raises
+    ------
+    MeshError
+        This is no SU2 mesh, there is no such zone, or the zones are not numbered well.
+    """
+    if not any(section.key in KNOWN for section in sections):
+        raise MeshError(
+            f"{lines.name}: this is no SU2 mesh, for it has none of NDIME=, NELEM= and NPOIN=; "
+            "choose the mesh file, or give the file the ending of its format"
+        )
+    heads = _zone_heads(lines, sections)
+    zones = max(len(heads), 1)
+    chosen = 1 if number is None else number
+    if not 1 <= chosen <= zones:
+        has = "one zone" if zones == 1 else f"the zones 1 to {zones}"
+        raise MeshError(
+            f"{lines.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
+        )
+    if zones == 1:
+        return Bounds(chosen, zones, 0, len(lines))
+    begin = heads[chosen].line
+    later = [head.line for head in heads.values() if head.line > begin]
+    return Bounds(chosen, zones, begin + 1, min(later, default=len(lines)))
+
+
+def _zone_heads(lines: Lines, sections: list[Section]) -> dict[int, Section]:
+    """Return the ``IZONE`` line of each zone by number; none when the file has no zones."""
+    totals = [s for s in sections if s.key == "NZONE"]
+    heads: dict[int, Section] = {}
+    for section in sections:
+        if section.key != "IZONE":
+            continue
+        number = count_of(lines, section)
+        if number in heads:
+            raise lines.error(
+                section.line,
+                f"IZONE= {number} stands a second time (first on line {heads[number].line + 1}); "
+                "number the zones one by one",
+            )
+        heads[number] = section
+    if not totals:
+        if len(heads) > 1:
+            second = list(heads.values())[1]
+            raise lines.error(
+                second.line,
+                f"a second zone begins, but there is no NZONE; put NZONE= {len(heads)} on the "
+                "first line",
+            )
+        return {}
+    total = count_of(lines, totals[0])
+    if total == 1 and not heads:
+        return {}
+    if sorted(heads) != list(range(1, len(heads) + 1)) or len(heads) != total:
+        given = ", ".join(map(str, list(heads)[:8])) or "none"
+        raise lines.error(
+            totals[0].line,
+            f"NZONE= {total} needs the lines IZONE= 1 to IZONE= {total}, each once, but the file "
+            f"has {given}; correct NZONE or restore the missing zone",
+        )
+    return heads
+
+
+def misspelt(sections: list[Section], key: str) -> str:
+    """Return which unknown keyword may be meant as this one, for a message, or nothing."""
+    for section in sections:
+        if section.key not in KNOWN and get_close_matches(section.key, [key], cutoff=0.8):
+            return f"; line {section.line + 1} has {section.key}=, did you mean {key}=?"
+    return ""
+
+
+def count_of(lines: Lines, section: Section) -> int:
+    """Return the number after the keyword; what follows it is not looked at.
+
+    Raises
+    ------
+    MeshError
+        It is no whole number, or negative.
+    """
+    word = (section.value.split() or [b""])[0]
+    if not _COUNT.fullmatch(word):
+        raise lines.error(
+            section.line,
+            f"{section.key}= {show(word)} is wrong: a whole number, not negative, is needed",
+        )
+    return int(word)

@@ -1,0 +1,211 @@
+"""The parts of one zone of an SU2 file, by their lines, counted and checked.
+
+Sections that slideviz does not know (FFD boxes, periodic data, offsets) and the halo markers are
+only located, so that writing can keep them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slideviz.mesh.io.su2_rows import Rows
+from slideviz.mesh.io.su2_scan import Lines, show
+from slideviz.mesh.io.su2_sections import KNOWN, Bounds, Section, count_of, misspelt
+from slideviz.mesh.model import IntArray
+
+SEND_RECEIVE = "SEND_RECEIVE"
+_NAME_IT = "; name the marker"
+_COUNT_THEM = "; add it with the number of elements"
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerRows:
+    """A boundary: its name, the line of the name, and the lines of its elements (r,)."""
+
+    name: str
+    line: int
+    rows: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SendRows:
+    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, ``SEND_TO`` and its rows (r,)."""
+
+    begin: int
+    end: int
+    domain: bytes
+    rows: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """Where the parts of one zone stand.
+
+    Attributes
+    ----------
+    bounds : Bounds
+        Which zone, and its lines.
+    dim : int
+        2 or 3.
+    elements, points : (r,) int64
+        The lines of the elements and of the points.
+    markers : tuple of MarkerRows
+        The boundaries.
+    sends : tuple of SendRows
+        The ``SEND_RECEIVE`` markers, which tie the nodes of a halo.
+    kept : tuple of Section
+        The unknown sections.
+    """
+
+    bounds: Bounds
+    dim: int
+    elements: IntArray
+    points: IntArray
+    markers: tuple[MarkerRows, ...]
+    sends: tuple[SendRows, ...]
+    kept: tuple[Section, ...]
+
+
+def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
+    """Return where the parts of a zone stand.
+
+    Raises
+    ------
+    MeshError
+        A section is missing or stands twice, a count is wrong, or a marker has no good name.
+    """
+    inside = [
+        section
+        for section in sections
+        if bounds.begin <= section.line < bounds.end and section.key not in ("NZONE", "IZONE")
+    ]
+    return _Walk(lines, inside, bounds).zone()
+
+
+class _Walk:
+    """Walks through the sections of one zone."""
+
+    def __init__(self, lines: Lines, sections: list[Section], bounds: Bounds) -> None:
+        self.lines = lines
+        self.sections = sections
+        self.bounds = bounds
+        self.rows = Rows(lines)
+
+    def zone(self) -> Zone:
+        """Return where the parts stand."""
+        heads = {key: self._only(key) for key in ("NDIME", "NELEM", "NPOIN", "NMARK")}
+        dim = count_of(self.lines, heads["NDIME"])
+        if dim not in (2, 3):
+            raise self.lines.error(
+                heads["NDIME"].line, f"NDIME= {dim} is not possible; write 2 or 3"
+            )
+        self.rows.none(heads["NDIME"])
+        elements = self.rows.counted(heads["NELEM"], "elements")
+        points = self.rows.counted(heads["NPOIN"], "points")
+        for key, rows in (("NELEM", elements), ("NPOIN", points)):
+            if not len(rows):
+                raise self.lines.error(
+                    heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
+                )
+        self.rows.none(heads["NMARK"])
+        markers, sends, kept = self._walk()
+        self._check_markers(heads["NMARK"], markers, len(sends))
+        return Zone(self.bounds, dim, elements, points, markers, sends, kept)
+
+    def _only(self, key: str) -> Section:
+        """Return the section of that key, which must stand once."""
+        found = [section for section in self.sections if section.key == key]
+        if not found:
+            remedy = "; write NMARK= 0 if it has no boundaries" if key == "NMARK" else ""
+            meant = misspelt(self.sections, key)
+            why = "" if meant else "; perhaps the file is cut off, so write it again" + remedy
+            raise self.lines.error(
+                self.bounds.end - 1,
+                f"the mesh ends here, but has no line {key}={meant}{why}",
+            )
+        if len(found) > 1:
+            raise self.lines.error(
+                found[1].line,
+                f"{key}= stands a second time (first on line {found[0].line + 1}); remove one, "
+                "or number the zones with NZONE= and IZONE=",
+            )
+        return found[0]
+
+    def _walk(
+        self,
+    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[Section, ...]]:
+        """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
+        markers, sends, kept = [], [], []
+        at = 0
+        while at < len(self.sections):
+            section = self.sections[at]
+            at += 1
+            if section.key == "MARKER_TAG":
+                name = self._name(section)
+                head, domain, at = self._marker_head(section, at, name == SEND_RECEIVE)
+                rows = self.rows.counted(head, f"elements of marker {name}")
+                if name == SEND_RECEIVE:
+                    sends.append(SendRows(section.line, head.stop, domain, rows))
+                else:
+                    markers.append(MarkerRows(name, section.line, rows))
+            elif section.key == "MARKER_ELEMS":
+                raise self.lines.error(
+                    section.line,
+                    "MARKER_ELEMS= has no MARKER_TAG= before it"
+                    + (misspelt(self.sections[at - 2 : at - 1], "MARKER_TAG") or _NAME_IT),
+                )
+            elif section.key not in KNOWN:
+                kept.append(section)
+        return tuple(markers), tuple(sends), tuple(kept)
+
+    def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, bytes, int]:
+        """Return the MARKER_ELEMS section of a marker, SEND_TO, and the place after them."""
+        self.rows.none(tag)
+        following = self.sections[at] if at < len(self.sections) else None
+        if following is None or following.key != "MARKER_ELEMS":
+            raise self.lines.error(
+                tag.line,
+                f"marker {show(tag.value)} is not followed by MARKER_ELEMS="
+                + (misspelt(self.sections[at : at + 1], "MARKER_ELEMS") or _COUNT_THEM),
+            )
+        at, domain = at + 1, b""
+        if sends and at < len(self.sections) and self.sections[at].key == "SEND_TO":
+            # The elements stand after this line, which belongs to the marker.
+            self.rows.none(following)
+            head = self.sections[at]
+            following = Section(following.key, following.value, head.line, head.stop)
+            at, domain = at + 1, head.value
+        return following, domain, at
+
+    def _name(self, section: Section) -> str:
+        try:
+            name = section.value.decode()
+        except UnicodeDecodeError:
+            name = ""
+        if not name or not name.isprintable():
+            what = "has control characters" if name else "is empty or not UTF-8 text"
+            remedy = "" if name else ", or save the file as UTF-8"
+            raise self.lines.error(
+                section.line,
+                f"the marker name '{show(section.value)}' {what}; rename the marker{remedy}",
+            )
+        return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
+
+    def _check_markers(self, head: Section, markers: tuple[MarkerRows, ...], sends: int) -> None:
+        """Raise when names repeat or the count is wrong."""
+        seen: dict[str, int] = {}
+        for marker in markers:
+            if marker.name in seen:
+                raise self.lines.error(
+                    marker.line,
+                    f"marker {marker.name} stands a second time (first on line "
+                    f"{seen[marker.name] + 1}); rename or merge them",
+                )
+            seen[marker.name] = marker.line
+        count = count_of(self.lines, head)
+        if count != len(markers) + sends:
+            raise self.lines.error(
+                head.line,
+                f"NMARK= {count} says {count} markers, but {len(markers) + sends} follow; correct "
+                "the count or restore the missing markers",
+            )

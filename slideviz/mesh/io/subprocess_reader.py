@@ -1,0 +1,167 @@
+"""Reading other formats in a process of its own.
+
+Some readers of meshio run for hours on a wrong count, ask for all memory, or crash with the
+library below them. In a process of its own that costs nobody anything: it has limits of time and
+memory, it can be stopped at any moment, and the window stays alive meanwhile.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pickle
+import resource
+import select
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import path_error
+from slideviz.mesh.io.meshio_bridge import read_foreign
+from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.undone import ended
+
+_SECONDS = 20
+_SECONDS_PER_BYTE = 20e-6
+_MEMORY = 8 << 30
+_MEMORY_PER_BYTE = 200
+"""Several times what the slowest of meshio's readers needs."""
+_TICK_SECONDS = 0.05
+_BYTES_PER_SECOND = 5e6
+_CHUNK_BYTES = 1 << 20
+_SET_DEATH_SIGNAL = 1
+
+
+def read_apart(path: Path, progress: Progress) -> Mesh:
+    """Return the mesh of a file that meshio reads, as ``read_foreign`` does.
+
+    Raises
+    ------
+    MeshError
+        As ``read_foreign``, and when the reader takes too long, or crashes.
+    """
+    begun = time.monotonic()
+    expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
+    # Without -P a file numpy.py in the folder of the mesh would be run.
+    command = [sys.executable, "-P", "-c", f"from {__name__} import main; main()"]
+    command += [*map(str, (os.getpid(), *_limits(path.stat().st_size))), str(path)]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(part for part in sys.path if part),
+        # Threads reserve memory, which counts against the limit.
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+    answer = bytearray()
+    with _started(path, command, environment) as reader, ended(reader):
+        assert reader.stdout is not None
+        while True:
+            spent = time.monotonic() - begun
+            progress(0.9 * spent / (spent + expected))
+            if not select.select([reader.stdout], [], [], _TICK_SECONDS)[0]:
+                continue
+            chunk = os.read(reader.stdout.fileno(), _CHUNK_BYTES)
+            if not chunk:
+                break
+            answer += chunk
+        code = reader.wait()
+    mesh = _unpacked(path, bytes(answer), code)
+    progress(1.0)
+    return mesh
+
+
+def _started(
+    path: Path, command: list[str], environment: dict[str, str]
+) -> subprocess.Popen[bytes]:
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+        )
+    except OSError as problem:
+        raise path_error(
+            path,
+            f"cannot be read: its reader does not start: {problem.strerror}; close other programs",
+        ) from problem
+
+
+def _limits(size: int) -> tuple[int, int]:
+    """Return the seconds and the bytes of memory that a file of that size may need."""
+    present = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = min(_MEMORY + _MEMORY_PER_BYTE * size, 0.8 * present)
+    return int(_SECONDS + _SECONDS_PER_BYTE * size), int(memory)
+
+
+def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
+    """Return the mesh that the reader sent, or raise what it said."""
+    if code == -signal.SIGXCPU:
+        raise path_error(
+            path,
+            "cannot be read: it takes longer than a file of this size should; check its counts, "
+            "or use another format, such as .su2 or .vtu",
+        )
+    if code or not answer:
+        raise path_error(
+            path,
+            f"cannot be read: meshio crashed on it (code {code}); check the file, or use another "
+            "format, such as .su2 or .vtu",
+        )
+    content = pickle.loads(answer)
+    if isinstance(content, str):
+        raise MeshError(content)
+    points, cells, markers, name = content
+    return Mesh(
+        points=points,
+        cells=Cells.from_types(*cells),
+        markers=tuple(Marker(label, Cells.from_types(*parts)) for label, parts in markers),
+        name=name,
+        source=path.resolve(),
+    )
+
+
+def main() -> None:
+    """Read a file and send it through the standard output.
+
+    The arguments are the number of the process that waits for it, seconds, bytes of memory, and
+    the path.
+    """
+    _die_with(int(sys.argv[1]))
+    # Whatever prints must not get into the answer.
+    with os.fdopen(os.dup(1), "wb") as channel:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        try:
+            mesh = read_foreign(path, lambda _: None)
+        except MeshError as problem:
+            pickle.dump(str(problem), channel)
+        except MemoryError:
+            pickle.dump(str(_too_large(path)), channel)
+        else:
+            markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
+            cells = (mesh.cells.types, mesh.cells.connectivity)
+            pickle.dump((mesh.points, cells, markers, mesh.name), channel)
+
+
+def _die_with(parent: int) -> None:
+    """Let the system end this process when the one that waits for it is killed."""
+    with suppress(OSError, AttributeError):  # other systems than Linux have no such call
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:  # it was killed before
+        sys.exit(1)
+
+
+def _too_large(path: Path) -> MeshError:
+    return path_error(
+        path,
+        "cannot be read: it needs more memory than a file of this size should; check its counts, "
+        "or use another format, such as .su2 or .vtu",
+    )

@@ -1,0 +1,85 @@
+"""What is around the cells that a line or circle cuts: the other cells of a 2D mesh, faint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import PAPER
+from slideviz.mesh.model import FloatArray
+from slideviz.sections.cut import Cutter
+from slideviz.sections.line import Box, trace
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons, joined
+from slideviz.session.passages import moved
+
+MOST = 150_000
+"""More cells than this are a grey area, and would take matplotlib too long."""
+_EDGE, _FACE = "#c9d0d8", "#f3f5f7"
+_LINE = 0.7
+"""Points."""
+
+
+def surroundings(
+    cutter: Cutter, points: FloatArray, matrices: Mapping[int, FloatArray]
+) -> Polygons | None:
+    """Return all cells of all passages of a 2D mesh; None in 3D, where they would hide the cut."""
+    if cutter.dim == 3:
+        return None
+    own = cutter.all_cells(points)
+    return joined([own.with_points(moved(own.points, matrix)) for matrix in matrices.values()])
+
+
+def window(cut: Box, around: Polygons, ratio: float) -> Box:
+    """Return what of a mesh is shown around what is cut, as wide and high as there is room.
+
+    Parameters
+    ----------
+    cut : (2,), (2,) float64
+        The box around what is cut: it is as large as it would be by itself.
+    around : Polygons
+    ratio : float
+        Of width to height of the room.
+    """
+    low, high = cut
+    size = high - low
+    wanted = np.maximum(size, [size[1] * ratio, size[0] / ratio])
+    found = np.stack([(low + high - wanted) / 2.0, (low + high + wanted) / 2.0])
+    corners = around.points[around.connectivity, :2]
+    ends = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    # Room beside the mesh shows nothing: where it ends on one side, more of the other is shown.
+    shift = np.maximum(ends[0] - found[0], 0.0) - np.maximum(found[1] - ends[1], 0.0)
+    fits = ends[1] - ends[0] >= wanted
+    found = np.where(fits, found + shift, np.stack([ends[0], ends[1]]))
+    return found[0], found[1]
+
+
+def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None:
+    """Draw the cells of a box faintly, and the line or circle that cuts them.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    around : Polygons
+    section : Section
+    box : (2,), (2,) float64
+        What the axes show.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    corner = around.points[around.connectivity, :2]
+    low = np.minimum.reduceat(corner, around.offsets[:-1])
+    high = np.maximum.reduceat(corner, around.offsets[:-1])
+    seen = around.take(np.flatnonzero(((high >= box[0]) & (low <= box[1])).all(axis=1)))
+    if len(seen):
+        rings = np.split(seen.points[seen.connectivity, :2], seen.offsets[1:-1])
+        many = len(seen) > MOST
+        faint = PolyCollection(
+            rings, facecolors=_FACE, edgecolors=_FACE if many else _EDGE, linewidths=0.3, zorder=0
+        )
+        faint.set_rasterized(many)
+        axes.add_collection(faint, autolim=False)
+    line = LineCollection(trace(section, box), colors=PAPER.text, linewidths=_LINE, zorder=3)
+    axes.add_collection(line, autolim=False)

@@ -1,0 +1,130 @@
+"""What the curves of a session are made of: its runs by step, by cycle, along the span."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.plots.draw import GreedyRun, StepRun
+from slideviz.plots.spanwise import Profile, along, along_radius
+from slideviz.session.state import Frame, Run, Session
+
+Coordinate = Literal["r", "x", "y", "z"]
+
+UNDEFORMED = 4
+"""Number of the look of the undeformed mesh, which no run of a usual session has."""
+
+
+def look_of(run: Run) -> int:
+    """Return the number of a run's look, the same in all plots."""
+    number = run.number - 1
+    return number if number < UNDEFORMED else number + 1
+
+
+def step_runs(session: Session) -> list[StepRun]:
+    """Return minimum and mean of each run from the undeformed mesh on, by their numbers.
+
+    The solid line of the first is below dashed ones, which let see it where both coincide.
+    """
+    found = []
+    first = session.first
+    for run in sorted(session.runs, key=lambda run: run.number):
+        if first is None or not run.frames:
+            continue
+        frames = (first, *run.frames)
+        found.append(
+            StepRun(
+                run.label,
+                np.arange(len(frames)),
+                np.array([frame.quality.min for frame in frames]),
+                np.array([frame.quality.mean for frame in frames]),
+                look_of(run),
+            )
+        )
+    return found
+
+
+def greedy_run(session: Session) -> GreedyRun | None:
+    """Return the convergence of the selection of the step that is shown, if there was one."""
+    frame, run = session.frame, session.run_shown
+    if frame is None or run is None or frame.step is None or not frame.step.history:
+        return None
+    cycles = frame.step.history
+    return GreedyRun(
+        f"{run.label}, step {frame.step.index}",
+        np.array([cycle.control_nodes for cycle in cycles]),
+        np.array([cycle.error for cycle in cycles]),
+        np.array([cycle.level for cycle in cycles]),
+        _tolerance(run, session),
+        look_of(run),
+    )
+
+
+def _tolerance(run: Run, session: Session) -> float | None:
+    reduction = run.case.reduction
+    if reduction is None or session.mesh is None:
+        return None
+    if reduction.relative is None:
+        return reduction.tolerance
+    return reduction.relative * session.mesh.extent
+
+
+class Profiles:
+    """Quality along the span, each profile made once as long as its frame is there."""
+
+    def __init__(self) -> None:
+        self._made: WeakKeyDictionary[Frame, dict[object, Profile]] = WeakKeyDictionary()
+
+    def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
+        """Return those of the step that is shown, of other runs' last, of the undeformed mesh.
+
+        Raises
+        ------
+        SlidevizError
+            The mesh has no extent along the coordinate.
+        """
+        found = []
+        shown, run_shown = session.frame, session.run_shown
+        if shown is not None and run_shown is not None and shown is not session.first:
+            found.append(self._one(session, shown, coordinate, run_shown))
+        others = [run for run in session.runs if run is not run_shown]
+        found += [self._one(session, r.last, coordinate, r) for r in others if r.last is not None]
+        if session.first is not None:
+            found.append(self._one(session, session.first, coordinate, None))
+        return found
+
+    def _one(
+        self, session: Session, frame: Frame, coordinate: Coordinate, run: Run | None
+    ) -> Profile:
+        case, mesh = session.case, session.mesh
+        assert mesh is not None
+        label = "undeformed" if run is None else run.label
+        key = coordinate, case.axis, case.origin, label
+        kept = self._made.setdefault(frame, {})
+        if key not in kept:
+            # In layers of the undeformed mesh, so that layers of cells stay together.
+            values = frame.quality.values
+            if coordinate == "r":
+                made = along_radius(mesh, values, case.axis, case.origin, label=label)
+            else:
+                made = along(mesh, values, coordinate, label=label)
+            kept[key] = replace(made, series=UNDEFORMED if run is None else look_of(run))
+        return kept[key]
+
+
+def coordinates(session: Session) -> dict[Coordinate, str]:
+    """Return what the span can be counted along: words by name."""
+    if session.mesh is None or session.mesh.dim == 2:
+        return {"y": "along y", "x": "along x", "r": "along the radius"}
+    return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
+
+
+def natural(session: Session) -> Coordinate:
+    """Return what the span is counted along at first: the radius where the mesh turns."""
+    if session.mesh is None or any(pair.kind == "rotational" for pair in session.pairs):
+        return "r"
+    extent = np.ptp(session.mesh.points, axis=0)
+    return "y" if session.mesh.dim == 2 else ("x", "y", "z")[int(extent.argmax())]

@@ -1,0 +1,213 @@
+"""Plots of runs, drawn onto axes that are given: no window, no global state.
+
+Each function draws onto empty matplotlib ``Axes``. Series differ by colour, line and marker, so
+that they can be told apart in grey and by colour-blind people. Qualities are size-skew, without
+a unit, 0 to 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from slideviz.plots.histogram import histogram
+from slideviz.plots.series import GreedyRun, Outcome, QualityRun, StepRun
+from slideviz.plots.style import ON_DARK, ON_LIGHT, PRINT, Style, add_legend, dress, place
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "ON_DARK",
+    "ON_LIGHT",
+    "PRINT",
+    "GreedyRun",
+    "Outcome",
+    "QualityRun",
+    "StepRun",
+    "Style",
+    "against_steps",
+    "convergence",
+    "histogram",
+    "quality_by_step",
+]
+
+What = Literal["minimum", "mean", "seconds", "control_nodes", "max_error"]
+
+LABELS: dict[What, str] = {
+    "minimum": "minimum quality [-]",
+    "mean": "mean quality [-]",
+    "seconds": "processor time [s]",
+    "control_nodes": "control nodes [-]",
+    "max_error": "largest error [mesh units]",
+}
+_ROOM = 0.1
+"""Labels of numbers of steps are at least this part of the axis apart."""
+_CROWDED = 300
+"""Selections of more cycles than this get a thin line."""
+
+
+def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -> None:
+    """Draw minimum (filled markers) and mean quality (hollow ones) against the step."""
+    dress(axes, style, "step [-]", "quality [-]")
+    for index, run in enumerate(runs):
+        look = _line(style, place(run.series, index))
+        # Of many steps some markers do, those of each run at other steps.
+        every = max(1, len(run.steps) // 6)
+        look["markevery"] = (index % every, every)
+        hollow = {**look, "markerfacecolor": style.look.background}
+        axes.plot(run.steps, run.minimum, label=run.label, gid=f"minimum:{run.label}", **look)
+        axes.plot(run.steps, run.mean, gid=f"mean:{run.label}", **hollow)
+    for what, face in (("minimum", style.look.text), ("mean", style.look.background)):
+        dot: dict[str, Any] = {
+            "marker": "o",
+            "markersize": 5,
+            "linestyle": "",
+            "color": style.look.text,
+        }
+        axes.plot([], [], label=what, markerfacecolor=face, **dot)
+    _quality_limits(axes, [v for run in runs for v in (*run.minimum, *run.mean)])
+    _whole_ticks(axes)
+    add_legend(axes, style)
+
+
+def convergence(
+    axes: Axes, runs: Sequence[GreedyRun], unit: str = "mesh units", style: Style = PRINT
+) -> None:
+    """Draw the error of greedy selections against control nodes, on a logarithmic axis.
+
+    Each tolerance is a thin line; markers show where levels begin, about ten of many.
+    """
+    dress(axes, style, "control nodes [-]", f"largest error [{unit}]")
+    axes.set_yscale("log")
+    told: set[float] = set()
+    for index, run in enumerate(runs):
+        shown = run.error > 0
+        first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
+        line = _line(style, place(run.series, index))
+        begins = np.flatnonzero(first[shown])
+        line["markevery"] = begins[:: max(1, len(begins) // 10)].tolist()
+        line["markersize"] = 3.5
+        if len(run.error) > _CROWDED:
+            line["linewidth"] = 0.5 * style.width
+        axes.plot(run.control_nodes[shown], run.error[shown], label=run.label, **line)
+        if run.tolerance and run.tolerance not in told:
+            told.add(run.tolerance)
+            axes.axhline(run.tolerance, color=style.look.text, linewidth=0.9, linestyle=(0, (4, 3)))
+            axes.annotate(
+                f"tolerance {run.tolerance:g}",
+                (0.0, run.tolerance),
+                xycoords=axes.get_yaxis_transform(),
+                xytext=(3, -2),
+                textcoords="offset points",
+                ha="left",
+                va="top",
+                fontsize=style.size,
+                color=style.look.text,
+            )
+    axes.set_xlim(left=0)
+    if told:  # room for the words below the lowest line
+        axes.set_ylim(bottom=min(axes.get_ylim()[0], 0.3 * min(told)))
+    add_legend(axes, style)
+
+
+def against_steps(
+    axes: Axes,
+    rows: Sequence[Outcome],
+    what: What = "minimum",
+    style: Style = PRINT,
+) -> None:
+    """Draw what runs came to against their number of steps, a line for each label.
+
+    Parameters
+    ----------
+    axes : Axes
+    rows : sequence of Outcome
+        In any order. Runs with inverted cells are crosses that no line joins.
+    what : {"minimum", "mean", "seconds", "control_nodes", "max_error"}
+    style : Style
+    """
+    dress(axes, style, "deformation steps [-]", LABELS[what])
+    labels = list(dict.fromkeys(row.label for row in rows))
+    for index, label in enumerate(labels):
+        mine = sorted((row for row in rows if row.label == label), key=lambda row: row.steps)
+        steps = np.array([row.steps for row in mine])
+        values = np.array([float(getattr(row, what)) for row in mine])
+        bad = np.array([row.inverted > 0 for row in mine]) & (what in ("minimum", "mean"))
+        line = _line(style, place(mine[0].series, index))
+        axes.plot(steps, np.where(bad, np.nan, values), label=label, **line)
+        if bad.any():  # an empty line that is not clipped would spoil the layout
+            cross = {"color": line["color"], "linestyle": "", "marker": "x", "markersize": 6}
+            axes.plot(steps[bad], values[bad], clip_on=False, gid=f"inverted:{label}", **cross)
+    every = [float(getattr(row, what)) for row in rows]
+    if what in ("minimum", "mean"):
+        _quality_limits(axes, every)
+    elif _ratio(every) > 30 or what == "max_error":
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0)
+    _step_ticks(axes, sorted({row.steps for row in rows}))
+    add_legend(axes, style)
+
+
+def _line(style: Style, index: int) -> dict[str, Any]:
+    """Return the arguments of ``Axes.plot`` of a series."""
+    look = style.series(index)
+    return {
+        "color": look.colour,
+        "linestyle": look.dash,
+        "linewidth": style.width,
+        "marker": look.marker,
+        "markersize": 4.5,
+        "markerfacecolor": look.colour,
+        "markeredgewidth": 1.0,
+    }
+
+
+def _ratio(values: Sequence[float]) -> float:
+    """Return how many times the smallest positive value the largest one is."""
+    good = [value for value in values if np.isfinite(value) and value > 0]
+    return max(good) / min(good) if good else 1.0
+
+
+def _quality_limits(axes: Axes, values: Sequence[float]) -> None:
+    """Show 0 to 1, or less where the values leave much of it empty, but always from 0."""
+    good = [value for value in values if np.isfinite(value)]
+    top = max(good, default=1.0)
+    axes.set_ylim(0.0, 1.02 if top > 0.75 else max(1.12 * top, 0.1))
+
+
+def _whole_ticks(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _step_ticks(axes: Axes, steps: Sequence[int]) -> None:
+    """Put ticks at the numbers of steps; on a logarithmic axis where they span a decade."""
+    from matplotlib.ticker import NullLocator
+
+    places = np.array(steps, np.float64)
+    if steps and steps[-1] >= 8 * steps[0] > 0:
+        axes.set_xscale("log")
+        axes.xaxis.set_minor_locator(NullLocator())
+        places = np.log(places)
+    shown = [steps[k] for k in _apart(places)]
+    axes.set_xticks(shown, [str(step) for step in shown])
+    if len(steps) == 1:
+        axes.set_xlim(steps[0] - 1, steps[0] + 1)
+
+
+def _apart(places: np.ndarray) -> list[int]:
+    """Return which of rising numbers (n,) have room for a label: the ends, and some between."""
+    last = len(places) - 1
+    if last < 1:
+        return list(range(last + 1))
+    least = _ROOM * (places[last] - places[0])
+    found = [0]
+    for k in range(1, last):
+        if min(places[k] - places[found[-1]], places[last] - places[k]) >= least:
+            found.append(k)
+    return [*found, last]

@@ -1,0 +1,247 @@
+"""The histogram of qualities, drawn onto axes that are given, with inverted cells apart.
+
+One distribution may be filled; all others are outlines in steps, which differ by colour and
+dashes, so that they can be told apart over the bars, over each other, and in grey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray
+from slideviz.plots.series import Bars, Distribution, Outline, QualityRun
+from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BAND, _STEMS = 0.12, 0.62
+"""Width of the strip left of the values where inverted cells are counted, as part of the range,
+and the part of it for counts; its name has the rest."""
+_PALER = 0.45
+"""How much of the background is mixed into bars, so that lines over them stand out."""
+_SWATCH = 5
+"""Colours of bars in a legend."""
+
+
+def histogram(
+    axes: Axes,
+    runs: Sequence[QualityRun],
+    metric: str = "size-skew",
+    edges: FloatArray | None = None,
+    log: bool = False,
+    style: Style = PRINT,
+) -> None:
+    """Draw outlines of how many cells of each run have which quality.
+
+    Parameters
+    ----------
+    axes : Axes
+    runs : sequence of QualityRun
+    metric : str
+        Name of the value, for the axis.
+    edges : (k + 1,) float64, optional
+        Of equal intervals; of 25 from 0 to 1 when left out.
+    log : bool
+        Whether the count is on a logarithmic axis, which shows a few bad cells among many.
+    style : Style
+    """
+    edges = np.linspace(0.0, 1.0, 26) if edges is None else edges
+    outlines = []
+    for index, run in enumerate(runs):
+        values = run.values if run.inverted is None else np.where(run.inverted, np.nan, run.values)
+        found = Distribution.of(values, edges)
+        # A legend elsewhere serves several axes, with other numbers of inverted cells.
+        told = found.inverted > 0 and style.legend
+        label = f"{run.label} ({found.inverted} inverted)" if told else run.label
+        outlines.append(Outline(label, found, place(run.series, index)))
+    draw_distribution(axes, None, outlines, f"{metric} quality [-]", log, style)
+
+
+def draw_distribution(
+    axes: Axes,
+    bars: Bars | None,
+    outlines: Sequence[Outline],
+    metric: str,
+    log: bool = False,
+    style: Style = PRINT,
+) -> None:
+    """Draw counts of cells: one distribution as bars, if it is given, and others as outlines.
+
+    Parameters
+    ----------
+    axes : Axes
+    bars : Bars or None
+    outlines : sequence of Outline
+        All have the same intervals, those of the bars.
+    metric : str
+        Label of the values.
+    log : bool
+        Whether counts are on a logarithmic axis, which shows a few bad cells among many.
+    style : Style
+    """
+    dress(axes, style, metric, "cells [-]")
+    foot = 0.5 if log else 0.0
+    # The undeformed mesh, in dots, can be told from any colour.
+    paler = any(outline.series is not None for outline in outlines)
+    if bars is not None:
+        _fill(axes, bars, paler, foot, style)
+    for outline in outlines:
+        counts, edges = outline.distribution.counts, outline.distribution.edges
+        look = _look(outline, style)
+        axes.stairs(counts, edges, baseline=None, label=outline.label, **look)
+    every = [outline.distribution for outline in outlines]
+    every += [bars.distribution] if bars is not None else []
+    if not every:
+        return
+    low, high = every[0].edges[0], every[0].edges[-1]
+    left = low
+    if any(one.inverted for one in every):
+        left = low - BAND * (high - low)
+        _strip(axes, bars, outlines, (left, low), foot, style)
+    axes.set_xlim(left, high)
+    _counts_axis(axes, bars, outlines, log)
+    inset = (low - left) / (high - left)
+    box = (inset, 0.0, 1.0 - inset, 1.0)
+    add_legend(axes, style, **_entries(axes, bars, paler, style), loc="best", bbox_to_anchor=box)
+
+
+def _look(outline: Outline, style: Style) -> dict[str, Any]:
+    """Return how an outline is drawn."""
+    if outline.series is None:
+        return {"color": style.look.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
+    look = style.series(outline.series)
+    return {"color": look.colour, "linestyle": look.dash, "linewidth": style.width}
+
+
+def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> None:
+    """Draw bars with an outline, which is wider than those that may lie on it."""
+    one = bars.distribution
+    axes.bar(
+        one.edges[:-1],
+        np.maximum(one.counts - foot, 0.0),
+        np.diff(one.edges),
+        bottom=foot,
+        align="edge",
+        color=_colours(bars, paler, style),
+        linewidth=0,
+        gid="shown",
+    )
+    width = 0.8 + style.width if paler else 0.6
+    axes.stairs(
+        one.counts,
+        one.edges,
+        baseline=None,
+        color=style.look.text,
+        linewidth=width,
+        gid="outline",
+    )
+
+
+def _colours(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
+    """Return the colour of every bar, (red, green, blue)."""
+    from matplotlib.colors import to_rgb
+
+    given = bars.colours if bars.colours is not None else [style.series(0).colour]
+    own = np.array([to_rgb(colour) for colour in given])
+    if paler:
+        own += _PALER * (np.array(to_rgb(style.look.background)) - own)
+    count = len(bars.distribution.counts)
+    return [tuple(rgb) for rgb in np.broadcast_to(own, (count, 3))]
+
+
+def _counts_axis(axes: Axes, bars: Bars | None, outlines: Sequence[Outline], log: bool) -> None:
+    """Let the axis of the counts begin and end where they do."""
+    from matplotlib.ticker import NullLocator
+
+    if log:
+        axes.set_yscale("log")
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.set_ylim(bottom=0.5)
+        return
+    # Cells of the undeformed mesh can be all alike: beside them nothing else would be seen.
+    compared = [outline.distribution for outline in outlines if outline.series is not None]
+    compared += [bars.distribution] if bars is not None else []
+    highest = max((max(one.counts.max(), one.inverted) for one in compared), default=1)
+    axes.set_ylim(0.0, 1.05 * max(highest, 1))
+
+
+def _strip(
+    axes: Axes,
+    bars: Bars | None,
+    outlines: Sequence[Outline],
+    ends: tuple[float, float],
+    foot: float,
+    style: Style,
+) -> None:
+    """Count inverted cells in a strip of their own, left of all values."""
+    left, low = ends
+    axes.axvspan(left, low, color=style.alarm, alpha=0.13, linewidth=0)
+    room = _STEMS * (low - left)
+    if bars is not None and bars.distribution.inverted:
+        height = bars.distribution.inverted - foot
+        axes.bar(left, height, room, bottom=foot, align="edge", color=style.alarm)
+    for index, outline in enumerate(outlines):
+        number = outline.distribution.inverted
+        if number:
+            look = _look(outline, style)
+            apart = room / (len(outlines) + 1)
+            at = left + apart * (index + 1)
+            axes.plot([at, at], [foot, number], **look)
+            across = [at - 0.35 * apart, at + 0.35 * apart]
+            axes.plot(across, [number, number], **(look | {"linestyle": "solid"}))
+    axes.text(
+        low - 0.5 * ((low - left) - room),
+        0.97,
+        "inverted",
+        transform=axes.get_xaxis_transform(),
+        rotation="vertical",
+        ha="center",
+        va="top",
+        fontsize=style.size,
+        color=style.alarm,
+    )
+
+
+def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[str, Any]:
+    """Return what a legend has: the bars first, with the colours that they have."""
+    from matplotlib.patches import Patch
+
+    handles, labels = axes.get_legend_handles_labels()
+    if bars is None:
+        return {"handles": handles, "labels": labels}
+    key = Patch(edgecolor=style.look.text)
+    colours, there = _colours(bars, paler, style), np.flatnonzero(bars.distribution.counts)
+    first, last = (there[0], there[-1]) if len(there) else (0, len(colours) - 1)
+    some = [colours[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
+    return {
+        "handles": [key, *handles],
+        "labels": [bars.label, *labels],
+        "handler_map": {key: _swatch(some, style.look.text)},
+    }
+
+
+def _swatch(colours: Sequence[Any], edge: str) -> Any:
+    """Return what draws a box with several colours side by side into a legend."""
+    from matplotlib.legend_handler import HandlerBase
+    from matplotlib.patches import Rectangle
+
+    class Swatch(HandlerBase):
+        def create_artists(
+            self, _legend: Any, _handle: Any, x: float, y: float, *rest: Any
+        ) -> list[Any]:
+            width, height, _, transform = rest
+            part = width / len(colours)
+            boxes = [
+                Rectangle((part * i - x, -y), part, height, facecolor=colour, linewidth=0)
+                for i, colour in enumerate(colours)
+            ]
+            boxes.append(Rectangle((-x, -y), width, height, fill=False, edgecolor=edge))
+            for box in boxes:
+                box.set_transform(transform)
+            return boxes
+
+    return Swatch()

@@ -1,0 +1,206 @@
+"""What a line or circle through a 2D mesh cuts, laid flat: the quality along it, as a curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slideviz.color_scheme import COLOUR_MAP
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+from slideviz.plots.ticks import rounded_out
+from slideviz.sections.line import along
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons
+from slideviz.sections.unroll import Label, direction_label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+GAP = 1e-6
+"""Cells further apart than this part of the whole length are not neighbours."""
+_FILLED, _FOLDED = 0.85, 0.3
+"""How opaque the areas below a curve and those of inverted cells are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The numbers of the cells along a section, from one end to the other.
+
+    Attributes
+    ----------
+    ends : (q, 2) float64
+        From where to where a cell is cut, the smaller position first; sorted. Of a line in the
+        mesh's length unit, of a circle in degrees.
+    values : (q,) float64
+    inverted : (q,) bool
+    cells : (q,) int64
+    """
+
+    ends: FloatArray
+    values: FloatArray
+    inverted: np.ndarray
+    cells: IntArray
+
+    def cell_at(self, position: float) -> int | None:
+        """Return the cell at a position; where cells overlap, an inverted one before others."""
+        here = np.flatnonzero((self.ends[:, 0] <= position) & (position <= self.ends[:, 1]))
+        if not len(here):
+            return None
+        return int(self.cells[here[np.argmax(self.inverted[here])]])
+
+
+def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np.ndarray) -> Curve:
+    """Return the curve of what a section cuts of a 2D mesh.
+
+    Parameters
+    ----------
+    lines : Polygons
+        Of two corners each (see `slideviz.sections.cut.Cutter.cut`).
+    section : Section
+    values, inverted : (m,)
+        Of all cells of the mesh.
+    """
+    corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
+    if section.kind == "cylinder":
+        at = _angles(corners - np.asarray(section.origin[:2]))
+    else:
+        way = along(section)
+        assert way is not None
+        at = corners @ way
+    ends = np.sort(at, axis=1)
+    order = np.lexsort(ends.T)
+    cells = lines.cells[order]
+    return Curve(ends[order], values[cells], inverted[cells], cells)
+
+
+def _angles(corners: FloatArray) -> FloatArray:
+    """Return in degrees where lines (q, 2, 2) about 0 begin and end, (q, 2).
+
+    The middle of each is in -180 to 180, always: curves of several meshes are above each other.
+    """
+    start, end = np.degrees(np.arctan2(corners[..., 1], corners[..., 0])).T
+    end = start + (end - start + 180.0) % 360.0 - 180.0
+    turn = 360.0 * np.floor(((start + end) / 2.0 + 180.0) / 360.0)
+    return np.column_stack([start - turn, end - turn])
+
+
+def position_label(section: Section) -> Label:
+    """Return what the positions along a section are."""
+    if section.kind == "cylinder":
+        return Label("angle [°]", "θ [°]")
+    way = along(section)
+    assert way is not None
+    return direction_label(np.append(way, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class CurveRow:
+    """A curve of a plot: what it is called, and the number of its look (None: its place)."""
+
+    label: str
+    curve: Curve
+    series: int | None = None
+
+
+@dataclass(frozen=True)
+class Colours:
+    """The colours of values, for the areas below a single curve: map and range."""
+
+    colour_map: str = COLOUR_MAP
+    limits: tuple[float, float] = (0.0, 1.0)
+
+
+def draw_curves(
+    axes: Axes,
+    rows: Sequence[CurveRow],
+    labels: tuple[str, str],
+    style: Style = PRINT,
+    colours: Colours | None = None,
+) -> None:
+    """Draw curves onto empty axes, as steps; where they have no cell, they are interrupted.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    rows : sequence of CurveRow
+        The last one is that which is looked at: areas are below it, and inverted cells marked.
+    labels : (str, str)
+        Of position and number.
+    style : Style
+    colours : Colours, optional
+        Of the areas; none are drawn without.
+    """
+    dress(axes, style, *labels)
+    good = np.concatenate([row.curve.values for row in rows])
+    low, high = rounded_out(float(good.min()), float(good.max()))
+    room = 0.06 * (high - low)
+    axes.set_ylim(low - room, high + room)
+    ends = np.concatenate([row.curve.ends for row in rows])
+    side = 0.02 * float(np.ptp(ends)) or 1.0
+    axes.set_xlim(ends.min() - side, ends.max() + side)
+    last = rows[-1].curve
+    if colours is not None:
+        _areas(axes, last, colours, low - room)
+    if last.inverted.any():
+        _folded(axes, last, style)
+    for index, row in enumerate(rows):
+        look = style.series(place(row.series, index))
+        axes.plot(
+            *steps(row.curve),
+            color=look.colour,
+            linestyle=look.dash if index < len(rows) - 1 else "solid",
+            linewidth=style.width,
+            label=row.label,
+            gid=f"along:{row.label}",
+        )
+    add_legend(axes, style, loc="best")
+
+
+def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
+    """Return a curve as positions and numbers of a polyline, not a number where it breaks."""
+    whole = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
+    breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * whole) + 1
+    x, y = curve.ends.ravel(), np.repeat(curve.values, 2)
+    return np.insert(x, 2 * breaks, np.nan), np.insert(y, 2 * breaks, np.nan)
+
+
+def _areas(axes: Any, curve: Curve, colours: Colours, bottom: float) -> None:
+    """Fill what is below a curve in the colours of its numbers."""
+    from matplotlib.collections import PolyCollection
+
+    shown = PolyCollection(
+        list(_columns(curve.ends, np.full(len(curve.values), bottom), curve.values)),
+        array=np.clip(curve.values, *colours.limits),
+        cmap=colours.colour_map,
+        clim=colours.limits,
+        alpha=_FILLED,
+        edgecolors="face",
+        linewidths=0.2,
+        gid="areas",
+    )
+    axes.add_collection(shown, autolim=False)
+
+
+def _folded(axes: Any, curve: Curve, style: Style) -> None:
+    """Mark where inverted cells are, over the whole height."""
+    from matplotlib.collections import PolyCollection
+
+    low, high = axes.get_ylim()
+    ends = curve.ends[curve.inverted]
+    columns = _columns(ends, np.full(len(ends), low), np.full(len(ends), high))
+    shown = PolyCollection(
+        list(columns), facecolors=style.alarm, alpha=_FOLDED, linewidths=0, gid="inverted"
+    )
+    shown.set_label("inverted")
+    axes.add_collection(shown, autolim=False)
+
+
+def _columns(ends: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return rectangles (q, 4, 2) from ``low`` to ``high`` (q,) over ``ends`` (q, 2)."""
+    left, right = ends.T
+    corners = [(left, low), (right, low), (right, high), (left, high)]
+    return np.stack([np.column_stack(corner) for corner in corners], axis=1)

@@ -1,0 +1,120 @@
+"""The numbers that a section is coloured by, and what the cut has of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slideviz.color_scheme import COLOUR_MAP
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, Quality
+from slideviz.terms import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Paint:
+    """A number for every cell of a mesh.
+
+    Attributes
+    ----------
+    label : str
+        What it is.
+    values : (m,) float64
+    inverted : (m,) bool
+        Cells that get the colour of inverted ones.
+    limits : (float, float)
+        What the ends of the colour map stand for.
+    colour_map : str
+        A colour map of matplotlib.
+    """
+
+    label: Quantity
+    values: FloatArray
+    inverted: np.ndarray
+    limits: tuple[float, float]
+    colour_map: str = COLOUR_MAP
+
+    def within(self, low: float, high: float) -> Paint:
+        """Return the same with other limits.
+
+        Raises
+        ------
+        CaseError
+            They are not finite or not in order.
+        """
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise CaseError(
+                f"colour range {low:.6g} to {high:.6g}: the first number must be the smaller one"
+            )
+        return replace(self, limits=(low, high))
+
+    def up_to(self, cells: IntArray) -> Paint:
+        """Return the same with limits of 0 and the largest number of cells (c,)."""
+        return replace(self, limits=(0.0, float(self.values[cells].max(initial=0.0)) or 1.0))
+
+    def shown(self, cells: IntArray) -> FloatArray:
+        """Return the numbers of cells (c,), in the limits; not a number where inverted."""
+        return np.where(self.inverted[cells], np.nan, np.clip(self.values[cells], *self.limits))
+
+    def summary(self, cells: IntArray) -> dict[str, float | int]:
+        """Return number, min, mean, max, and inverted of cells (c,), each once, c > 0."""
+        mine = self.values[cells]
+        worst = cells[np.argmin(np.where(self.inverted[cells], -1.0, mine))]
+        return {
+            "cells": len(cells),
+            "min": float(mine.min()),
+            "mean": float(mine.mean()),
+            "max": float(mine.max()),
+            "inverted": int(np.count_nonzero(self.inverted[cells])),
+            "worst_cell": int(worst),
+        }
+
+    def sentence(self, cells: IntArray, of: int | None = None, shown: str = "") -> str:
+        """Return the summary in words, for people.
+
+        Where the cells are only some ``of`` so many, ``shown`` says which.
+        """
+        found = self.summary(cells)
+        end = "max" if self.label == "displacement" else "min"
+        number = ".4g" if self.label == "displacement" else ".4f"
+        count = f"{len(cells):,} cell{'s' if len(cells) > 1 else ''} cut"
+        if of is not None:
+            count = f"{len(cells):,} of {of:,} cells cut (shown: {shown})"
+        if found["inverted"]:
+            count += f", {found['inverted']:,} inverted"
+        return f"{self.label}: {end} {found[end]:{number}}, mean {found['mean']:{number}}; {count}"
+
+
+def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:
+    """Return the numbers of all cells to colour them by.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    quality : Quality
+        That of the mesh.
+    by : Quantity
+        The displacement of a cell is the mean of the lengths by which its nodes moved.
+    reference : Mesh, optional
+        The undeformed mesh; the displacement needs it.
+
+    Raises
+    ------
+    CaseError
+        The displacement is wanted without the mesh that it is measured from, or with another.
+    """
+    inverted = quality.status == INVERTED
+    if by != "displacement":
+        values = {"size-skew": quality.values, "size": quality.size, "skew": quality.skew}[by]
+        return Paint(by, values, inverted, (0.0, 1.0))
+    if reference is None or reference.points.shape != mesh.points.shape:
+        raise CaseError(
+            "the displacement is measured from the undeformed mesh; give that mesh as reference"
+        )
+    length = np.linalg.norm(mesh.points - reference.points, axis=1)
+    cells = mesh.cells
+    total = np.add.reduceat(length[cells.connectivity], cells.offsets[:-1])
+    values = total / np.diff(cells.offsets)
+    return Paint(by, values, inverted, (0.0, 1.0)).up_to(np.arange(len(values)))

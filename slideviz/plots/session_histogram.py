@@ -1,0 +1,136 @@
+"""The histogram of what a session shows: the step, and other runs to compare it with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.case.motion_words import deformation
+from slideviz.plots.curves import look_of
+from slideviz.plots.distribution import distribution, spread
+from slideviz.plots.histogram import draw_distribution
+from slideviz.plots.series import Bars, Distribution, Outline
+from slideviz.plots.style import Style
+from slideviz.plots.ticks import rounded_out
+from slideviz.session.state import Frame, Run, Session
+from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LEAST_SPREAD = 0.05
+"""Part of the quality's 0 to 1 that is shown at least."""
+
+MOST = 4
+"""Runs that are compared with the one that is shown: of more lines none would be seen."""
+
+Range = tuple[float, float]
+
+
+class Counts:
+    """The counts of frames, made once as long as a frame is there."""
+
+    def __init__(self) -> None:
+        self._kept: WeakKeyDictionary[Frame, dict[object, Distribution]] = WeakKeyDictionary()
+        self._spreads: WeakKeyDictionary[Frame, dict[ColourBy, Range | None]] = WeakKeyDictionary()
+
+    def limits(self, session: Session, whole: bool) -> Range:
+        """Return round numbers around the values that cells have; or, whole, that they can have.
+
+        They are the same for all steps of a run, so that bars can be compared as it is played.
+        """
+        what = shown_measure(session)
+        shown = [*session.frames, *(run.last for run in session.runs if run.last is not None)]
+        for frame in shown:
+            kept = self._spreads.setdefault(frame, {})
+            if what not in kept:
+                kept[what] = spread(frame, what, session.mesh)
+        found = [ends for frame in shown if (ends := self._spreads[frame][what]) is not None]
+        low, high = min((e[0] for e in found), default=0.0), max((e[1] for e in found), default=1.0)
+        if what != "displacement":
+            # Closer, differences that mean nothing would look large.
+            return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
+        return rounded_out(0.0 if whole else low, high)
+
+    def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:
+        """Return the counts of a frame of the session between limits."""
+        what = shown_measure(session)
+        kept = self._kept.setdefault(frame, {})
+        if (what, limits) not in kept:
+            kept[what, limits] = distribution(frame, what, limits, session.mesh)
+        return kept[what, limits]
+
+
+def draw_histogram(
+    counts: Counts, session: Session, how: tuple[bool, bool], figure: Figure, style: Style
+) -> None:
+    """Draw the histogram of what a session shows; nothing without a mesh.
+
+    ``how`` is whether counts are logarithmic, and whether all values there can be are shown.
+    """
+    if session.frame is None:
+        return
+    what, (log, whole) = shown_measure(session), how
+    limits = counts.limits(session, whole)
+    shown, run = counts.of(session, session.frame, limits), session.run_shown
+    label = "undeformed" if session.view.frame == 0 or run is None else run.label
+    told = QUANTITIES[what]
+    metric = told.axis if told.unit else f"{told.label} quality [-]"
+    runs, left_out = compared(session)
+    outlines = [
+        Outline(other.label, counts.of(session, other.last, limits), look_of(other))
+        for other in runs
+        if other.last is not None
+    ]
+    # Nothing has moved there.
+    if session.first is not None and session.view.frame > 0 and what != "displacement":
+        outlines.append(Outline("undeformed", counts.of(session, session.first, limits), None))
+    axes = figure.add_subplot()
+    bars = Bars(label, shown, _colours(session, shown))
+    draw_distribution(axes, bars, outlines, metric, log, style)
+    legend = axes.get_legend()
+    if left_out and legend is not None:
+        legend.set_title(f"without {left_out} other run{'s' if left_out > 1 else ''}")
+        legend.get_title().set_fontsize(style.size)
+        legend.get_title().set_color(style.look.text)
+
+
+def compared(session: Session) -> tuple[list[Run], int]:
+    """Return the runs to compare with the one that is shown, by number, and how many are not.
+
+    First comes the run that is beside it, then those with the same motion, then newer ones. Of
+    each, the last step is meant: that of the run that is shown is what is played to.
+    """
+    shown = session.run_shown
+    others = [run for run in session.runs if run.last is not None and run is not shown]
+
+    def rank(run: Run) -> tuple[bool, bool, int]:
+        alike = shown is not None and deformation(run.case) == deformation(shown.case)
+        return run.number != session.view.beside, not alike, -run.number
+
+    first = sorted(others, key=rank)[:MOST]
+    return sorted(first, key=lambda run: run.number), len(others) - len(first)
+
+
+def first_value(axes: Axes) -> float:
+    """Return where the values of a histogram begin; left of it is the strip of inverted cells."""
+    bars = [patch for patch in axes.patches if patch.get_gid() == "shown"]
+    return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
+
+
+def shown_measure(session: Session) -> Quantity:
+    """Return what the histogram counts: what the cells are coloured by, or size-skew."""
+    return quantity_of(session.view.colour_by)
+
+
+def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
+    """Return the colours of the bars: those of their values in the view."""
+    import matplotlib as mpl
+
+    low, high = session.colour_range
+    middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
+    part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
+    return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]

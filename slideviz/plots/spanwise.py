@@ -1,0 +1,205 @@
+"""Quality along the span: minimum and mean of the cells in layers of equal height.
+
+Layers are counted along the radius about an axis (blades; thesis Figure 6.19), or along a
+direction. A cell belongs to the layer that its middle (the mean of its nodes) lies in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.periodic import in_axis_frame
+from slideviz.plots.style import PRINT, Style, add_legend, dress, place
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_LAYERS = 40
+"""When their number is left open."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Quality in layers from one end of the span to the other.
+
+    Attributes
+    ----------
+    label : str
+        Of the run.
+    coordinate : str
+        What the layers are counted along: ``r``, ``x``, ``y``, ``z`` or ``s``.
+    edges : (k + 1,) float64
+        Borders of the layers, in the mesh's length unit.
+    minimum, mean : (k,) float64
+        NaN in a layer without cells.
+    count : (k,) int64
+        Cells in each layer.
+    series : int, optional
+        Number of its look; its place in the sequence when left out.
+    """
+
+    label: str
+    coordinate: str
+    edges: FloatArray
+    minimum: FloatArray
+    mean: FloatArray
+    count: IntArray
+    series: int | None = None
+
+    @property
+    def position(self) -> FloatArray:
+        """Return the middles of the layers (k,), in the mesh's length unit."""
+        return (self.edges[1:] + self.edges[:-1]) / 2.0
+
+    @property
+    def fraction(self) -> FloatArray:
+        """Return the middles of the layers (k,) as parts of the span, 0 to 1."""
+        return (self.position - self.edges[0]) / (self.edges[-1] - self.edges[0])
+
+
+def along_radius(
+    mesh: Mesh,
+    values: FloatArray,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+    layers: int | None = None,
+    label: str = "",
+) -> Profile:
+    """Return the quality in layers of equal height along the radius about an axis.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The deformed mesh, or the undeformed one to keep layers of cells together.
+    values : (m,) float64
+        A value for each cell.
+    axis, origin : (3,) floats
+        Direction of the axis, of any length but zero, and a point on it.
+    layers : int, optional
+        At least 1; when left out, one for each layer of cells of usual height, 40 at most.
+    label : str
+
+    Raises
+    ------
+    SlidevizError
+        There is not a value for each cell, no layer, or the mesh has no span.
+    MeshError
+        The axis has length zero.
+    """
+    local = in_axis_frame(mesh.points, axis, origin)
+    return _profile(mesh, values, np.hypot(local[:, 0], local[:, 1]), ("r", layers, label))
+
+
+def along(
+    mesh: Mesh,
+    values: FloatArray,
+    direction: Sequence[float] | Literal["x", "y", "z"] = "z",
+    layers: int | None = None,
+    label: str = "",
+) -> Profile:
+    """Return the quality in layers of equal height along a direction; as `along_radius`.
+
+    Raises
+    ------
+    SlidevizError
+        There is not a value for each cell, no layer, or the mesh has no span that way.
+    """
+    name = direction if isinstance(direction, str) else "s"
+    axis = np.eye(3)["xyz".index(name)] if isinstance(direction, str) else np.array(direction)
+    axis = np.asarray(axis, float)[: mesh.dim]
+    length = float(np.linalg.norm(axis))
+    if not length > 0:
+        raise SlidevizError(
+            f"direction {direction!r} has no length in this {mesh.dim}D mesh; choose another"
+        )
+    return _profile(mesh, values, mesh.points @ axis / length, (name, layers, label))
+
+
+def _profile(
+    mesh: Mesh, values: FloatArray, height: FloatArray, words: tuple[str, int | None, str]
+) -> Profile:
+    coordinate, wanted, label = words
+    cells = mesh.cells
+    if len(values) != len(cells):
+        raise SlidevizError(
+            f"{len(values)} values for {len(cells)} cells; give one value for each cell"
+        )
+    if wanted is not None and wanted < 1:
+        raise SlidevizError(f"{wanted} layers; at least 1 is needed")
+    used = height[cells.nodes]
+    low, high = float(used.min()), float(used.max())
+    if not high > low:
+        raise SlidevizError(f"{mesh.name} has no extent along {coordinate}; choose another")
+    at, first = height[cells.connectivity], cells.offsets[:-1]
+    middle = np.add.reduceat(at, first) / np.diff(cells.offsets)
+    usual = np.median(np.maximum.reduceat(at, first) - np.minimum.reduceat(at, first))
+    layers = wanted or round(min(max((high - low) / max(usual, 1e-300), 1.0), MOST_LAYERS))
+    layer = np.clip(((middle - low) / (high - low) * layers).astype(np.int64), 0, layers - 1)
+    count = np.bincount(layer, minlength=layers)
+    minimum = np.full(layers, np.inf)
+    np.minimum.at(minimum, layer, values)
+    total = np.bincount(layer, weights=values, minlength=layers)
+    empty = count == 0
+    return Profile(
+        label,
+        coordinate,
+        frozen_array(np.linspace(low, high, layers + 1), np.float64),
+        frozen_array(np.where(empty, np.nan, minimum), np.float64),
+        frozen_array(np.where(empty, np.nan, total / np.maximum(count, 1)), np.float64),
+        frozen_array(count, np.int64),
+    )
+
+
+def spanwise(
+    axes: Axes,
+    profiles: Sequence[Profile],
+    what: Literal["minimum", "mean"] = "minimum",
+    fraction: bool = False,
+    unit: str = "mesh units",
+    style: Style = PRINT,
+) -> None:
+    """Draw the minimum or mean quality along the span, which is the vertical axis.
+
+    Parameters
+    ----------
+    axes : Axes
+    profiles : sequence of Profile
+    what : {"minimum", "mean"}
+    fraction : bool
+        Whether the vertical axis is the part of the span instead of the coordinate.
+    unit : str
+        Of the coordinate.
+    style : Style
+    """
+    coordinate = profiles[0].coordinate if profiles else "r"
+    label = "span fraction [-]" if fraction else f"{coordinate} [{unit}]"
+    dress(axes, style, f"{what} quality [-]", label)
+    ends = []
+    for index, profile in enumerate(profiles):
+        look = style.series(place(profile.series, index))
+        values: FloatArray = getattr(profile, what)
+        height = profile.fraction if fraction else profile.position
+        there = np.isfinite(values)
+        axes.plot(
+            values[there],
+            height[there],
+            color=look.colour,
+            linestyle=look.dash,
+            linewidth=style.width,
+            marker=look.marker,
+            markersize=4,
+            # Markers of lines that coincide are side by side.
+            markevery=(index, max(len(profiles), int(there.sum()) // 8)),
+            label=profile.label,
+        )
+        ends += [0.0, 1.0] if fraction else [profile.edges[0], profile.edges[-1]]
+    axes.set_xlim(0.0, 1.02)
+    if ends:
+        axes.set_ylim(min(ends), max(ends))
+    add_legend(axes, style)

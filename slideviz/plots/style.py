@@ -1,0 +1,140 @@
+"""How plots look: colours, lines and markers that tell series apart, also in grey."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, Look
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SMALLEST = 8.0
+"""Points; no letter of a plot is smaller at the printed size."""
+
+_ON_LIGHT = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#56b4e9", "#e69f00")
+_ON_DARK = ("#56b4e9", "#e69f00", "#2bc49a", "#e39bc4", "#ffffff", "#f0e442", "#f08040")
+"""Okabe and Ito's palette (2008), which colour-blind people can tell apart; lighter on dark."""
+
+_DASHES: tuple[Any, ...] = (
+    "solid",
+    (0, (5, 1.6)),
+    (0, (1.2, 1.2)),
+    (0, (6, 1.5, 1.2, 1.5)),
+    (0, (2.6, 1.2)),
+    (0, (6, 1.4, 1.2, 1.4, 1.2, 1.4)),
+    (0, (10, 2)),
+)
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+@dataclass(frozen=True)
+class Series:
+    """What tells one series from the others.
+
+    Attributes
+    ----------
+    colour, marker : str
+    dash : str or tuple
+        A line style of matplotlib.
+    """
+
+    colour: str
+    marker: str
+    dash: Any
+
+
+@dataclass(frozen=True)
+class Style:
+    """Look of a plot.
+
+    Attributes
+    ----------
+    look : Look
+        Background and letters; series have lighter colours on a dark one.
+    size : float
+        Height of letters in points, 8 or more at the printed size.
+    width : float
+        Of lines, in points.
+    legend : bool
+        Whether the axes get a legend of their own (when there is more than one series).
+    """
+
+    look: Look = PAPER
+    size: float = SMALLEST + 0.5
+    width: float = 1.4
+    legend: bool = True
+
+    @property
+    def dark(self) -> bool:
+        """Tell whether letters are lighter than the background."""
+        return _brightness(self.look.text) > _brightness(self.look.background)
+
+    def series(self, index: int) -> Series:
+        """Return how the series of that number, from 0, is drawn; 49 of them differ."""
+        palette = _ON_DARK if self.dark else _ON_LIGHT
+        turn = index // len(palette)
+        return Series(
+            palette[index % len(palette)],
+            _MARKERS[(index + turn) % len(_MARKERS)],
+            _DASHES[(index + 2 * turn) % len(_DASHES)],
+        )
+
+    @property
+    def alarm(self) -> str:
+        """Return the colour of inverted cells."""
+        return "#ff5d6c" if self.dark else INVERTED_COLOUR
+
+
+def place(given: int | None, index: int) -> int:
+    """Return the number of a look: the given one, or else the place in the sequence."""
+    return index if given is None else given
+
+
+def _brightness(colour: str) -> int:
+    """Return the sum of the parts of a colour ``#rrggbb``."""
+    return sum(bytes.fromhex(colour[1:]))
+
+
+PRINT = Style(PAPER)
+ON_LIGHT = Style(LIGHT)
+ON_DARK = Style(DARK)
+
+
+def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
+    """Give axes their labels, colours, letters and a quiet grid."""
+    text, size = style.look.text, max(style.size, SMALLEST)
+    axes.set_facecolor(style.look.background)
+    figure = axes.get_figure()
+    if figure is not None:
+        figure.set_facecolor(style.look.background)
+    axes.set_xlabel(x_label, fontsize=size, color=text)
+    axes.set_ylabel(y_label, fontsize=size, color=text)
+    axes.tick_params(which="both", colors=text, labelsize=size, color=style.look.edge)
+    for name, spine in axes.spines.items():
+        spine.set_visible(name in ("left", "bottom"))
+        spine.set_color(style.look.edge)
+    axes.grid(True, color=style.look.edge, alpha=0.22, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for letters in (axes.xaxis.get_offset_text(), axes.yaxis.get_offset_text()):
+        letters.set_fontsize(size)
+        letters.set_color(text)
+
+
+def add_legend(axes: Axes, style: Style, **options: Any) -> None:
+    """Add a legend if the style wants one and there is something to tell apart."""
+    handles = options.get("handles") or axes.get_legend_handles_labels()[0]
+    if not style.legend or len(handles) < 2:
+        return
+    axes.legend(
+        fontsize=max(style.size, SMALLEST),
+        labelcolor=style.look.text,
+        facecolor=style.look.background,
+        edgecolor="none",
+        framealpha=0.8,
+        handlelength=3.2,
+        borderpad=0.3,
+        labelspacing=0.25,
+        **options,
+    )

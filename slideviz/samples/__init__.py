@@ -1,0 +1,1 @@
+"""Sample cases: mesh generators, and the table of the samples."""

@@ -1,0 +1,165 @@
+"""The sample ``passage``, one blade of a linear turbine cascade, and the grid of ``stator``.
+
+An O-grid lies around the blade, in a rectangular hole of a channel of quadrilaterals (H-grid).
+Both are drawn with straight lines first and then smoothed as one, with the
+nodes of the periodic sides free and moving in pairs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.case.model import Case, Rotate, Translate
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+from slideviz.samples.blade import PASSAGE, Section, blade_nodes
+from slideviz.samples.channel import Counts, channel_numbers, channel_points, counts
+from slideviz.samples.smooth import smooth
+
+WALL = 0.05
+"""Height of the cells at the blade over that of the O-grid's outermost ones."""
+LINE, QUADRILATERAL = 3, 9
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The cells of O-grid and channel, whatever the section.
+
+    Attributes
+    ----------
+    n : Counts
+    number : (i, j) int
+        Node at each place of the channel, -1 inside the hole.
+    ring : (layers + 1, k) int
+        Nodes of the O-grid, from the blade out, counter-clockwise; the last are the hole's rim.
+    quads : (m, 4) int
+        Nodes of the cells, counter-clockwise.
+    """
+
+    n: Counts
+    number: IntArray
+    ring: IntArray
+    quads: IntArray
+
+    def sides(self) -> dict[str, IntArray]:
+        """Return the edges (k, 2) of blade, inflow, outflow, and the periodic sides."""
+        number = self.number
+        return {
+            "blade": np.column_stack([self.ring[0], np.roll(self.ring[0], -1)]),
+            "inflow": _line(number[0]),
+            "outflow": _line(number[-1]),
+            "periodic_1": _line(number[:, 0]),
+            "periodic_2": _line(number[:, -1]),
+        }
+
+
+def passage_mesh(size: int) -> Mesh:
+    """Return the smoothed mesh, with ``size`` cells along the inflow.
+
+    Raises
+    ------
+    CaseError
+        ``size`` is below 12.
+    """
+    grid = make_grid(counts(size))
+    points = smoothed(grid, straight_points(grid, PASSAGE))
+    sides = {"airfoil" if k == "blade" else k: side for k, side in grid.sides().items()}
+    markers = [Marker(name, Cells.from_blocks([(LINE, side)])) for name, side in sides.items()]
+    cells = Cells.from_blocks([(QUADRILATERAL, grid.quads)])
+    return Mesh(points, cells, tuple(markers), name="passage")
+
+
+def passage_case() -> Case:
+    """Return the case that turns and lifts the blade, the periodic sides following."""
+    return Case(
+        roles={
+            "airfoil": "moving",
+            "inflow": "sliding",
+            "outflow": "sliding",
+            "periodic_1": "periodic",
+            "periodic_2": "periodic",
+        },
+        motions=(Rotate("airfoil", -8.0), Translate("airfoil", (0.0, 0.12))),
+        sliding="ps",
+        periodic="moving",
+        periodic_type="translational",
+        steps=5,
+    )
+
+
+def make_grid(n: Counts) -> Grid:
+    """Return the grid of so many cells."""
+    number = channel_numbers(n)
+    ring = _ring(n, number)
+    return Grid(n, number, ring, _quads(n, number, ring))
+
+
+def straight_points(grid: Grid, section: Section) -> FloatArray:
+    """Return nodes on straight lines (m, 2), to start from."""
+    channel = channel_points(grid.n, section)[grid.number.ravel() >= 0]
+    rim = channel[grid.ring[-1]]
+    blade = blade_nodes(grid.n.lower, len(rim) - grid.n.lower, section)
+    part = layer_parts(grid.n)[:-1, None, None]
+    return np.concatenate([channel, (blade + part * (rim - blade)).reshape(-1, 2)])
+
+
+def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatArray:
+    """Return the points (m, 2) smoothed as ``sample_smooth.smooth`` does it."""
+    heights = np.diff(layer_parts(grid.n))
+    heights /= heights[-1]
+    n_channel = len(grid.quads) - grid.ring[1:].size
+    rho = np.concatenate([np.ones(n_channel), np.repeat(heights, grid.ring.shape[1])])
+    unknown = _unknowns(len(points), grid.number, grid.ring)
+    return smooth(points, grid.quads, rho, unknown, tolerance)
+
+
+def layer_parts(n: Counts) -> FloatArray:
+    """Return how far out each row of the O-grid lies, from 0 to 1: (layers + 1,)."""
+    heights = WALL ** (np.arange(n.layers)[::-1] / (n.layers - 1))
+    return np.concatenate([[0.0], np.cumsum(heights) / heights.sum()])
+
+
+def _ring(n: Counts, number: IntArray) -> IntArray:
+    """Return the nodes of the O-grid, from the blade out, counter-clockwise: (layers + 1, k).
+
+    Column 0 starts at the leading edge, on the hole's first side.
+    """
+    hole = number[n.ahead : n.ahead + n.along + 1, n.below : n.below + n.beside + 1]
+    rim = np.concatenate([hole[:-1, 0], hole[-1, :-1], hole[:0:-1, -1], hole[0, :0:-1]])
+    rim = np.roll(rim, n.nose)
+    inner = number.max() + 1 + np.arange(n.layers * len(rim)).reshape(n.layers, -1)
+    return np.concatenate([inner, rim[None]])
+
+
+def _quads(n: Counts, number: IntArray, ring: IntArray) -> IntArray:
+    """Return the cells (m, 4), counter-clockwise: first the channel, then the O-grid."""
+    around = np.roll(ring, -1, axis=1)
+    channel = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    o_grid = [ring[1:], around[1:], around[:-1], ring[:-1]]
+    h_quads = np.column_stack([part.ravel() for part in channel])
+    inside = np.zeros([size - 1 for size in number.shape], bool)
+    inside[n.ahead : n.ahead + n.along, n.below : n.below + n.beside] = True
+    h_quads = h_quads[~inside.ravel()]
+    o_quads = np.column_stack([part.ravel() for part in o_grid])
+    return np.concatenate([h_quads, o_quads])
+
+
+def _unknowns(n_points: int, number: IntArray, ring: IntArray) -> IntArray:
+    """Return which coordinates are free, as ``smooth`` wants it: (n, 2).
+
+    The blade is fixed, inflow and outflow slide along their line, and the second periodic side
+    moves as the first.
+    """
+    free = np.ones((n_points, 2), bool)
+    free[ring[0]] = False
+    free[[number[0], number[-1]], 0] = False
+    free[number[:, -1]] = False
+    unknown = np.where(free, np.cumsum(free).reshape(-1, 2) - 1, -1)
+    unknown[number[:, -1]] = unknown[number[:, 0]]
+    return unknown
+
+
+def _line(nodes: IntArray) -> IntArray:
+    """Return the edges of a row of nodes: (k, 2)."""
+    return np.column_stack([nodes[:-1], nodes[1:]])

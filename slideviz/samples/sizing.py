@@ -1,0 +1,106 @@
+"""How long the triangles' edges are in the sample ``turbine-row``: short at vane and wake.
+
+    h(x) = h0 (1 + (m - 1) (1 - exp(-k D / (m - 1))))
+
+D is the distance from the layer around the vane or from the wake, whose own D grows slowly
+downstream; m is what far triangles measure over those at the layer. The neighbouring vanes count
+alike, so that the periodic sides get the same nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
+
+from slideviz.mesh.model import FloatArray
+from slideviz.samples.triangles import inside
+from slideviz.samples.vane import AHEAD, CHORD, LENGTH, camber, camber_line, pitch
+
+SLOPE = 350.0
+"""k, per unit of length."""
+WAKE = 0.3
+"""D on the wake over the way from the trailing edge."""
+SHAPE = (150, 250)
+"""Grid points in x and y of a tabulated size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sizing:
+    """Edge length tabulated over the rectangle around the channel.
+
+    Attributes
+    ----------
+    low, step : (2,)
+        First grid point, and distance of grid points in x and y.
+    table : (nx, ny)
+        Edge length at the grid points.
+    """
+
+    low: FloatArray
+    step: FloatArray
+    table: FloatArray
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the edge length at points (k, 2), bilinear between grid points: (k,)."""
+        place = (points - self.low) / self.step
+        found: FloatArray = map_coordinates(self.table, place.T, order=1, mode="nearest")
+        return found
+
+
+def find_sizing(rim: FloatArray, triangles: float) -> Sizing:
+    """Return the edge lengths that need about so many triangles.
+
+    Parameters
+    ----------
+    rim : (k, 2)
+        The outermost nodes of the layer, in order.
+    triangles : float
+        How many equilateral ones are to fill the channel outside the layer.
+    """
+    shortest = float(np.mean(np.hypot(*(np.roll(rim, -1, axis=0) - rim).T)))
+    x = np.linspace(-AHEAD, LENGTH - AHEAD, SHAPE[0])
+    below, above = camber(x).min() - pitch() / 2, camber(x).max() + pitch() / 2
+    y = np.linspace(below, above, SHAPE[1])
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+    far = _distance(grid.reshape(-1, 2), rim).reshape(SHAPE)
+    loop = np.arange(len(rim))
+    around = inside(grid.reshape(-1, 2), rim, np.column_stack([loop, np.roll(loop, -1)]))
+    channel = np.abs(grid[..., 1] - camber(x)[:, None]) < pitch() / 2
+    free = channel & ~around.reshape(SHAPE)
+    area = pitch() * LENGTH * np.count_nonzero(free) / np.count_nonzero(channel)
+    # The least m has the most triangles, and 0.3 leaves room for coarse meshes with few layers.
+    low, high = 0.3, 60.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        h = shortest * _growth(far[free], middle)
+        count = 4 / np.sqrt(3) * area * np.mean(1 / h**2)
+        low, high = (middle, high) if count > triangles else (low, middle)
+    step = np.array([x[1] - x[0], y[1] - y[0]])
+    return Sizing(np.array([x[0], y[0]]), step, shortest * _growth(far, high))
+
+
+def _growth(far: FloatArray, most: float) -> FloatArray:
+    """Return h / h0 at the distances ``far``."""
+    span = most - 1
+    if abs(span) < 1e-9:
+        return np.ones_like(far)
+    return 1 + span * -np.expm1(-SLOPE * far / abs(span))
+
+
+def _distance(points: FloatArray, rim: FloatArray) -> FloatArray:
+    """Return D of points (k, 2): 0 on the rim and inside of it (k,)."""
+    best = np.full(len(points), np.inf)
+    s, *line = camber_line()
+    wake = s > CHORD
+    way = s[wake] - CHORD
+    spine = np.column_stack([values[wake] for values in line[:2]])
+    tree, wake_tree = cKDTree(rim), cKDTree(spine)
+    nearest = np.round((points[:, 1] - camber(points[:, 0])) / pitch())
+    for k in (-1, 0, 1):
+        here = np.column_stack([points[:, 0], points[:, 1] - (nearest + k) * pitch()])
+        near, at = wake_tree.query(here)
+        best = np.minimum(best, np.minimum(tree.query(here)[0], near + WAKE * way[at]))
+    return best

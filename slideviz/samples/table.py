@@ -1,0 +1,175 @@
+"""Sample cases: those of the thesis (chapter 4), at any size, and a blade passage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, FromFile
+from slideviz.case.words import nearest
+from slideviz.errors import CaseError
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.model import Mesh
+from slideviz.samples.passage import passage_case, passage_mesh
+from slideviz.samples.row import row_case, row_mesh
+from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh
+from slideviz.samples.thesis import FILE, thesis_case
+
+SAMPLES: Mapping[str, str] = {
+    "square": "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
+    "polar": "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
+    "hexahedron": "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
+    "cylindrical": "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
+    "passage": "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
+    "turbine-row": "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
+    "size: cells (224180)",
+    "stator": "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
+}
+"""What each sample is, by name."""
+
+DEFAULT_SIZES = {
+    "square": 25,
+    "polar": 25,
+    "hexahedron": 25,
+    "cylindrical": 25,
+    "passage": 36,
+    "turbine-row": 224_180,
+    "stator": 240_000,
+}
+VARIANTS: Mapping[str, tuple[str, ...]] = {
+    "square": ("file", "motion", "translate"),
+    "polar": ("file",),
+    "hexahedron": ("file", "motion", "flat"),
+    "cylindrical": ("file",),
+    "passage": ("motion",),
+    "turbine-row": ("motion",),
+    "stator": ("file",),
+}
+"""How each sample can move, the default first.
+
+``file``: as a displacement file; ``motion``: the same by MOTION keys; ``translate``: the case of
+thesis Figure 4.4, which moves the block close to two sides; ``flat``: that of Figure 4.14, without
+a component in z.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A mesh and a case that deforms it.
+
+    Attributes
+    ----------
+    name : str
+        One of ``SAMPLES``.
+    mesh : Mesh
+        The undeformed mesh.
+    case : Case
+        Its files are named as if they were in the current folder; ``write_sample`` puts them
+        into another.
+    displacement : Displacements or None
+        What the case's displacement file is to hold, where it has one.
+    """
+
+    name: str
+    mesh: Mesh
+    case: Case
+    displacement: Displacements | None = None
+
+
+def sample(name: str, size: int | None = None, variant: str | None = None) -> Sample:
+    """Return a sample case.
+
+    Parameters
+    ----------
+    name : str
+        One of ``SAMPLES``.
+    size : int, optional
+        Cells in each direction; of the passage: cells along its inflow; of turbine row and
+        stator: all cells. One of ``DEFAULT_SIZES`` when left out.
+    variant : str, optional
+        One of ``VARIANTS[name]``; the first when left out.
+
+    Raises
+    ------
+    CaseError
+        There is no such sample or variant, or the size is out of range.
+    """
+    if name not in SAMPLES:
+        hint = nearest(name, SAMPLES)
+        raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
+    kind = variant or VARIANTS[name][0]
+    if kind not in VARIANTS[name]:
+        raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(VARIANTS[name])}")
+    cells = DEFAULT_SIZES[name] if size is None else size
+    if name == "passage":
+        return Sample(name, passage_mesh(cells), passage_case())
+    if name == "turbine-row":
+        return Sample(name, row_mesh(cells), row_case(cells))
+    if name == "stator":
+        mesh = stator_mesh(cells)
+        return Sample(name, mesh, stator_case(), stator_displacement(mesh))
+    return Sample(name, *thesis_case(name, cells, kind))
+
+
+def write_sample(
+    name: str,
+    folder: str | Path,
+    size: int | None = None,
+    variant: str | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write ``mesh.su2``, ``displacement.txt`` where there is one, and ``NAME.cfg``; return them.
+
+    Parameters are those of ``sample`` and:
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; made if there is none.
+    overwrite : bool
+        Whether to replace files that exist.
+
+    Raises
+    ------
+    CaseError, MeshError
+        As of ``sample``; or a file exists or cannot be written.
+    """
+    from slideviz.case.cfg import write_case
+    from slideviz.mesh.io.files import write
+
+    made, folder = sample(name, size, variant), Path(folder)
+    mesh, table, case = folder / "mesh.su2", folder / FILE, folder / f"{name}.cfg"
+    paths = [mesh, *([table] if made.displacement else []), case]
+    there = [path for path in paths if path.exists()]
+    if there and not overwrite:
+        raise CaseError(f"{there[0]}: exists already; remove it or choose another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
+    write(mesh, made.mesh, overwrite)
+    if made.displacement is not None:
+        with atomic_write(table, CaseError, table if overwrite else None) as file:
+            file.write(_displacement_text(made.displacement).encode())
+    placed = _in_folder(made.case, folder, name)
+    write_case(case, placed.change(source=case if overwrite else None))
+    return paths
+
+
+def _in_folder(case: Case, folder: Path, name: str) -> Case:
+    """Return the case with its files in that folder."""
+    motions = tuple(
+        replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
+        for motion in case.motions
+    )
+    mesh, out = folder / "mesh.su2", folder / f"{name}_deformed.su2"
+    return case.change(mesh_file=mesh, mesh_out=out, motions=motions)
+
+
+def _displacement_text(table: Displacements) -> str:
+    """Return the lines of a displacement file that reads back bit for bit."""
+    rows = zip(table.nodes.tolist(), table.vectors.tolist(), strict=True)
+    return "".join("\t".join([str(node), *map(repr, row)]) + "\n" for node, row in rows)

@@ -1,0 +1,1 @@
+"""The one way to draw cells with VTK, for the window, the command line and films."""

@@ -1,0 +1,94 @@
+"""VTK objects for the parts of a mesh, made once and changed in place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from slideviz.color_scheme import COLOUR_MAP, INVERTED_COLOUR
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
+
+VALUES = "values"
+LIFT = 1e-4
+"""Lines of a 2D mesh are drawn this part of its extent above the cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A boundary in the scene: what it is, its geometry, its actors.
+
+    Attributes
+    ----------
+    surface : Surface
+    shape : pyvista.PolyData
+        Its facets.
+    actor : pyvista.Actor
+    """
+
+    surface: Surface
+    shape: Any
+    actor: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The lines that highlight a boundary, and their actor."""
+
+    shape: Any
+    actor: Any
+
+
+def surface_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
+    """Return a boundary as PolyData at the mesh's points (n, d); lines if the mesh is 2D."""
+    at = lifted(points[surface.nodes], lift)
+    flat = facet_connectivity(surface.facets)
+    if surface.facets.shape[1] == 2:
+        shape = pv.PolyData(at, lines=flat)
+    else:
+        shape = pv.PolyData(at, faces=flat)
+    shape.cell_data[VALUES] = np.zeros(len(surface.facets))
+    return shape
+
+
+def rim_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
+    """Return the lines that highlight a boundary: itself in 2D, its border in 3D."""
+    at = lifted(points[surface.nodes], lift)
+    lines = surface.facets if surface.facets.shape[1] == 2 else surface.rim
+    if not len(lines):
+        # A closed surface, a blade for example, has no border: its own edges show it.
+        lines = np.concatenate([surface.facets[:, [0, 1]], surface.facets[:, [1, 2]]])
+    return pv.PolyData(at, lines=facet_connectivity(lines))
+
+
+def cell_shape(mesh: Mesh) -> Any:
+    """Return all cells of a 2D mesh as PolyData, in the order of the cells."""
+    cells = mesh.cells
+    flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
+    shape = pv.PolyData(padded(mesh.points), faces=flat)
+    shape.cell_data[VALUES] = np.zeros(len(cells))
+    return shape
+
+
+def volume(mesh: Mesh) -> Any:
+    """Return all cells of a mesh as an UnstructuredGrid, in the order of the cells."""
+    cells = mesh.cells
+    flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
+    return pv.UnstructuredGrid(flat, cells.types, padded(mesh.points))
+
+
+def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:
+    """Move the points of a shape, in place."""
+    shape.points[:] = lifted(points, lift)
+    shape.GetPoints().Modified()
+
+
+def lookup_table() -> Any:
+    """Return the colours of 0 to 1, with those of the ends beyond, and that of inverted cells."""
+    table = pv.LookupTable(COLOUR_MAP, n_values=256, scalar_range=(0.0, 1.0))
+    # Not what is below the range: a valid cell may be below one that was chosen.
+    table.nan_color = INVERTED_COLOUR
+    return table

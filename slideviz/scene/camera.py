@@ -1,0 +1,218 @@
+"""Where the scene is looked at from: sides, fitting, zooming; in parallel or perspective."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from slideviz.scene.pick import to_display
+from slideviz.scene.stage import Stage
+
+FILL = 0.92
+"""How much of the free height or width a mesh takes."""
+
+DETAIL = 0.5
+"""Who sees less than this part of the height that would show everything looks at a detail."""
+
+SLACK = 0.25
+"""The box around a mesh may be outside the view by this much of it, with the mesh inside."""
+
+SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
+    "+x": ((1, 0, 0), (0, 0, 1)),
+    "-x": ((-1, 0, 0), (0, 0, 1)),
+    "+y": ((0, 1, 0), (0, 0, 1)),
+    "-y": ((0, -1, 0), (0, 0, 1)),
+    "+z": ((0, 0, 1), (0, 1, 0)),
+    "-z": ((0, 0, -1), (0, 1, 0)),
+    "iso": ((1, -1, 0.8), (0, 0, 1)),
+}
+"""Direction from the mesh to the eye, and what is up."""
+
+
+class Eye:
+    """The camera of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+    shapes : callable
+        Returns the data sets that should be seen.
+
+    Attributes
+    ----------
+    beside : Eye or None
+        That of a view beside this one, which looks from the same place: what fills the view is
+        all that both show.
+    """
+
+    def __init__(self, stage: Stage, shapes: Callable[[], list[Any]]) -> None:
+        self.stage = stage
+        self._shapes = shapes
+        self._fitted: tuple[float, ...] = ()
+        self.beside: Eye | None = None
+
+    @property
+    def _camera(self) -> Any:
+        return self.stage.plotter.camera
+
+    def look_from(self, side: str, parallel: bool) -> None:
+        """Look at everything from a side: a key of `SIDES`."""
+        towards, up = SIDES[side]
+        bounds = np.array(self.stage.plotter.bounds).reshape(3, 2)
+        centre = bounds.mean(axis=1)
+        camera = self._camera
+        camera.focal_point = centre
+        away = max(np.ptp(bounds, axis=1).max(), 1e-300)
+        camera.position = centre + np.asarray(towards, float) * away
+        camera.up = up
+        camera.parallel_projection = parallel
+        self.fit()
+
+    def fit(self) -> None:
+        """Make everything fill the view, from the present side, beside the legend's strip."""
+        self.shift()
+        found = self._whole()
+        if found is None:
+            return
+        centre, half, depth = found
+        self.aim(centre, half, depth)
+        self._fitted = self.place
+
+    def _whole(self) -> tuple[Any, float, float] | None:
+        """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
+        eyes = [self] if self.beside is None else [self, self.beside]
+        shapes = [shape for eye in eyes for shape in eye._shapes()]
+        if not shapes:
+            return None
+        axes = self._axes()
+        # Not all points at once: of large meshes, a copy of them takes longer than all else.
+        along = [axes @ np.asarray(shape.points).T for shape in shapes]
+        low = np.min([one.min(axis=1) for one in along], axis=0)
+        high = np.max([one.max(axis=1) for one in along], axis=0)
+        extent = high - low
+        half = max(eye._half(extent) for eye in eyes)
+        return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
+
+    def _half(self, extent: Any) -> float:
+        """Return half the height that shows an extent (3,) in a view of this size."""
+        width, height = self.stage.plotter.window_size
+        free = max(width - self.stage.strip(), 1.0)
+        return max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
+
+    def sees_detail(self) -> bool:
+        """Tell whether much less than everything is in the view, for somebody wanted it so."""
+        found = self._whole()
+        return found is not None and self._camera.parallel_scale < DETAIL * found[1]
+
+    @property
+    def fitted(self) -> bool:
+        """Tell whether nobody has moved the camera since everything was made to fill the view."""
+        return self._fitted == self.place
+
+    def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
+        """Look at a point, seeing ``half`` the height above and below it.
+
+        Parameters
+        ----------
+        centre : (3,)
+        half : float
+            In the length unit.
+        depth : float
+            Extent of what is seen along the line of sight.
+        """
+        camera = self._camera
+        direction = self._axes()[2]
+        away = max(depth, half)
+        if not camera.parallel_projection:
+            away = half / np.tan(np.radians(camera.view_angle / 2.0)) + depth / 2.0
+        camera.focal_point = centre
+        camera.position = centre - direction * away
+        camera.parallel_scale = half
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def _axes(self) -> Any:
+        """Return right, up and forward, (3, 3), as unit vectors."""
+        camera = self._camera
+        right = np.cross(camera.direction, np.array(camera.up))
+        up = np.cross(right, camera.direction)
+        return np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), camera.direction])
+
+    def shift(self) -> None:
+        """Keep the strip of the legend free: the picture shifts, the camera keeps its centre."""
+        width = self.stage.plotter.window_size[0]
+        self._camera.SetWindowCenter(self.stage.strip() / max(width, 1), 0.0)
+
+    def zoom_at(self, x: float, y: float, factor: float) -> None:
+        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
+        camera, renderer = self._camera, self.stage.plotter.renderer
+        if not camera.parallel_projection:
+            camera.Dolly(factor)
+            renderer.ResetCameraClippingRange()
+            return
+        width, height = self.stage.plotter.window_size
+        right = np.cross(camera.direction, camera.up)
+        middle = width / 2.0 * (1.0 - camera.GetWindowCenter()[0])
+        # Pixels from the camera's centre, in the world's length unit at the present scale.
+        unit = 2.0 * camera.parallel_scale / height
+        offset = ((x - middle) * right + (y - height / 2) * np.asarray(camera.up)) * unit
+        shift = offset * (1.0 - 1.0 / factor)
+        camera.focal_point = np.asarray(camera.focal_point) + shift
+        camera.position = np.asarray(camera.position) + shift
+        camera.parallel_scale = camera.parallel_scale / factor
+        renderer.ResetCameraClippingRange()
+
+    def take(self, other: Eye) -> None:
+        """Look from where another eye looks; the strip of the legend stays as it is here."""
+        camera, theirs = self._camera, other._camera
+        camera.position, camera.focal_point = theirs.position, theirs.focal_point
+        camera.up, camera.view_angle = theirs.up, theirs.view_angle
+        camera.parallel_projection = theirs.parallel_projection
+        camera.parallel_scale = theirs.parallel_scale
+        self.shift()
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def sees_all(self) -> bool:
+        """Tell whether the boxes around all that should be seen are within the view."""
+        boxes = [np.array(shape.bounds).reshape(3, 2) for shape in self._shapes()]
+        corners = [np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes]
+        if not corners:
+            return True
+        seen = to_display(self.stage.plotter, np.concatenate(corners))
+        size = np.array(self.stage.plotter.window_size)
+        return bool((seen >= -SLACK * size).all() and (seen <= (1 + SLACK) * size).all())
+
+    def loses_some(self) -> bool:
+        """Tell whether a node of what should be seen is outside the view, or below the legend."""
+        width, height = self.stage.plotter.window_size
+        free = np.array([width - self.stage.strip(), height])
+        for shape in self._shapes():
+            seen = to_display(self.stage.plotter, np.asarray(shape.points))
+            if (seen < 0).any() or (seen > free).any():
+                return True
+        return False
+
+    def looks_like(self, other: Eye) -> bool:
+        """Tell whether another eye looks from the same place in the same way."""
+        camera, theirs = self._camera, other._camera
+        return (
+            self.place == other.place
+            and camera.parallel_projection == theirs.parallel_projection
+            and camera.view_angle == theirs.view_angle
+        )
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Return position, focal point, up, and half the height seen: ten numbers."""
+        camera = self._camera
+        numbers = (*camera.position, *camera.focal_point, *camera.up, camera.parallel_scale)
+        return tuple(float(number) for number in numbers)
+
+    def go(self, place: tuple[float, ...]) -> None:
+        """Look from a place that `place` returned."""
+        camera = self._camera
+        camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
+        camera.parallel_scale = place[9]
+        self.shift()
+        self.stage.plotter.renderer.ResetCameraClippingRange()

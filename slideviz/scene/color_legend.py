@@ -1,0 +1,172 @@
+"""What the colours mean: the roles, or the colour bar, in a strip at the right of the view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from slideviz.color_scheme import Look
+from slideviz.plots.ticks import bar_ticks
+from slideviz.scene.plate import Rect
+from slideviz.terms import ROLES, ColourByTerm, Role
+
+STRIP = 104
+"""Pixels at the right edge that are kept free of the mesh, at normal letter size."""
+
+_VTK_FONT_FILE = 4
+_AIR = 12.0
+"""Pixels around the colour bar and its letters."""
+_BAR, _LONG = 20.0, 11
+"""Pixels that the colour bar is wide; letters of a title that needs all of the strip."""
+_LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
+"""Pixels that a number beside the colour bar is high, those between both, and its title's."""
+
+
+@lru_cache(maxsize=1)
+def _font_file() -> str:
+    """Return a font with all signs we need; VTK's own has no Greek and looks coarse."""
+    import matplotlib as mpl
+
+    return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
+
+
+def set_letters(text: Any, look: Look, size: float) -> None:
+    """Give a vtkTextProperty our font, the look's colour, and a size in pixels."""
+    import pyvista as pv
+
+    text.SetFontFamily(_VTK_FONT_FILE)
+    text.SetFontFile(_font_file())
+    text.SetFontSize(round(size))
+    text.SetColor(*pv.Color(look.text).float_rgb)
+    text.SetBold(False)
+    text.SetItalic(False)
+    text.SetShadow(False)
+
+
+def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
+    """Write the roles in use into the upper right corner, each with its colour."""
+    for row, role in enumerate(roles):
+        top, term = 14 + 24 * (row + 1), ROLES[role]
+        _line(plotter, ("\u25a0", term.colour, term.label), (top, STRIP - 28, 14), look, font_scale)
+
+
+def add_point_legend(
+    plotter: Any, words: Sequence[tuple[str, str]], top: float, style: tuple[Look, float]
+) -> float:
+    """Write what points mean below ``top`` pixels; return where the last line ends."""
+    for row, (word, colour) in enumerate(words):
+        _line(plotter, ("\u25cf", colour, word), (top + 21 * (row + 1), STRIP - 25, 12), *style)
+    return top + 21 * len(words)
+
+
+def _line(
+    plotter: Any,
+    said: tuple[str, str, str],
+    place: tuple[float, float, float],
+    look: Look,
+    font_scale: float,
+) -> None:
+    """Write a sign in its colour and a word, so far below the top and left of the right edge."""
+    import pyvista as pv
+    from vtkmodules.vtkRenderingCore import vtkCoordinate
+
+    (sign, colour, word), (down, right, size) = said, place
+    # Counted from a corner, the place is right in a view of any size.
+    corner = vtkCoordinate()
+    corner.SetCoordinateSystemToNormalizedViewport()
+    corner.SetValue(1.0, 1.0)
+    for what, said_in, edge, letters in (
+        (sign, colour, STRIP - 8, 1.4 * size),
+        (word, look.text, right, size),
+    ):
+        text = pv.Text(what)
+        text.GetPositionCoordinate().SetReferenceCoordinate(corner)
+        text.GetPositionCoordinate().SetCoordinateSystemToViewport()
+        text.GetPositionCoordinate().SetValue(-edge * font_scale, -down * font_scale)
+        set_letters(text.prop, look, letters * font_scale)
+        text.prop.color = said_in
+        text.prop.SetVerticalJustificationToCentered()
+        # A role and the nodes of a type may have the same word.
+        name = f"legend:{word}:{what}" if sign == "\u25a0" else f"legend:nodes:{word}:{what}"
+        plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
+
+
+def clear_legend(plotter: Any) -> None:
+    """Remove the legend of roles and the colour bar, and the plate below it."""
+    for name in list(plotter.actors):
+        if name.startswith(("legend:", "plate:")):
+            plotter.remove_actor(name, reset_camera=False, render=False)
+    for name in list(plotter.scalar_bars.keys()):
+        plotter.remove_scalar_bar(name, render=False)
+
+
+def add_colour_bar(
+    plotter: Any, mapper: Any, what: ColourByTerm, inverted: bool, style: tuple[Look, float]
+) -> None:
+    """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
+    (look, font_scale), title, unit = style, what.label, what.unit
+    bar = plotter.add_scalar_bar(
+        title=title,
+        mapper=mapper,
+        vertical=True,
+        interactive=False,
+        color=look.text,
+        render=False,
+    )
+    bar.SetUnconstrainedFontSize(True)
+    bar.SetTitle(f"{title}\n{unit}" if unit else title)
+    # Longer words would be cut off at the edge of the view.
+    size = (14 if len(title) < _LONG else 13) if not unit else 12
+    set_letters(bar.GetTitleTextProperty(), look, size * font_scale)
+    set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
+    set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
+    bar.SetVerticalTitleSeparation(round(8 * font_scale))
+    bar.SetTextPad(round(_GAP * font_scale))
+    bar.SetUseCustomLabels(True)
+    bar.SetDrawNanAnnotation(inverted)
+    bar.SetDrawAnnotations(inverted)
+    bar.SetNanAnnotation("inverted" if inverted else "")
+
+
+def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect:
+    """Put the colour bar at the right edge of the view as it is now, ``below`` pixels from its top.
+
+    There its title ends, where lines about points above it do. Return the room of bar and letters.
+    """
+    width, height = (max(side, 1) for side in plotter.window_size)
+    bar, bottom = plotter.scalar_bars[title], 0.16
+    bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
+    # The title is in the middle of that: short ones keep away from the edge of the view.
+    wide = STRIP - 20 if len(title) >= _LONG else 66
+    bar.SetWidth(wide * font_scale / width)
+    bar.SetBarRatio(_BAR / wide)
+    free = 1.0 - below * font_scale / height
+    part = max(min(0.68, free - bottom), 0.2)
+    bar.SetHeight(part)
+    _number(bar, max(part * height - _HEAD * font_scale, 1.0) / font_scale)
+    room = _AIR * font_scale
+    return _rect(plotter, bottom * height - room, (bottom + part) * height + room, font_scale)
+
+
+def _number(bar: Any, length: float) -> None:
+    """Write as many numbers beside a bar as have room in its length in pixels at normal size."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    low, high = bar.GetLookupTable().GetRange()
+    at, form = bar_ticks(low, high, lambda _: _LABEL / length)
+    bar.SetLabelFormat(form)
+    bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
+
+
+def lines_room(plotter: Any, end: float, font_scale: float) -> Rect:
+    """Return the room of lines in the upper right corner, the last ``end`` pixels below the top."""
+    height = plotter.window_size[1]
+    return _rect(plotter, height - (end + 13) * font_scale, height, font_scale)
+
+
+def _rect(plotter: Any, bottom: float, top: float, font_scale: float) -> Rect:
+    """Return the strip between two heights, in pixels."""
+    width, height = plotter.window_size
+    return width - STRIP * font_scale, bottom, float(width), min(top, float(height))

@@ -1,0 +1,282 @@
+"""A section laid flat in a plotter: a cylinder unrolled, or a plane seen along its normal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import LIGHT, SELECTED_COLOUR, Look
+from slideviz.mesh.model import FloatArray
+from slideviz.mesh.periodic import Pair
+from slideviz.mesh.quality import INVERTED
+from slideviz.plots.section_paint import Paint
+from slideviz.scene import pick_cell
+from slideviz.scene.instances import Twins
+from slideviz.scene.marked_cell import IN_FRONT
+from slideviz.scene.passages import Period, matrices
+from slideviz.scene.polygon_actor import PolygonActor, plain_colour
+from slideviz.scene.stage import Stage
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons
+from slideviz.sections.threshold import Choice
+from slideviz.sections.unroll import Label, flat_labels, flatten, middle_angle, plane_axes
+from slideviz.session.passages import keeps, moved
+from slideviz.session.section_cuts import Cuts
+from slideviz.session.state import Session
+from slideviz.terms import quantity_of
+
+FILL = 0.94
+"""How much of the height or width a section takes."""
+
+
+class FlatScene:
+    """One section of a session, flat, with its neighbours; both axes to the same scale.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Where to draw.
+    cuts : Cuts
+        Shared with the view in space.
+    look : Look
+
+    Attributes
+    ----------
+    section : Section or None
+        What is shown.
+    polygons : Polygons or None
+        Its cells, flat.
+    session : Session
+        The state that is shown.
+    beside : FlatScene or None
+        Another scene with the same camera: both are seen whole.
+    """
+
+    def __init__(self, plotter: Any, cuts: Cuts, look: Look = LIGHT) -> None:
+        self.stage = Stage(plotter, look)
+        self.cuts = cuts
+        self.beside: FlatScene | None = None
+        self.section: Section | None = None
+        self.polygons: Polygons | None = None
+        self._all: Polygons | None = None
+        self._shown = PolygonActor(self.stage, "flat")
+        self._twins = Twins(self.stage, self._shown)
+        self._mark = PolygonActor(self.stage, "marked", pickable=False)
+        self._style_mark()
+        self._period = Period()
+        self._made_of: tuple[object, ...] = ()
+        self.session = Session()
+        self.set_look(look)
+
+    @property
+    def labels(self) -> tuple[Label, Label]:
+        """Return what both axes are called."""
+        assert self.section is not None
+        return flat_labels(self.section)
+
+    def update(self, session: Session, section: Section) -> None:
+        """Show another state, or another section."""
+        assert session.frame is not None
+        self.session, self.section = session, section
+        self.stage.set_colours(session)
+        by_value = session.view.colour_by != "role"
+        cut, only = self.cuts.of(session.frame.mesh, section), self.stage.chosen(session)
+        key = (cut, only, section, session.frame if by_value else None)
+        if key != self._made_of:
+            self._made_of = key
+            self._place(cut, only, section, session)
+        self._shown.colour(self.stage.values(session) if by_value else None)
+        self._style(section)
+        self._draw_neighbours(section)
+        self._draw_mark()
+
+    def _place(
+        self, cut: Polygons, only: Choice | None, section: Section, session: Session
+    ) -> None:
+        """Lay the polygons flat and draw them, but for cells that are not chosen."""
+        assert session.frame is not None
+        flat = flatten(cut, section) if len(cut) else cut
+        # Where the section lies stays, whatever cells of it are shown.
+        self._all = flat
+        if only is not None and section.whole and len(cut):
+            part = self.cuts.of(session.frame.mesh, section, only=only)
+            near = middle_angle(flat, section) if section.kind == "cylinder" else None
+            flat = flatten(part, section, near) if len(part) else part
+        elif only is not None:
+            flat = only.among(flat)
+        if not section.whole and len(flat):
+            # Nothing is in front of another, but folded cells overlap: they are drawn last.
+            folded = session.frame.quality.status[flat.cells] == INVERTED
+            flat = flat.take(np.argsort(folded, kind="stable")) if folded.any() else flat
+            flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
+        self.polygons = flat
+        self._shown.show(flat)
+
+    def _style(self, section: Section) -> None:
+        prop = self._shown.actor.prop
+        prop.color = plain_colour(self.stage.look)
+        prop.lighting = section.whole
+        prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
+        prop.line_width = 1.0
+        view = self.session.view
+        self.stage.edges(prop, view.edges, view.colour_by == "role")
+
+    def _draw_neighbours(self, section: Section) -> None:
+        found: dict[int, FloatArray] = {}
+        if self.session.view.copies:
+            pair = self._period.of(self.session)
+            for number, matrix in matrices(self.session, pair).items():
+                if pair is not None and keeps(section, matrix):
+                    found[number] = flat_matrix(section, pair, number, matrix)
+        self._twins.show(found)
+
+    def _style_mark(self) -> None:
+        prop, mapper = self._mark.actor.prop, self._mark.mapper
+        prop.style, prop.color, prop.line_width = "wireframe", SELECTED_COLOUR, 4.0
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+
+    def _draw_mark(self) -> None:
+        """Draw the edges of the marked cell, if the section shows it."""
+        assert self.polygons is not None
+        mine = np.flatnonzero(self.polygons.cells == self.session.view.marked)
+        self._mark.show(self.polygons.take(mine))
+
+    # What is told ----------------------------------------------------------------------
+
+    @property
+    def summary(self) -> str:
+        """Return in words how many cells are cut, and their min, mean and inverted ones.
+
+        While a range chooses cells, these are those of the cells that it leaves.
+        """
+        if self.polygons is None or self._all is None or not len(self._all):
+            return "it cuts no cell"
+        only = self.stage.chosen(self.session)
+        cells, every = self.polygons.cell_ids, len(self._all.cell_ids)
+        if only is not None and not len(cells):
+            return f"none of {every:,} cells cut is shown: {only.words}"
+        frame, mesh = self.session.frame, self.session.mesh
+        assert frame is not None
+        what = quantity_of(self.session.view.colour_by)
+        paint = Paint(
+            what,
+            frame.values(what, mesh),
+            frame.quality.status == INVERTED,
+            self.session.colour_range,
+        )
+        return paint.sentence(cells) if only is None else paint.sentence(cells, every, only.words)
+
+    def pick_cell(self, x: float, y: float) -> int | None:
+        """Return the cell at a pixel counted from the lower left, or None."""
+        if self.polygons is None or not len(self.polygons):
+            return None
+        shown = [self._shown.actor, *self._twins.drawn.values()]
+        cells = self.polygons.cells
+        return pick_cell.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
+
+    # Camera ----------------------------------------------------------------------------
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours for background and edges."""
+        self.stage.look = look
+        self.stage.set_background()
+        if self.section is not None and self.session.frame is not None:
+            self.update(self.session, self.section)
+
+    def bounds(self) -> tuple[FloatArray, FloatArray] | None:
+        """Return the lowest and highest corner (2,) of all that is drawn, or None."""
+        if self._all is None or not len(self._all):
+            return None
+        own = self._all.points
+        parts = [moved(own, np.array(twin.user_matrix)) for twin in self._twins.drawn.values()]
+        parts.append(own)
+        low = np.min([part.min(axis=0) for part in parts], axis=0)
+        high = np.max([part.max(axis=0) for part in parts], axis=0)
+        return low[:2], high[:2]
+
+    def fit(self) -> None:
+        """Make everything fill the view."""
+        scenes = [self] if self.beside is None else [self, self.beside]
+        found = [box for box in (scene.bounds() for scene in scenes) if box is not None]
+        if not found:
+            return
+        low = np.min([box[0] for box in found], axis=0)
+        high = np.max([box[1] for box in found], axis=0)
+        width, height = self.stage.plotter.window_size
+        extent = np.maximum(high - low, 1e-300)
+        half = max(extent[1], extent[0] * height / max(width, 1)) / 2.0 / FILL
+        centre = (low + high) / 2.0
+        camera = self.stage.plotter.camera
+        away = 10.0 * float(extent.max())
+        camera.focal_point = (*centre, 0.0)
+        camera.position = (*centre, away)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_projection = True
+        camera.parallel_scale = half
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def take_camera(self, other: FlatScene) -> None:
+        """Look at what another scene looks at."""
+        camera, theirs = self.stage.plotter.camera, other.stage.plotter.camera
+        camera.parallel_projection = True
+        camera.focal_point, camera.position = theirs.focal_point, theirs.position
+        camera.up, camera.parallel_scale = theirs.up, theirs.parallel_scale
+        self.stage.plotter.renderer.ResetCameraClippingRange()
+
+    def looks_like(self, other: FlatScene) -> bool:
+        """Tell whether another scene looks at the same."""
+        cameras = (self.stage.plotter.camera, other.stage.plotter.camera)
+        one, two = ((*c.focal_point, *c.position, *c.up, c.parallel_scale) for c in cameras)
+        return one == two
+
+    def zoom_at(self, x: float, y: float, factor: float) -> None:
+        """Enlarge by ``factor``; the pixel (x, y) from the lower left keeps what it shows."""
+        (left, right), (below, above) = self.ranges()
+        width, height = self.stage.plotter.window_size
+        camera = self.stage.plotter.camera
+        at = np.array([left + (right - left) * x / width, below + (above - below) * y / height])
+        way = (at - np.asarray(camera.focal_point)[:2]) * (1.0 - 1.0 / factor)
+        shift = np.array([*way, 0.0])
+        camera.focal_point = np.asarray(camera.focal_point) + shift
+        camera.position = np.asarray(camera.position) + shift
+        camera.parallel_scale = camera.parallel_scale / factor
+
+    def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return what the view reaches from left to right, and from bottom to top."""
+        camera = self.stage.plotter.camera
+        width, height = self.stage.plotter.window_size
+        x, y, _ = camera.focal_point
+        up = camera.parallel_scale
+        side = up * width / max(height, 1)
+        return (x - side, x + side), (y - up, y + up)
+
+
+def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -> FloatArray:
+    """Return the transformation (4, 4) of the flat section that a period's power is.
+
+    Parameters
+    ----------
+    section : Section
+        The matrix takes it onto itself.
+    pair : Pair
+        The period.
+    number : int
+        Its power.
+    matrix : (4, 4) float64
+        The transformation in space.
+    """
+    flat = np.eye(4)
+    if section.kind == "plane":
+        rows = plane_axes(section).rows
+        flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
+        flat[:3, 3] = rows @ matrix[:3, 3]
+        flat[2, 3] = 0.0
+        return flat
+    base, origin = section.basis, np.asarray(section.origin)
+    step = moved(origin[None], matrix)[0] - origin
+    sense = np.sign(base[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
+    flat[0, 3] = step @ base[2]
+    flat[1, 3] = section.radius * sense * np.copysign(pair.period, pair.angle) * number
+    return flat

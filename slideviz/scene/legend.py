@@ -1,0 +1,111 @@
+"""The legend of the scene: the roles in use, or the colour bar; and the axes in a corner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pyvista as pv
+
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene.color_legend import (
+    add_colour_bar,
+    add_point_legend,
+    add_role_legend,
+    clear_legend,
+    lines_room,
+    place_bar,
+)
+from slideviz.scene.plate import Plate
+from slideviz.scene.stage import Stage
+from slideviz.session.state import Session
+from slideviz.terms import COLOUR_BY, ROLES
+
+PLATE = "plate:legend"
+
+
+class LegendLayer:
+    """What the colours mean, in a strip at the right."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        # Of its own: that of an actor may be gone before the bar is.
+        self._mapper = pv.DataSetMapper()
+        self._mapper.lookup_table = stage.table
+        self._drawn: tuple[object, ...] = ()
+        self._bar: tuple[str, float] | None = None
+        self._plate: Plate | None = None
+        self._end = 0.0
+        self._placed: tuple[int, ...] = ()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        clear_legend(self.stage.plotter)
+        self._drawn, self._bar, self._plate = (), None, None
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the legend has a place of its own."""
+        return []
+
+    def update(self, _old: Session | None, new: Session) -> None:
+        """Show another state; made anew only where it differs, which takes longer than the rest."""
+        key = self._key(new)
+        if key != self._drawn:
+            self._drawn = key
+            clear_legend(self.stage.plotter)
+            self._bar = self._plate = None
+            if new.view.legend and self.stage.has_legend and new.mesh is not None:
+                self._make(new)
+        self._place()
+
+    def _make(self, session: Session) -> None:
+        stage, mesh, what = self.stage, session.mesh, session.view.colour_by
+        assert mesh is not None
+        style = (stage.look, stage.font_scale)
+        self._placed = ()
+        # First: what comes after it lies above it.
+        self._plate = Plate(stage.plotter, PLATE, stage.look) if stage.has_plate else None
+        if what == "role":
+            used = {session.role(name) for name in mesh.marker_names}
+            roles = [role for role in ROLES if role in used]
+            add_role_legend(stage.plotter, roles, stage.look, stage.font_scale)
+            top = 24.0 * len(roles) + 16
+            self._end = add_point_legend(stage.plotter, stage.point_words, top, style)
+            return
+        told = COLOUR_BY[what]
+        add_colour_bar(stage.plotter, self._mapper, told, has_inverted(session), style)
+        end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
+        self._bar, self._end = (told.label, end + (34 if stage.point_words else 0)), end
+
+    def _place(self) -> None:
+        """Put colour bar and plate where they belong in a view of this size."""
+        plotter, scale = self.stage.plotter, self.stage.font_scale
+        size = tuple(plotter.window_size)
+        if size == self._placed or not self._drawn:
+            return
+        self._placed = size
+        rect = lines_room(plotter, self._end, scale)
+        if self._bar is not None:
+            room = place_bar(plotter, *self._bar, scale)
+            # Lines about points are above the bar.
+            rect = (*room[:3], rect[3]) if self.stage.point_words else room
+        if self._plate is not None:
+            self._plate.place(rect)
+
+    def _key(self, session: Session) -> tuple[object, ...]:
+        """Return all that the legend says, and how."""
+        mesh, view = session.mesh, session.view
+        names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
+        said = frozenset(session.role(name) for name in names) or has_inverted(session)
+        colours = (view.colour_by, view.colour_map, session.colour_range)
+        points, style = self.stage.point_words, (self.stage.look, self.stage.font_scale)
+        shown = view.legend and self.stage.has_legend, self.stage.has_plate
+        return (id(mesh), shown, colours, said, points, style)
+
+
+def has_inverted(session: Session) -> bool:
+    """Tell whether the frame that is shown has inverted cells."""
+    return session.frame is not None and session.frame.quality.inverted > 0

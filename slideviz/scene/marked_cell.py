@@ -1,0 +1,107 @@
+"""The marked cell: its outline in front of everything, wherever in the mesh it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.surfaces import Surface, lifted
+from slideviz.scene import actors
+from slideviz.scene.actors import VALUES
+from slideviz.scene.stage import Stage
+from slideviz.scene.threshold import part_shape
+from slideviz.session.inspect import nodes_of
+from slideviz.session.state import Session
+
+OUTLINE, FACES, DOT = "mark:outline", "mark:faces", "mark:dot"
+IN_FRONT = -66_000.0
+"""Units of depth that bring lines and points in front of all else; the whole range is 65536."""
+
+
+class MarkLayer:
+    """The cell that the view marks: edges, sides in the colour of its value, and a dot.
+
+    The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
+    3D mesh, the boundaries let it be seen (`slideviz.scene.mesh.BoundaryLayer`).
+
+    Attributes
+    ----------
+    cell : int or None
+        Which cell is drawn.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.clear()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; nothing yet."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.cell: int | None = None
+        self._drawn: dict[str, Any] = {}
+        # Kept here: a data set that only VTK holds may come back from a mapper without points.
+        self._shapes: dict[str, Any] = {}
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the cell is a part of the mesh."""
+        return []
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        cell, frame = new.view.marked, new.frame
+        if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
+            for name in self._drawn:
+                self.stage.remove(name)
+            self.clear()
+            return
+        if cell != self.cell:
+            self._add(frame.mesh, cell)
+        if cell != self.cell or old is None or old.frame is not new.frame:
+            self._place(frame.mesh, cell)
+        self.cell = cell
+        if FACES in self._drawn:
+            shape = self._shapes[FACES]
+            shape.cell_data[VALUES] = np.full(shape.n_cells, self.stage.values(new)[cell])
+            self._drawn[FACES].mapper.scalar_visibility = True
+
+    def _add(self, mesh: Mesh, cell: int) -> None:
+        """Make the actors of another cell."""
+        for name in self._drawn:
+            self.stage.remove(name)
+        self._drawn = {}
+        at = lifted(mesh.points[nodes_of(mesh, cell)], 0.0)
+        edges = np.array(ELEMENTS[int(mesh.cells.types[cell])].edges)
+        lines = np.column_stack([np.full(len(edges), 2), edges]).ravel()
+        shapes = {OUTLINE: pv.PolyData(at, lines=lines), DOT: pv.PolyData(at[:1].copy())}
+        if mesh.dim == 3:
+            shapes[FACES] = part_shape(mesh, np.array([cell]))
+            shapes[FACES].cell_data[VALUES] = np.zeros(shapes[FACES].n_cells)
+        self._shapes = shapes
+        for name, shape in shapes.items():
+            actor = self.stage.add(shape, name, lighting=False, pickable=False)
+            self._drawn[name] = actor
+            if name == FACES:
+                continue
+            actor.prop.color = SELECTED_COLOUR
+            actor.prop.line_width, actor.prop.point_size = 4.0, 9.0
+            actor.prop.render_points_as_spheres = name == DOT
+            actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+            actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+            actor.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+
+    def _place(self, mesh: Mesh, cell: int) -> None:
+        """Move the actors to where the cell is now."""
+        at, lift = mesh.points[nodes_of(mesh, cell)], 3.0 * self.stage.lift(mesh)
+        actors.place(self._shapes[OUTLINE], at, lift)
+        actors.place(self._shapes[DOT], at.mean(axis=0)[None], lift)
+        if FACES in self._shapes:
+            faces = self._shapes[FACES]
+            actors.place(faces, mesh.points[faces.point_data["vtkOriginalPointIds"]])

@@ -1,0 +1,278 @@
+"""The mesh in the scene: its boundaries, and the cells of a 2D mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.mesh.model import FloatArray
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene import actors
+from slideviz.scene.actors import VALUES, Band, Drawn
+from slideviz.scene.shaders import see_through
+from slideviz.scene.stage import Stage
+from slideviz.session.state import Session
+from slideviz.terms import ROLES
+
+FADED = 0.3
+"""Opacity of a 2D mesh while sections show the cells on them."""
+GLASS = 0.15
+"""Opacity of boundaries around moving ones."""
+SEE_THROUGH = 0.25
+"""Opacity of boundaries around a marked cell that is not beside one of them."""
+_BESIDE = 1e-6
+"""Part of a mesh's length that an enclosed boundary is at least away from its outside."""
+
+
+def recoloured(old: Session | None, new: Session) -> bool:
+    """Tell whether cells have other values than before."""
+    return (
+        old is None
+        or old.frame is not new.frame
+        or old.view.colour_by != new.view.colour_by
+        or old.mesh is not new.mesh
+    )
+
+
+class CellLayer:
+    """All cells of a 2D mesh, or the outside of a 3D mesh without markers."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.shape: Any = None
+        self.actor: Any = None
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+        mesh = session.mesh
+        assert mesh is not None
+        if mesh.dim == 2:
+            shape = actors.cell_shape(mesh)
+        elif not surfaces:
+            shape = actors.volume(mesh).extract_surface(algorithm="geometry")
+            shape.cell_data[VALUES] = np.zeros(shape.n_cells)
+        else:
+            return
+        self.shape = shape
+        self.actor = self.stage.add(shape, "cells", lighting=mesh.dim == 3)
+        self.actor.prop.line_width = 1.0
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.shape = self.actor = None
+
+    def shapes(self) -> list[Any]:
+        """Return the data set of the cells."""
+        return [] if self.shape is None else [self.shape]
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        if self.actor is None or new.mesh is None or new.frame is None:
+            return
+        by_value = new.view.colour_by != "role"
+        if old is None or old.frame is not new.frame:
+            if new.mesh.dim == 2:
+                actors.place(self.shape, new.frame.mesh.points)
+            else:
+                ids = self.shape.point_data["vtkOriginalPointIds"]
+                actors.place(self.shape, new.frame.mesh.points[ids])
+        if by_value and recoloured(old, new):
+            values = self.stage.values(new)
+            if new.mesh.dim == 3:
+                values = values[self.shape.cell_data["vtkOriginalCellIds"]]
+            self.shape.cell_data[VALUES] = values
+        self.actor.mapper.scalar_visibility = by_value
+        self.actor.prop.color = self.stage.look.cell
+        inside = looks_inside(new)
+        if new.mesh.dim == 3:
+            see_through(self.actor, 0.12 if inside else 1.0)
+        else:
+            self.actor.prop.opacity = FADED if is_faded(new) else 1.0
+        self.stage.edges(self.actor.prop, new.view.edges and not inside, not by_value)
+
+
+class BoundaryLayer:
+    """The boundaries, each an actor, with a band around those that are selected.
+
+    Attributes
+    ----------
+    drawn : dict of str to Drawn
+        By name.
+    bands : dict of str to Band
+        Of those that are, or were, selected.
+    glass : frozenset of str
+        Those that are seen through, as moving ones are inside of them.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.drawn: dict[str, Drawn] = {}
+        self.bands: dict[str, Band] = {}
+        self.glass: frozenset[str] = frozenset()
+        self._lift = 0.0
+        self._closed = self._buried = False
+        self._enclosed: frozenset[str] = frozenset()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh."""
+        assert session.mesh is not None
+        self._lift = self.stage.lift(session.mesh)
+        for surface in surfaces:
+            self.drawn[surface.name] = self._add(surface, session.mesh.points)
+        self._closed = is_closed(surfaces)
+        self._enclosed = enclosed(surfaces, session.mesh.points)
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.drawn, self.bands, self.glass = {}, {}, frozenset()
+
+    def shapes(self) -> list[Any]:
+        """Return the data sets of all boundaries."""
+        return [one.shape for one in self.drawn.values()]
+
+    def _add(self, surface: Surface, points: FloatArray) -> Drawn:
+        shape = actors.surface_shape(surface, points, 2 * self._lift)
+        actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not surface.flat)
+        if not surface.flat:
+            actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
+        return Drawn(surface, shape, actor)
+
+    def _add_band(self, surface: Surface, points: FloatArray) -> Band:
+        """Return what highlights a boundary; made when first wanted, for most never are."""
+        rim = actors.rim_shape(surface, points, self._lift)
+        band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
+        band.prop.color = SELECTED_COLOUR
+        band.prop.line_width = 11 if surface.flat else 6
+        band.prop.opacity = 1.0
+        if not surface.flat:
+            # Lines on a face flicker unless they are drawn a little nearer.
+            band.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
+        return Band(rim, band)
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        if new.mesh is None or new.frame is None or not self.drawn:
+            return
+        if old is None or old.frame is not new.frame:
+            self._place(new.frame.mesh.points)
+        by_value = new.view.colour_by != "role" and new.mesh.dim == 3
+        if by_value and recoloured(old, new):
+            values = self.stage.values(new)
+            for one in self.drawn.values():
+                one.shape.cell_data[VALUES] = values[one.surface.owner]
+        self.glass, self._buried = self._glass(new), self._hides_mark(new)
+        for name, one in self.drawn.items():
+            self._style(name, one, new, by_value)
+        # Half of the faces look away; nobody sees them from outside, and they take their time.
+        culled = self._closed and not self.glass and seen_from_outside(new)
+        for one in self.drawn.values():
+            one.actor.prop.culling = "back" if culled else "none"
+
+    def _glass(self, session: Session) -> frozenset[str]:
+        """Return what would hide boundaries that move, where colours tell of roles."""
+        view = session.view
+        within = (name for name in self._enclosed if name not in view.hidden)
+        if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
+            return frozenset()
+        return frozenset(self.drawn) - self._enclosed
+
+    def _hides_mark(self, session: Session) -> bool:
+        """Tell whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
+        cell, mesh, hidden = session.view.marked, session.mesh, session.view.hidden
+        if cell is None or mesh is None or mesh.dim == 2 or not 0 <= cell < len(mesh.cells):
+            return False
+        shown = (one for name, one in self.drawn.items() if name not in hidden)
+        return not any((one.surface.owner == cell).any() for one in shown)
+
+    def _place(self, points: FloatArray) -> None:
+        for one in self.drawn.values():
+            at = points[one.surface.nodes]
+            actors.place(one.shape, at, 2 * self._lift)
+            if one.surface.name in self.bands:
+                actors.place(self.bands[one.surface.name].shape, at, self._lift)
+
+    def _style(self, name: str, one: Drawn, session: Session, by_value: bool) -> None:
+        view = session.view
+        shown = name not in view.hidden
+        one.actor.visibility = shown
+        lit = shown and name in view.selected
+        if lit and name not in self.bands and session.frame is not None:
+            self.bands[name] = self._add_band(one.surface, session.frame.mesh.points)
+        if name in self.bands:
+            self.bands[name].actor.visibility = lit
+        one.actor.prop.color = ROLES[session.role(name)].colour
+        one.actor.mapper.scalar_visibility = by_value
+        if one.surface.flat:
+            one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
+        else:
+            self.stage.edges(one.actor.prop, view.edges)
+            inside, glass = looks_inside(session), name in self.glass
+            opacity = 0.12 if inside else GLASS if glass else SEE_THROUGH if self._buried else 1.0
+            see_through(one.actor, opacity)
+            if inside or self._buried:
+                one.actor.prop.show_edges = False
+
+
+def looks_inside(session: Session) -> bool:
+    """Tell whether cells inside a 3D mesh are shown, so that its boundaries must let see them."""
+    view = session.view
+    if session.mesh is None or session.mesh.dim == 2:
+        return False
+    return view.threshold is not None or any(section.shown for section in view.sections)
+
+
+def is_faded(session: Session) -> bool:
+    """Tell whether sections show cells of a 2D mesh, so that the others must step back."""
+    if session.mesh is None or session.mesh.dim == 3:
+        return False
+    return any(section.shown and section.can_cut(2) for section in session.view.sections)
+
+
+def seen_from_outside(session: Session) -> bool:
+    """Tell whether boundaries that enclose a 3D mesh show nothing but their outside."""
+    view = session.view
+    glass = view.hidden or view.perspective or looks_inside(session)
+    # The outside of a folded cell is inside.
+    return not glass and session.frame is not None and session.frame.quality.inverted == 0
+
+
+def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
+    """Return the names of boundaries of a 3D mesh that are inside of all others: a wing in air.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+    points : (n, d) float64
+        Of the mesh.
+    """
+    boxes = {
+        one.name: (points[one.nodes].min(axis=0), points[one.nodes].max(axis=0))
+        for one in surfaces
+        if not one.flat
+    }
+    if not boxes:
+        return frozenset()
+    low = np.min([box[0] for box in boxes.values()], axis=0)
+    high = np.max([box[1] for box in boxes.values()], axis=0)
+    beside = _BESIDE * float((high - low).max())
+    return frozenset(
+        name
+        for name, box in boxes.items()
+        if (box[0] > low + beside).all() and (box[1] < high - beside).all()
+    )
+
+
+def is_closed(surfaces: Sequence[Surface]) -> bool:
+    """Tell whether surfaces together enclose something: every edge has two faces."""
+    faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
+    if len(faces) != len(surfaces) or not faces:
+        return False
+    every = np.concatenate(faces)
+    start, end = every.ravel(), np.roll(every, -1, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    keys = np.sort((low * (every.max() + 1) + high)[low != high])
+    pairs = len(keys) % 2 == 0 and bool(np.all(keys[::2] == keys[1::2]))
+    return pairs and bool(np.all(keys[1:-1:2] != keys[2::2]))

@@ -1,0 +1,74 @@
+"""Which boundary is under the mouse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from slideviz.mesh.model import FloatArray
+from slideviz.scene.actors import Drawn
+
+REACH = 9.0
+"""A click this many pixels beside a line still means the line."""
+
+
+def to_display(plotter: Any, points: FloatArray) -> FloatArray:
+    """Return where world points (n, 3) are seen, (n, 2) in pixels from the lower left."""
+    renderer = plotter.renderer
+    aspect = renderer.GetTiledAspectRatio()
+    matrix = renderer.camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1)
+    full = pv.array_from_vtkmatrix(matrix)
+    clip = np.column_stack([points, np.ones(len(points))]) @ full.T
+    size = np.array(plotter.render_window.GetSize())
+    return (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * size
+
+
+def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> str | None:
+    """Return the boundary of a 2D mesh nearest to a pixel, within `REACH`."""
+    best, found = REACH, None
+    at = np.array([x, y])
+    for one in drawn:
+        seen = to_display(plotter, np.asarray(one.shape.points))
+        a, b = seen[one.surface.facets[:, 0]], seen[one.surface.facets[:, 1]]
+        along = b - a
+        length2 = np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
+        part = np.clip(np.einsum("ij,ij->i", at - a, along) / length2, 0.0, 1.0)
+        distance = float(np.linalg.norm(a + part[:, None] * along - at, axis=1).min())
+        if distance < best:
+            best, found = distance, one.surface.name
+    return found
+
+
+def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> str | None:
+    """Return the boundary of a 3D mesh that is in front at a pixel."""
+    picker = _cell_picker()
+    names = {}
+    for one in drawn:
+        picker.AddPickList(one.actor)
+        names[one.actor] = one.surface.name
+    picker.Pick(x, y, 0.0, plotter.renderer)
+    return names.get(picker.GetActor())
+
+
+def meets(plotter: Any, x: float, y: float, actors: Sequence[Any]) -> bool:
+    """Tell whether the line of sight through a pixel meets one of some actors."""
+    if not actors:
+        return False
+    picker = _cell_picker()
+    picker.SetTolerance(0.0)
+    for actor in actors:
+        picker.AddPickList(actor)
+    picker.Pick(x, y, 0.0, plotter.renderer)
+    return picker.GetActor() is not None
+
+
+def _cell_picker() -> Any:
+    from vtkmodules.vtkRenderingCore import vtkCellPicker
+
+    picker = vtkCellPicker()
+    picker.SetTolerance(0.0005)
+    picker.PickFromListOn()
+    return picker

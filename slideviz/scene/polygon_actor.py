@@ -1,0 +1,77 @@
+"""An actor that shows polygons of cells, others from one moment to the next."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from slideviz.color_scheme import Look
+from slideviz.mesh.model import FloatArray
+from slideviz.scene.actors import VALUES
+from slideviz.scene.stage import Stage
+from slideviz.sections.polygons import Polygons
+
+
+class PolygonActor:
+    """Draws polygons, or lines, in the colours of the cells they belong to.
+
+    Parameters
+    ----------
+    stage : Stage
+    name : str
+        Of the actor.
+    pickable : bool
+        Whether the mouse finds it.
+
+    Attributes
+    ----------
+    actor : pyvista.Actor
+    mapper : pyvista.DataSetMapper
+        Its mapper, kept here: what Python knows of one that only VTK holds may be out of date.
+    shape : pyvista.PolyData
+    polygons : Polygons
+    """
+
+    def __init__(self, stage: Stage, name: str, pickable: bool = True) -> None:
+        # The plotter takes nothing that is empty, and a section may be.
+        self.shape = pv.PolyData(np.zeros((3, 3)), faces=[3, 0, 1, 2])
+        self.shape.cell_data[VALUES] = np.zeros(1)
+        self.actor = stage.add(self.shape, name, lighting=False, pickable=pickable)
+        self.mapper = self.actor.mapper
+        self.polygons = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
+        self.actor.visibility = False
+
+    def show(self, polygons: Polygons, lift: float = 0.0) -> None:
+        """Draw these, raised by ``lift`` in z; their numbers are 0."""
+        self.polygons = polygons
+        self.shape = polygon_shape(polygons, lift)
+        self.mapper.dataset = self.shape
+        self.actor.visibility = len(polygons) > 0
+
+    def colour(self, values: FloatArray | None) -> None:
+        """Give the polygons the numbers of their cells, (m,) for all of the mesh; None: none."""
+        if values is not None:
+            self.shape.cell_data[VALUES] = values[self.polygons.cells]
+        self.mapper.scalar_visibility = values is not None
+
+
+def plain_colour(look: Look) -> tuple[float, float, float]:
+    """Return the colour of polygons without numbers: it stands off from any background."""
+    cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (look.cell, look.ghost))
+    red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
+    return red, green, blue
+
+
+def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
+    """Return polygons, or lines, as PolyData with room for the numbers of their cells."""
+    shape = pv.PolyData()
+    shape.points = polygons.points + np.array([0.0, 0.0, lift])
+    table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)
+    if len(polygons) and polygons.sizes.max() == 2:
+        shape.SetLines(table)
+    else:
+        shape.SetPolys(table)
+    shape.cell_data[VALUES] = np.zeros(len(polygons))
+    return shape

@@ -1,0 +1,247 @@
+"""What is drawn: boundaries, cells, ghosts and legend in a plotter that it is given.
+
+The plotter may be the window's or an off-screen one. A scene is made of layers, one for each
+kind of thing; only they, and `slideviz.scene.actors`, make VTK objects, all of it in the
+thread that owns the plotter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import LIGHT, Look
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene import pick, pick_cell
+from slideviz.scene.actors import Drawn
+from slideviz.scene.camera import Eye
+from slideviz.scene.ghosts import GhostLayer
+from slideviz.scene.legend import LegendLayer
+from slideviz.scene.marked_cell import MarkLayer
+from slideviz.scene.mesh import BoundaryLayer, CellLayer
+from slideviz.scene.passages import CopyLayer
+from slideviz.scene.points import PointLayer
+from slideviz.scene.sections import SectionLayer
+from slideviz.scene.stage import Layer, Stage
+from slideviz.scene.threshold import ChosenLayer
+from slideviz.scene.triad import TriadLayer
+from slideviz.session.inspect import cell_at, surroundings
+from slideviz.session.state import Session
+from slideviz.session.store import tell_all
+
+NEAR = 8.0
+"""Sizes of a cell that the height of the view shows after flying to it."""
+
+
+class Scene:
+    """A mesh and its boundaries in a plotter.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Where to draw.
+    look : Look
+        Colours of background, text and edges.
+    font_scale : float
+        Enlarges the letters, for pictures of many pixels.
+    """
+
+    def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
+        self.stage = Stage(plotter, look, font_scale)
+        self._cells = CellLayer(self.stage)
+        self._boundaries = BoundaryLayer(self.stage)
+        self._chosen = ChosenLayer(self.stage, self._cells)
+        self._ghosts = GhostLayer(self.stage)
+        self.sections = SectionLayer(self.stage)
+        self.layers: tuple[Layer, ...] = (
+            self._cells,
+            self._boundaries,
+            self._chosen,
+            self.sections,
+            MarkLayer(self.stage),
+            self._ghosts,
+            CopyLayer(self.stage, self._cells, self._boundaries, self._chosen),
+            PointLayer(self.stage),
+            LegendLayer(self.stage),
+            TriadLayer(self.stage),
+        )
+        self.eye = Eye(self.stage, self._shapes)
+        self.session = Session()
+        self.set_look(look)
+
+    @property
+    def plotter(self) -> Any:
+        """Return where it is drawn."""
+        return self.stage.plotter
+
+    @property
+    def look(self) -> Look:
+        """Return the colours of background, text and edges."""
+        return self.stage.look
+
+    @property
+    def drawn(self) -> dict[str, Drawn]:
+        """Return the boundaries, by name."""
+        return self._boundaries.drawn
+
+    # What is in the scene ---------------------------------------------------------------
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; the camera sees all of it."""
+        for _ in self.opening(session, surfaces):
+            pass
+
+    def opening(self, session: Session, surfaces: Sequence[Surface]) -> Iterator[None]:
+        """Draw another mesh, and yield between the pieces of that."""
+        self.clear()
+        if session.mesh is None:
+            return
+        self.session = session
+        self.stage.set_colours(session)
+        for layer in self.layers:
+            layer.open(session, surfaces)
+            layer.update(None, session)
+            yield
+        self.look_from("+z" if session.mesh.dim == 2 else "iso")
+
+    def clear(self) -> None:
+        """Remove everything."""
+        for layer in self.layers:
+            layer.clear()
+        self.plotter.clear_actors()
+        self.session = Session()
+
+    def update(self, session: Session) -> None:
+        """Show another state of the same mesh; only what differs is touched."""
+        old, self.session = self.session, session
+        if session.mesh is None or old.mesh is None:
+            return
+        self.stage.set_colours(session)
+        tell_all((layer.update for layer in self.layers), old, session)
+        if old.view.perspective != session.view.perspective:
+            self.plotter.camera.parallel_projection = self._parallel()
+
+    def set_look(self, look: Look) -> None:
+        """Take other colours for background, letters and edges."""
+        self.stage.look = look
+        self.stage.set_background()
+        self._again()
+
+    def set_legend(self, drawn: bool) -> None:
+        """Draw the legend where it is wanted, or leave it to a view beside this one."""
+        self.stage.has_legend = drawn
+        self.resized()
+
+    def resized(self) -> None:
+        """Put the legend where it belongs in a view of another size."""
+        self.eye.shift()
+        self._again()
+
+    def _again(self) -> None:
+        if self.session.mesh is not None:
+            tell_all((layer.update for layer in self.layers), self.session, self.session)
+
+    # Ghosts -----------------------------------------------------------------------------
+
+    def set_motion_ghosts(self, ghosts: Mapping[str, FloatArray]) -> None:
+        """Draw where boundaries will go: points (u, d) of the nodes of each."""
+        self._ghosts.set_moved(ghosts)
+
+    @property
+    def motion_ghosts(self) -> dict[str, FloatArray]:
+        """Return where boundaries will go, as it was set."""
+        return dict(self._ghosts.moved)
+
+    # Camera and mouse -------------------------------------------------------------------
+
+    def look_from(self, side: str) -> None:
+        """Look at all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
+        self.eye.look_from(side, self._parallel())
+
+    def _parallel(self) -> bool:
+        mesh = self.session.mesh
+        return mesh is None or mesh.dim == 2 or not self.session.view.perspective
+
+    def _shapes(self) -> list[Any]:
+        return [shape for layer in self.layers for shape in layer.shapes()]
+
+    def take_camera(self, other: Scene) -> None:
+        """Look from where another scene looks."""
+        self.eye.take(other.eye)
+
+    def fit(self) -> None:
+        """Make everything fill the view, from the present side, beside the legend's strip."""
+        self.eye.fit()
+
+    def sees_all(self) -> bool:
+        """Tell whether nothing of the mesh is outside the view."""
+        return self.eye.sees_all()
+
+    def zoom_at(self, x: float, y: float, factor: float) -> None:
+        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
+        self.eye.zoom_at(x, y, factor)
+
+    def pick(self, x: float, y: float) -> str | None:
+        """Return the visible boundary at a pixel counted from the lower left, or None.
+
+        Sections and chosen cells in 3D are no boundaries, and what is in front of them is glass.
+        """
+        hidden = self.session.view.hidden
+        drawn = [one for name, one in self.drawn.items() if name not in hidden]
+        if not drawn:
+            return None
+        if drawn[0].surface.flat:
+            return pick.nearest_line(self.plotter, x, y, drawn)
+        # What is seen through glass is meant, not the glass.
+        solid = [*self.sections.actors(), *(actor for actor, _ in self._chosen.pickable())]
+        if pick.meets(self.plotter, x, y, solid):
+            return None
+        within = [one for one in drawn if one.surface.name not in self._boundaries.glass]
+        found = pick.front_surface(self.plotter, x, y, within) if within else None
+        return pick.front_surface(self.plotter, x, y, drawn) if found is None else found
+
+    def pick_cell(self, x: float, y: float) -> int | None:
+        """Return the cell at a pixel counted from the lower left, or None.
+
+        In 3D it is the one whose side is in front. While a range chooses cells, only these.
+        """
+        session = self.session
+        if session.mesh is None or session.frame is None:
+            return None
+        if session.mesh.dim == 2:
+            values = self.stage.values(session)
+            # Where cells overlap, an inverted one is told of before the others.
+            rank = np.where(np.isnan(values), -np.inf, values)
+            only = self.stage.chosen(session)
+            if only is not None:
+                rank = np.where(only.mask, rank, np.nan)
+            at = pick_cell.on_plane(self.plotter, x, y)
+            return cell_at(session.frame.mesh, *at, rank)
+        # Boundaries in front of a section are glass.
+        cut = pick_cell.front_cell(self.plotter, x, y, self.sections.pickable())
+        return pick_cell.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
+
+    def _pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""
+        if self._chosen.cells is not None:
+            return self._chosen.pickable()
+        hidden = self.session.view.hidden
+        shown = [
+            (one.actor, one.surface.owner) for name, one in self.drawn.items() if name not in hidden
+        ]
+        if self._cells.actor is not None:
+            owner = self._cells.shape.cell_data["vtkOriginalCellIds"]
+            shown.append((self._cells.actor, np.asarray(owner)))
+        return shown
+
+    def fly_to(self, cell: int) -> None:
+        """Look at a cell of the frame that is shown, from the present side and near."""
+        mesh = self.session.frame.mesh if self.session.frame is not None else None
+        if mesh is None or not 0 <= cell < len(mesh.cells):
+            return
+        middle, size = surroundings(mesh, cell)
+        depth = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+        self.eye.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)

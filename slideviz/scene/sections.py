@@ -1,0 +1,215 @@
+"""Sections in the scene: the cells that planes and cylinders cut, in the colours of the view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene.cut_lines import CutLines
+from slideviz.scene.instances import Twins
+from slideviz.scene.mesh import recoloured
+from slideviz.scene.passages import Period, matrices
+from slideviz.scene.polygon_actor import PolygonActor, plain_colour
+from slideviz.scene.stage import Stage
+from slideviz.sections.line import Box, box_around
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons
+from slideviz.session.passages import keeps, moved
+from slideviz.session.section_cuts import Cuts, can_cut
+from slideviz.session.state import Session
+
+NAME, BAND, RIM = "section:", "band:", "rim:"
+"""What names of actors begin with: of what a section shows, and of what is below it in 2D."""
+WIDTHS = {BAND: 8.0, RIM: 10.0}
+"""Pixels of the line that a cut through a 2D mesh is, in the colours of its cells, and of what
+sets it off: where cells are smaller than pixels, these lines are what is seen."""
+LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
+"""How far these are above the cells of a 2D mesh, as parts of `Stage.lift`."""
+
+
+@dataclass(eq=False)
+class SectionDrawn:
+    """A section in the scene: what shows its polygons, and of what they were made."""
+
+    shown: PolygonActor
+    made_of: tuple[object, ...] = ()
+
+    @property
+    def polygons(self) -> Polygons:
+        """Return the polygons."""
+        return self.shown.polygons
+
+    @property
+    def actor(self) -> Any:
+        """Return their actor."""
+        return self.shown.actor
+
+
+class SectionLayer:
+    """What the sections of the view show of the mesh, and of its neighbouring passages.
+
+    Attributes
+    ----------
+    cuts : Cuts
+        What was cut, for others that show the same.
+    drawn : dict of str to SectionDrawn
+        By the name of the actor: ``section:0`` is the first section of the mesh itself,
+        ``section:0:1`` that of its next passage.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.cuts = Cuts()
+        self._lines = CutLines(stage)
+        self.clear()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; its sections come with its state."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.drawn: dict[str, SectionDrawn] = {}
+        self._period = Period()
+        self._twins: dict[str, Twins] = {}
+        self._lines.clear()
+        self._lines_of: tuple[object, ...] = ()
+        self._box: tuple[tuple[object, ...], Box] | None = None
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the boundaries are around it anyway."""
+        return []
+
+    def pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actors of the mesh itself, each with the cells of its polygons."""
+        return [
+            (one.actor, one.polygons.cells)
+            for name, one in self.drawn.items()
+            if name.startswith(NAME) and name.count(":") == 1 and len(one.polygons)
+        ]
+
+    def actors(self) -> list[Any]:
+        """Return all that sections show, of neighbours too."""
+        twins = (twin for one in self._twins.values() for twin in one.drawn.values())
+        return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *twins]
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state; only what differs is cut or coloured again."""
+        if new.frame is None or not (new.view.sections or self.drawn):
+            return
+        wanted = self._wanted(new)
+        for name in [name for name in self.drawn if name not in wanted]:
+            if name in self._twins:
+                self._twins.pop(name).show({})
+            self.stage.remove(name)
+            del self.drawn[name]
+        again = recoloured(old, new)
+        for name, (section, number, matrix) in wanted.items():
+            self._draw(name, (section, number, matrix), new, again)
+        neighbours = self._neighbours(new)
+        for name, (section, number, _) in wanted.items():
+            if number == 0 and (neighbours or name in self._twins):
+                base = self.drawn[name].shown
+                twins = self._twins.setdefault(name, Twins(self.stage, base))
+                # The period takes these onto themselves: nothing has to be cut again.
+                twins.show({at: m for at, m in neighbours.items() if keeps(section, m)})
+        if new.frame.mesh.dim == 2:
+            self._draw_lines(new, neighbours)
+
+    def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
+        """Draw the cutting lines of a 2D mesh across all that is drawn of it."""
+        assert session.frame is not None
+        mesh, sections = session.frame.mesh, dict(shown_sections(session))
+        key = (mesh, sections, tuple(neighbours), self.stage.look)
+        if key == self._lines_of:
+            return
+        self._lines_of = key
+        if self._box is None or self._box[0] != (mesh, tuple(neighbours)):
+            # Not again for every place that a line is dragged to.
+            self._box = (mesh, tuple(neighbours)), self._find_box(mesh, neighbours)
+        self._lines.show(sections, self._box[1], self.stage.lift(mesh))
+
+    def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
+        """Return the box around a mesh and its neighbours."""
+        own = mesh.points[self.cuts.cutter(mesh).used]
+        every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
+        boxes = [box_around(points) for points in every]
+        low = np.min([box[0] for box in boxes], axis=0)
+        return low, np.max([box[1] for box in boxes], axis=0)
+
+    def _neighbours(self, session: Session) -> dict[int, FloatArray]:
+        return matrices(session, self._period.of(session) if session.view.copies else None)
+
+    def _wanted(self, session: Session) -> dict[str, tuple[Section, int, FloatArray | None]]:
+        """Return what is cut: section and passage, with the matrix of a neighbour, by name."""
+        found: dict[str, tuple[Section, int, FloatArray | None]] = {}
+        neighbours = self._neighbours(session)
+        for index, section in shown_sections(session):
+            for kind, wanted in _kinds(section, session).items():
+                found[f"{kind}{index}"] = wanted, 0, None
+                for number, matrix in neighbours.items():
+                    if not keeps(section, matrix):
+                        found[f"{kind}{index}:{number}"] = wanted, number, matrix
+        return found
+
+    def _draw(
+        self,
+        name: str,
+        wanted: tuple[Section, int, FloatArray | None],
+        session: Session,
+        again: bool,
+    ) -> None:
+        section, number, matrix = wanted
+        kind = name[: name.index(":") + 1]
+        frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
+        assert frame is not None
+        # The view's way to find the period may change with the case, and so the matrix.
+        only = self.stage.chosen(session)
+        key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes(), only)
+        one = self.drawn.get(name)
+        if one is None:
+            one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
+        if one.made_of != key:
+            polygons = self.cuts.of(frame.mesh, section, matrix, only)
+            one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
+            one.made_of, again = key, True
+        if not by_value:
+            one.shown.colour(None)
+        elif again:
+            one.shown.colour(self.stage.values(session))
+        self._style(kind, one.shown, section, session)
+
+    def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
+        prop, look = shown.actor.prop, self.stage.look
+        prop.color = look.text if kind == RIM else plain_colour(look)
+        solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
+        # A cut has the very colours of the bar; whole cells need shades to be told apart.
+        prop.lighting = solid
+        prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
+        self.stage.edges(prop, session.view.edges, session.view.colour_by == "role")
+        if session.mesh is not None and session.mesh.dim == 2:
+            prop.line_width = 1.0 if section.whole else WIDTHS.get(kind, WIDTHS[BAND])
+
+
+def _kinds(section: Section, session: Session) -> dict[str, Section]:
+    """Return what is drawn of a section, by what the names of its actors begin with.
+
+    In 2D whole cells are above a line in their colours, and lines above a wider one.
+    """
+    section = replace(section, name="")
+    found = {NAME: section}
+    if session.mesh is not None and session.mesh.dim == 2:
+        line = replace(section, whole=False)
+        found |= {BAND: line, RIM: line} if section.whole else {RIM: line}
+    return found
+
+
+def shown_sections(session: Session) -> Iterator[tuple[int, Section]]:
+    """Yield the sections that are drawn, with their places in the list."""
+    for index, section in enumerate(session.view.sections):
+        if section.shown and can_cut(session.mesh, section):
+            yield index, section

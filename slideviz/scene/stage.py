@@ -1,0 +1,143 @@
+"""What all parts of a scene share: the plotter, the look, the colours of values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene.actors import LIFT, VALUES, lookup_table
+from slideviz.scene.color_legend import STRIP
+from slideviz.scene.shaders import draw_fine_edges
+from slideviz.sections.threshold import Choice
+from slideviz.session.state import Session
+
+
+class Layer(Protocol):
+    """A part of the scene that draws one kind of thing.
+
+    Its actors have names of their own, ``kind:name``, and are changed in place.
+    """
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; nothing of the one before is left in the plotter."""
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state of the same mesh, touching only what differs; None: set all."""
+
+    def clear(self) -> None:
+        """Forget the mesh; the actors are gone already."""
+
+    def shapes(self) -> list[Any]:
+        """Return the data sets that should be seen when everything is made to fit the view."""
+
+
+class Stage:
+    """The plotter of a scene and what is common to its layers.
+
+    Attributes
+    ----------
+    plotter : pyvista.BasePlotter
+    look : Look
+        Colours of background, text and edges.
+    font_scale : float
+        Enlarges the letters, for pictures of many pixels.
+    table : pyvista.LookupTable
+        The colours of values, and of inverted cells; changed in place.
+    point_words : tuple of (str, str)
+        Words and colours of the nodes drawn as points, for the legend.
+    has_legend : bool
+        Whether the legend is drawn, if it is wanted, and its strip kept free.
+    has_plate : bool
+        Whether the legend has a half-transparent plate; not where the background is left out.
+    """
+
+    def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
+        self.plotter = plotter
+        self.look = look
+        self.font_scale = font_scale
+        self.table = lookup_table()
+        self.point_words: tuple[tuple[str, str], ...] = ()
+        self.has_legend = True
+        self.has_plate = True
+        self._values: tuple[object, FloatArray] | None = None
+        self._chosen: tuple[FloatArray, object, Choice] | None = None
+
+    def add(self, shape: Any, name: str, **options: Any) -> Any:
+        """Return the actor of a new data set; cells have no colour of their values yet."""
+        valued = VALUES in shape.cell_data
+        actor = self.plotter.add_mesh(
+            shape,
+            name=name,
+            scalars=VALUES if valued else None,
+            cmap=self.table if valued else None,
+            clim=tuple(self.table.scalar_range) if valued else None,
+            show_scalar_bar=False,
+            reset_camera=False,
+            render=False,
+            copy_mesh=False,
+            **options,
+        )
+        draw_fine_edges(actor)
+        if valued:
+            # The table's own range: pyvista gives each actor that of its data.
+            actor.mapper.SetUseLookupTableScalarRange(True)
+        actor.mapper.scalar_visibility = False
+        return actor
+
+    def remove(self, name: str) -> None:
+        """Remove an actor, if it is there."""
+        self.plotter.remove_actor(name, reset_camera=False, render=False)
+
+    def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
+        """Draw the edges of an actor's cells, or do not; plain cells have the look's own colour."""
+        prop.show_edges = shown
+        prop.edge_color = self.look.edge if plain else VALUE_EDGE
+        prop.edge_opacity = 0.45
+
+    def lift(self, mesh: Mesh) -> float:
+        """Return how far lines of a mesh are drawn above its cells, in its length unit."""
+        return LIFT * mesh.extent if mesh.dim == 2 else 0.0
+
+    def strip(self) -> float:
+        """Return how many pixels at the right are the legend's."""
+        if not self.has_legend:
+            return 0.0
+        return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
+
+    def values(self, session: Session) -> FloatArray:
+        """Return the number of every cell of the frame that is shown, (m,), for the colours.
+
+        Not a number for inverted cells. Made once for a frame, whatever layers ask for it.
+        """
+        frame, what = session.frame, session.view.colour_by
+        assert frame is not None
+        key = (frame, what)
+        if self._values is None or self._values[0] != key:
+            self._values = key, frame.shown_values(what, session.mesh)
+        return self._values[1]
+
+    def chosen(self, session: Session) -> Choice | None:
+        """Return which cells the range of the view leaves, None where there is no range."""
+        threshold = session.view.threshold
+        if threshold is None:
+            return None
+        values = self.values(session)
+        if self._chosen is None or self._chosen[0] is not values or self._chosen[1] != threshold:
+            self._chosen = values, threshold, Choice.of(values, threshold)
+        return self._chosen[2]
+
+    def set_colours(self, session: Session) -> None:
+        """Give the table the map and the range of the session."""
+        low, high = session.colour_range
+        self.table.scalar_range = (low, high)
+        if session.view.colour_map != self.table.cmap.name:
+            self.table.apply_cmap(session.view.colour_map, 256)
+
+    def set_background(self) -> None:
+        """Give the plotter the background of the look."""
+        look = self.look
+        top = None if look.background == look.background_top else look.background_top
+        self.plotter.set_background(look.background, top=top)

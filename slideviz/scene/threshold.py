@@ -1,0 +1,160 @@
+"""Only the cells whose value is in a range: whole, with the others out of the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
+
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.surfaces import Surface, lifted
+from slideviz.scene import actors
+from slideviz.scene.actors import VALUES
+from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
+from slideviz.scene.shaders import see_through
+from slideviz.scene.stage import Stage
+from slideviz.sections.threshold import chosen_cells
+from slideviz.session.state import Session
+
+NAME = "chosen"
+CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
+"""Names under which VTK's surfaces keep where cells and points come from."""
+
+
+class ChosenLayer:
+    """The cells that the threshold of the view leaves.
+
+    In 2D the other cells keep a faint area without lines; in 3D the sides between chosen cells
+    are left out, so that what is drawn grows with the surface of what is chosen.
+
+    Parameters
+    ----------
+    stage : Stage
+    others : CellLayer
+        Draws all cells; it steps back while some are chosen.
+
+    Attributes
+    ----------
+    cells : (k,) int64 or None
+        Which are chosen, None without a threshold.
+    shape : pyvista.PolyData or None
+        What is drawn; ``owner`` tells whose sides its polygons are.
+    """
+
+    def __init__(self, stage: Stage, others: CellLayer) -> None:
+        self.stage = stage
+        self.others = others
+        self.clear()
+
+    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
+        """Draw another mesh; nothing yet."""
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.cells: IntArray | None = None
+        self.shape: Any = None
+        self.actor: Any = None
+        self._faded = False
+
+    def shapes(self) -> list[Any]:
+        """Return nothing: the boundaries are around it anyway."""
+        return []
+
+    @property
+    def owner(self) -> IntArray:
+        """Return the cell that each polygon of the shape is a side of, (f,)."""
+        return np.asarray(self.shape.cell_data[CELL])
+
+    def pickable(self) -> list[tuple[Any, IntArray]]:
+        """Return the actor of the chosen cells, if there are some, with their polygons' cells."""
+        if self.cells is None or not len(self.cells):
+            return []
+        return [(self.actor, self.owner)]
+
+    def update(self, old: Session | None, new: Session) -> None:
+        """Show another state."""
+        chosen = new.view.threshold is not None and new.frame is not None
+        self._fade(new, chosen)
+        if not chosen:
+            if self.actor is not None:
+                self.actor.visibility = False
+            self.cells = None
+            return
+        moved = old is None or old.frame is not new.frame or self.cells is None
+        if moved or recoloured(old, new) or old.view.threshold != new.view.threshold:  # type: ignore[union-attr]
+            self._draw(new)
+        if self.actor is not None:
+            self.actor.visibility = self.shape.n_cells > 0
+            self.actor.mapper.scalar_visibility = True
+            self.stage.edges(self.actor.prop, new.view.edges)
+
+    def _fade(self, session: Session, chosen: bool) -> None:
+        """Make the cells that are not chosen faint, or let them be as they were."""
+        actor = self.others.actor
+        if actor is None or session.mesh is None or not (chosen or self._faded):
+            return
+        self._faded = chosen
+        if session.mesh.dim == 3:
+            see_through(actor, 0.12 if looks_inside(session) else 1.0)
+        if chosen:
+            actor.mapper.scalar_visibility = False
+            actor.prop.show_edges = False
+
+    def _draw(self, session: Session) -> None:
+        """Draw the cells that are chosen now, in place where they are the same as before."""
+        frame, threshold = session.frame, session.view.threshold
+        assert frame is not None
+        assert threshold is not None
+        mesh, values = frame.mesh, self.stage.values(session)
+        cells = chosen_cells(values, threshold)
+        if self.cells is None or self.shape is None or not np.array_equal(cells, self.cells):
+            self.shape = part_shape(mesh, cells)
+            self.cells = cells
+        points = mesh.points[self.shape.point_data[POINT]]
+        actors.place(self.shape, points, 0.5 * self.stage.lift(mesh))
+        self.shape.cell_data[VALUES] = values[self.owner]
+        if self.actor is not None:
+            self.actor.mapper.dataset = self.shape
+        elif len(cells):  # an empty shape cannot be added
+            self.actor = self.stage.add(self.shape, NAME, lighting=mesh.dim == 3)
+            self.actor.prop.line_width = 1.0
+            self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
+
+
+def part_shape(mesh: Mesh, cells: IntArray) -> Any:
+    """Return some cells (k,) of a mesh as PolyData: themselves in 2D, their outside in 3D.
+
+    Its cell data ``CELL`` are the owners of the polygons, numbers in the mesh; its point data
+    ``POINT`` the nodes.
+    """
+    offsets, corners, nodes = _connectivity(mesh, cells)
+    points = lifted(mesh.points[nodes], 0.0)
+    table = pv.CellArray.from_arrays(offsets, corners)
+    if mesh.dim == 2 or not len(cells):
+        shape = pv.PolyData()
+        shape.points = points
+        shape.SetPolys(table)
+        shape.point_data[POINT], shape.cell_data[CELL] = nodes, cells
+        return shape
+    grid = pv.UnstructuredGrid()
+    grid.points = points
+    grid.SetCells(numpy_to_vtk(mesh.cells.types[cells], deep=True), table)
+    shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
+    shape.point_data[POINT] = nodes[shape.point_data[POINT]]
+    shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
+    return shape
+
+
+def _connectivity(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return offsets (k + 1,) and corners of some cells in new numbers of nodes, and the nodes."""
+    every = mesh.cells
+    sizes = every.offsets[cells + 1] - every.offsets[cells]
+    offsets = np.concatenate(([0], np.cumsum(sizes)))
+    ramp = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
+    old = every.connectivity[np.repeat(every.offsets[cells], sizes) + ramp]
+    used = np.zeros(len(mesh.points), bool)
+    used[old] = True
+    return offsets, (np.cumsum(used) - 1)[old], np.flatnonzero(used)

@@ -1,0 +1,1 @@
+"""Sections of meshes as arrays: shapes, cuts, and how they are laid flat."""

@@ -1,0 +1,231 @@
+"""The cells that a section cuts: their cuts as polygons, or the cells whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.surfaces import padded
+from slideviz.sections.cases import cut_cases
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons, offsets_of
+from slideviz.sections.threshold import Choice
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Cells of one type: VTK identifier, ids (m,), nodes (m, k), and the same by column."""
+
+    vtk: int
+    ids: IntArray
+    nodes: IntArray
+    columns: tuple[IntArray, ...]
+
+
+class Cutter:
+    """Cuts the cells of a mesh at any positions of its nodes; made once for a mesh.
+
+    Parameters
+    ----------
+    cells : Cells
+        The cells of the mesh.
+    """
+
+    def __init__(self, cells: Cells) -> None:
+        self.dim = max((ELEMENTS[vtk].dim for vtk in cells.by_type), default=3)
+        self._cells = cells
+        self._blocks = [
+            _Block(vtk, ids, nodes, tuple(np.ascontiguousarray(nodes.T)))
+            for vtk, (ids, nodes) in cells.by_type.items()
+        ]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Cutter:
+        """Return the cutter of a mesh."""
+        return cls(mesh.cells)
+
+    @property
+    def used(self) -> IntArray:
+        """Return the nodes of the cells, sorted, each once: what a section can reach."""
+        return self._cells.nodes
+
+    def cut(self, points: FloatArray, section: Section) -> Polygons:
+        """Return where the section cuts the cells; none where it misses them.
+
+        Parameters
+        ----------
+        points : (n, d) float64
+            The nodes of the mesh.
+        section : Section
+            Its ``whole`` is not looked at; see `show`.
+
+        Returns
+        -------
+        Polygons
+            Convex cells give one polygon, folded ones perhaps more. Corners lie on the edges of
+            the cells and on the section, to rounding also on a cylinder. A side of cells that
+            lies in the section is shown by the cell on its negative side; where that leaves
+            nothing, the section is the rim of the mesh, by the other.
+
+        Raises
+        ------
+        CaseError
+            A cylinder is to cut a 2D mesh, and its axis is not z.
+        """
+        level = self._level(points, section)
+        owners, low, high = self._corners(level)
+        if not len(owners):
+            owners, low, high = self._corners(-level)
+        keep = _distinct(low, high)
+        enough = keep.sum(axis=1) >= self.dim
+        owners, low, high, keep = owners[enough], low[enough], high[enough], keep[enough]
+        keys, corners = np.unique(low[keep] * len(points) + high[keep], return_inverse=True)
+        a, b = np.divmod(keys, len(points))
+        at = _crossings(points, a, b, level, section)
+        found = Polygons(at, offsets_of(keep.sum(axis=1)), corners, owners)
+        return found.take(np.argsort(owners, kind="stable"))
+
+    def which_cells(self, points: FloatArray, section: Section) -> IntArray:
+        """Return the sorted ids of the cells that the section cuts (see `cut`).
+
+        These have nodes on both sides, or a side in the section. For a cylinder, sides are those
+        of the nodes: one that bulges into a cell between its nodes does not count.
+        """
+        return self.cut(points, section).cell_ids
+
+    def crinkle(self, points: FloatArray, section: Section) -> Polygons:
+        """Return the surface of the cells that the section cuts, whole; in 2D the cells."""
+        return self.surface(points, self.which_cells(points, section))
+
+    def all_cells(self, points: FloatArray) -> Polygons:
+        """Return the surface of all cells; in 2D the cells."""
+        return self.surface(points, np.concatenate([block.ids for block in self._blocks]))
+
+    def show(self, points: FloatArray, section: Section, only: Choice | None = None) -> Polygons:
+        """Return the cut cells, whole or cut as the section says; some of them if not all."""
+        if not section.whole:
+            found = self.cut(points, section)
+            return found if only is None else only.among(found)
+        ids = self.which_cells(points, section)
+        # What is beside cells that are left out is a side that was between cells before.
+        return self.surface(points, ids if only is None else ids[only.mask[ids]])
+
+    def surface(self, points: FloatArray, ids: IntArray) -> Polygons:
+        """Return the sides that only one of the cells ``ids`` (c,) has; in 2D the cells.
+
+        The sides are oriented outwards of cells that are not inverted.
+        """
+        sides, owners = [np.empty((0, 4), np.int64)], [np.empty(0, np.int64)]
+        for block in self._blocks:
+            mine = np.isin(block.ids, ids)
+            row, nodes = ELEMENTS[block.vtk], block.nodes[mine]
+            for side in row.facets if self.dim == 3 else (tuple(range(row.n_nodes)),):
+                # A triangle repeats its last node.
+                sides.append(nodes[:, list(side) + [side[-1]] * (4 - len(side))])
+                owners.append(block.ids[mine])
+        facets, owner = np.concatenate(sides), np.concatenate(owners)
+        if self.dim == 3:
+            outer = _single(facets, len(points))
+            facets, owner = facets[outer], owner[outer]
+        keep = np.ones(facets.shape, bool)
+        keep[facets[:, 2] == facets[:, 3], 3] = False
+        used, corners = np.unique(facets[keep], return_inverse=True)
+        return Polygons(padded(points[used]), offsets_of(keep.sum(axis=1)), corners, owner)
+
+    def _level(self, points: FloatArray, section: Section) -> FloatArray:
+        if not section.can_cut(self.dim):
+            raise CaseError(
+                f"{section.describe()}: its axis is not z, so it needs a 3D mesh; a 2D mesh is cut "
+                "by a plane, or in a circle by a cylinder about z"
+            )
+        return section.distance(points)
+
+    def _corners(self, level: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Return owners (q,) and both ends (q, c) of the edge of every corner, -1 for none.
+
+        A corner at a node has this node as both ends.
+        """
+        negative = (level < 0).view(np.uint8)
+        parts = []
+        for block in self._blocks:
+            pattern = np.zeros(len(block.ids), np.uint8)
+            for bit, column in enumerate(block.columns):
+                pattern |= negative[column] << bit
+            cut = np.flatnonzero((pattern > 0) & (pattern < 2 ** len(block.columns) - 1))
+            loops = cut_cases(block.vtk)[pattern[cut]]
+            cell, loop = np.nonzero(loops[:, :, 0] >= 0)
+            edges = loops[cell, loop]
+            ends = block.nodes[cut[cell][:, None, None], _EDGES[block.vtk][edges]]
+            ends = np.where((edges < 0)[..., None], -1, np.sort(ends, axis=2))
+            at_node = (level[ends] == 0) & (ends >= 0)
+            low = np.where(at_node[..., 1], ends[..., 1], ends[..., 0])
+            high = np.where(at_node[..., 0], ends[..., 0], ends[..., 1])
+            parts.append((block.ids[cut[cell]], low, high))
+        width = max((part[1].shape[1] for part in parts), default=0)
+        none = np.empty((0, width), np.int64)
+        return (
+            np.concatenate([np.empty(0, np.int64), *(part[0] for part in parts)]),
+            np.concatenate([none, *(_wide(part[1], width) for part in parts)]),
+            np.concatenate([none, *(_wide(part[2], width) for part in parts)]),
+        )
+
+
+_EDGES = {vtk: np.array(row.edges) for vtk, row in ELEMENTS.items() if row.dim > 1}
+
+
+def _wide(table: IntArray, width: int) -> IntArray:
+    return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=-1)
+
+
+def _single(facets: IntArray, n_points: int) -> np.ndarray:
+    """Tell which of the facets (f, 4) no other has the nodes of, (f,)."""
+    nodes = np.sort(facets, axis=1)
+    keys = nodes[:, 0] * n_points + nodes[:, 1], nodes[:, 2] * n_points + nodes[:, 3]
+    order = np.lexsort(keys)
+    differs = np.ones(len(facets) + 1, bool)
+    differs[1:-1] = (np.diff(keys[0][order]) != 0) | (np.diff(keys[1][order]) != 0)
+    single = np.empty(len(facets), bool)
+    single[order] = differs[1:] & differs[:-1]
+    return single
+
+
+def _distinct(low: IntArray, high: IntArray) -> np.ndarray:
+    """Tell which corners (q, c) there are and differ from the one before, round the loop."""
+    there = low >= 0
+    last = np.maximum(there.sum(axis=1) - 1, 0)
+    rows = np.arange(len(low))
+    before = [np.roll(ends, 1, axis=1) for ends in (low, high)]
+    for rolled, ends in zip(before, (low, high), strict=True):
+        rolled[:, :1] = ends[rows, last][:, None]
+    return there & ((low != before[0]) | (high != before[1]))
+
+
+def _crossings(
+    points: FloatArray, a: IntArray, b: IntArray, level: FloatArray, section: Section
+) -> FloatArray:
+    """Return the points (k, 3) where the section meets the edges from a to b (k,) each."""
+    start = padded(points[a])
+    way = padded(points[b]) - start
+    before, after = level[a], level[b]
+    between = a != b
+    share = np.zeros(len(a))
+    if section.kind == "plane":
+        share[between] = before[between] / (before - after)[between]
+        return start + share[:, None] * way
+    # Along an edge the squared radius is a parabola, so the crossing is known exactly.
+    across = section.basis[:2]
+    p, d = (start[between] - np.asarray(section.origin)) @ across.T, way[between] @ across.T
+    square, slope = np.sum(d * d, axis=1), np.sum(p * d, axis=1)
+    rest = np.sum(p * p, axis=1) - section.radius**2
+    root = np.sqrt(np.maximum(slope**2 - square * rest, 0.0))
+    sign = np.where(after[between] > before[between], 1.0, -1.0)
+    # Of the two forms of the root, the one that does not subtract like numbers.
+    stable = sign * slope > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(stable, -rest / (slope + sign * root), (sign * root - slope) / square)
+    share[between] = np.clip(np.nan_to_num(found), 0.0, 1.0)
+    return start + share[:, None] * way

@@ -1,0 +1,66 @@
+"""The cells that the range of the view leaves, of a section too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.sections.polygons import Polygons
+
+ONLY_INVERTED = (-1.0, -0.5)
+"""A range that no value is in: it chooses the inverted cells alone."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Some cells of a mesh; two that choose the same are equal.
+
+    Attributes
+    ----------
+    key : bytes
+        Which they are, packed.
+    mask : (m,) bool
+        The same for every cell.
+    words : str
+        Which values they have.
+    """
+
+    key: bytes
+    mask: np.ndarray = field(compare=False, repr=False)
+    words: str = field(compare=False)
+
+    @classmethod
+    def of(cls, values: FloatArray, threshold: tuple[float, float]) -> Choice:
+        """Return the cells whose value is in a range (see `chosen_cells`)."""
+        mask = np.zeros(len(values), bool)
+        mask[chosen_cells(values, threshold)] = True
+        mask.flags.writeable = False
+        return cls(np.packbits(mask).tobytes(), mask, range_words(threshold))
+
+    def among(self, polygons: Polygons) -> Polygons:
+        """Return those polygons whose cells are chosen; their points stay."""
+        return polygons.take(np.flatnonzero(self.mask[polygons.cells]))
+
+
+def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
+    """Return the cells whose value is in a closed range, in rising order.
+
+    Parameters
+    ----------
+    values : (m,) float64
+        As ``Frame.shown_values`` gives them: not a number for an inverted cell.
+    threshold : (float, float)
+        Lowest and highest value. From 0 or below, inverted cells are chosen too.
+    """
+    low, high = threshold
+    chosen = (values >= low) & (values <= high)
+    return np.flatnonzero(chosen | np.isnan(values) if low <= 0.0 else chosen)
+
+
+def range_words(threshold: tuple[float, float]) -> str:
+    """Return a range in words."""
+    if threshold[1] < 0.0:
+        return "inverted cells"
+    return f"{threshold[0]:.3g} to {threshold[1]:.3g}"

@@ -1,0 +1,114 @@
+"""Pure functions from one session to the next: roles, motions, settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.session.guess import with_periodicity
+from slideviz.session.rows import replaced, without
+from slideviz.session.state import Place, Session
+from slideviz.terms import Role
+
+
+def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
+    """Return the session with these boundaries in that role, which confirms it for them."""
+    changed = tuple(names)
+    roles = dict(session.case.roles) | dict.fromkeys(changed, role)
+    guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
+    still = (_of_moving(motion, roles) for motion in session.case.motions)
+    motions = tuple(motion for motion in still if motion is not None)
+    case = session.case.change(roles=roles, motions=motions)
+    if "periodic" not in roles.values():
+        case = case.change(periodic="none")
+    elif case.periodic == "none" and "periodic" not in session.case.roles.values():
+        mine = (p for p in session.pairs if {p.first, p.second} & set(changed))
+        case = with_periodicity(case, next(mine, None))
+    return replace(session, case=case, guesses=guesses)
+
+
+def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
+    """Return a motion of those of its boundaries that move; None where none of them does."""
+    names = named(motion.marker)
+    moving = tuple(name for name in names if roles.get(name) == "moving")
+    if moving == names:
+        return motion
+    return replace(motion, marker=moving if len(moving) > 1 else moving[0]) if moving else None
+
+
+def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
+    """Return the session with the guesses for these boundaries (default: all) taken as right."""
+    gone = set(session.guesses if names is None else names)
+    kept = {name: guess for name, guess in session.guesses.items() if name not in gone}
+    return replace(session, guesses=kept)
+
+
+def set_case(session: Session, **values: Any) -> Session:
+    """Return the session with other settings of the case."""
+    guess = "" if "reduction" in values else session.reduction_guess
+    return replace(session, case=session.case.change(**values), reduction_guess=guess)
+
+
+def set_invalid(session: Session, place: Place, sentences: tuple[str, ...]) -> Session:
+    """Return the session with the fields of a panel that are not valid."""
+    others = tuple(each for each in session.invalid if each[0] != place)
+    found = (*others, *((place, sentence) for sentence in sentences))
+    return session if found == session.invalid else replace(session, invalid=found)
+
+
+def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
+    """Return the session with one more motion, performed last or as the one of that index."""
+    motions = list(session.case.motions)
+    motions.insert(len(motions) if index is None else index, motion)
+    return set_case(session, motions=tuple(motions))
+
+
+def replace_motion(session: Session, index: int, motion: Motion) -> Session:
+    """Return the session with another motion at that place."""
+    return set_case(session, motions=replaced(session.case.motions, index, motion))
+
+
+def remove_motion(session: Session, index: int) -> Session:
+    """Return the session without the motion at that place."""
+    return set_case(session, motions=without(session.case.motions, index))
+
+
+def move_motion(session: Session, index: int, by: int) -> Session:
+    """Return the session with a motion performed earlier (negative) or later."""
+    motions = list(session.case.motions)
+    motion = motions.pop(index)
+    motions.insert(max(0, index + by), motion)
+    return set_case(session, motions=tuple(motions))
+
+
+def moved_files(session: Session, moved: Mapping[Path, Path]) -> Session:
+    """Return the session with files at other places: of the mesh, and of displacements."""
+
+    def there(case: Case) -> Case:
+        motions = tuple(
+            replace(m, path=moved.get(m.path, m.path)) if isinstance(m, FromFile) else m
+            for m in case.motions
+        )
+        file, out = case.mesh_file, case.mesh_out
+        if file is None or file not in moved:
+            return case.change(motions=motions)
+        new = moved[file]
+        if out is not None and out.parent == file.parent:
+            out = new.with_name(f"{new.stem}_deformed{out.suffix}")
+        return case.change(motions=motions, mesh_file=new, mesh_out=out)
+
+    return replace(
+        session,
+        path=moved.get(session.path, session.path) if session.path else None,
+        case=there(session.case),
+        # The same files: what ran with them is what the case says.
+        runs=tuple(replace(run, case=there(run.case)) for run in session.runs),
+    )
+
+
+def saved_case(session: Session, case: Case) -> Session:
+    """Return the session with ``case`` on disk."""
+    return replace(session, case=case, saved=case)

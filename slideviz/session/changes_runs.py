@@ -1,0 +1,137 @@
+"""Pure functions from one session to the next: its runs, and which of them are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+from slideviz.session.changes_view import set_view, show_frame
+from slideviz.session.state import Frame, Run, Session
+
+UNDEFORMED = 0
+"""Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
+MOST_REMOVED = 2
+"""Removed runs that are kept for undo: each may hold hundreds of megabytes."""
+
+
+def start_run(session: Session) -> Session:
+    """Return the session with one more run, of the settings there are, and it shown.
+
+    Runs that were cancelled or failed before their first step go.
+    """
+    kept = tuple(run for run in session.runs if run.frames)
+    number = 1 + max((session.newest, *(run.number for run in session.runs)))
+    runs = (*kept, Run(number, session.case))
+    session = replace(session, runs=runs, shown=number, newest=number)
+    return show_frame(session, 0)
+
+
+def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
+    """Return the session with steps just computed by the newest run; the last is shown."""
+    newest = session.runs[-1]
+    grown = replace(newest, frames=(*newest.frames, *frames), saved=False)
+    session = replace(session, runs=(*session.runs[:-1], grown))
+    if session.shown != grown.number:
+        return session  # the user looks at another run meanwhile
+    return show_frame(session, len(grown.frames))
+
+
+def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
+    """Return the session with the newest run ended that way, if one was going on."""
+    if not session.runs or session.runs[-1].end:
+        return session
+    ended = replace(session.runs[-1], end=end)
+    return replace(session, runs=(*session.runs[:-1], ended))
+
+
+def show_run(session: Session, number: int) -> Session:
+    """Return the session with the last step of that run shown."""
+    run = session.run(number)
+    if run is None:
+        return session
+    beside = None if session.view.beside == number else session.view.beside
+    session = set_view(replace(session, shown=number), beside=beside)
+    return show_frame(session, len(run.frames))
+
+
+def show_beside(session: Session, number: int | None) -> Session:
+    """Return the session with another run in a second view beside the first; None: no such.
+
+    ``UNDEFORMED`` stands for the undeformed mesh.
+    """
+    known = number == UNDEFORMED or session.run(number) is not None
+    if number == session.shown or not known:
+        number = None
+    return set_view(session, beside=number, swapped=False)
+
+
+def remove_run(session: Session, number: int) -> Session:
+    """Return the session without a run, which is kept for undo; one that goes on stays."""
+    run = session.run(number)
+    if run is None or not run.end:
+        return session
+    rest = tuple(other for other in session.runs if other.number != number)
+    beside = None if session.view.beside == number else session.view.beside
+    removed = (*session.removed, run)[-MOST_REMOVED:]
+    newest = max(session.newest, *(other.number for other in session.runs))
+    session = replace(session, runs=rest, removed=removed, newest=newest)
+    session = set_view(session, beside=beside)
+    if session.shown != number:
+        return session
+    if not rest:
+        return show_frame(set_view(replace(session, shown=None), beside=None), 0)
+    return show_run(session, rest[-1].number)
+
+
+def bring_back(session: Session, number: int) -> Session:
+    """Return the session with a removed run at its old place, if it is still kept."""
+    back = [run for run in session.removed if run.number == number]
+    if not back:
+        return session
+    runs = tuple(sorted((*session.runs, *back), key=lambda run: run.number))
+    return replace(
+        session, runs=runs, removed=tuple(run for run in session.removed if run not in back)
+    )
+
+
+def rename_run(session: Session, number: int, name: str) -> Session:
+    """Return the session with a run called by another name; by none if that is empty."""
+    name = " ".join(name.split())
+    run = session.run(number)
+    if run is None or run.name == name:
+        return session
+    runs = tuple(replace(one, name=name) if one is run else one for one in session.runs)
+    return replace(session, runs=runs)
+
+
+def take_settings(session: Session, number: int) -> Session:
+    """Return the session with the settings of a run put back: roles, motions, method."""
+    run = session.run(number)
+    if run is None:
+        return session
+    return replace(session, case=run.case, guesses={}, reduction_guess="")
+
+
+def seen_beside(session: Session) -> Session:
+    """Return the session as the second view shows it: the other run, at the matching step."""
+    if session.view.beside == UNDEFORMED:
+        return show_frame(session, 0)
+    run, other = session.run_shown, session.run(session.view.beside)
+    if other is None:
+        return session
+    last = len(run.frames) if run is not None else 0
+    at = session.view.frame
+    # Runs of different numbers of steps: the same part of the displacement.
+    frame = round(at * len(other.frames) / last) if last else 0
+    if at:
+        frame = max(frame, 1)
+    return show_frame(replace(session, shown=other.number), frame)
+
+
+def saved_mesh(session: Session) -> Session:
+    """Return the session with the deformed mesh of the run that is shown on disk."""
+    runs = tuple(
+        replace(run, saved=True) if run.number == session.shown else run for run in session.runs
+    )
+    return replace(session, runs=runs)

@@ -1,0 +1,100 @@
+"""Pure functions from one session to the next: how it is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from slideviz.sections.threshold import ONLY_INVERTED
+from slideviz.session.rows import replaced, without
+from slideviz.session.state import Session, ViewState
+from slideviz.terms import ColourBy
+
+if TYPE_CHECKING:
+    from slideviz.sections.model import Section
+
+TASTE = (
+    "edges",
+    "undeformed",
+    "motion_ghost",
+    "legend",
+    "triad",
+    "perspective",
+    "colour_map",
+)
+"""Settings of the view that suit any mesh, so that they stay when another is opened."""
+
+
+def set_view(session: Session, **values: Any) -> Session:
+    """Return the session looked at in another way.
+
+    What the colours say has a range of its own, which is there again when it is coloured by again.
+    """
+    old = session.view
+    what: ColourBy = values.get("colour_by", old.colour_by)
+    if what != old.colour_by:
+        ranges = dict(old.ranges)
+        if old.colour_range is not None:
+            ranges[old.colour_by] = old.colour_range
+        values = {"colour_range": ranges.pop(what, None)} | values
+        values["ranges"] = tuple(sorted(ranges.items()))
+        # Cells chosen by a quality say nothing of a displacement, and the other way round.
+        if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
+            values.setdefault("threshold", None)
+    return replace(session, view=replace(old, **values))
+
+
+def select(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with these boundaries highlighted."""
+    return set_view(session, selected=tuple(names))
+
+
+def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
+    """Return the session with these boundaries shown or hidden."""
+    hidden = session.view.hidden
+    change = frozenset(names)
+    return set_view(session, hidden=hidden - change if shown else hidden | change)
+
+
+def isolate(session: Session, names: Iterable[str]) -> Session:
+    """Return the session with only these boundaries shown."""
+    every = session.mesh.marker_names if session.mesh else ()
+    return set_view(session, hidden=frozenset(every) - frozenset(names))
+
+
+def show_frame(session: Session, index: int) -> Session:
+    """Return the session at another step, the nearest there is."""
+    return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
+
+
+def add_section(session: Session, section: Section) -> Session:
+    """Return the session with one more section."""
+    return set_view(session, sections=(*session.view.sections, section))
+
+
+def replace_section(session: Session, index: int, section: Section) -> Session:
+    """Return the session with another section at that place."""
+    return set_view(session, sections=replaced(session.view.sections, index, section))
+
+
+def remove_section(session: Session, index: int) -> Session:
+    """Return the session without the section at that place."""
+    return set_view(session, sections=without(session.view.sections, index))
+
+
+def lay_flat(session: Session, index: int | None) -> Session:
+    """Return the session with the section at that place laid flat beside the view; None: none."""
+    laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
+    return set_view(session, sections=tuple(laid))
+
+
+def mark(session: Session, cell: int | None) -> Session:
+    """Return the session with a cell marked, or none."""
+    return set_view(session, marked=cell)
+
+
+def fresh_view(session: Session, old: ViewState) -> Session:
+    """Return a session just opened with the taste of the one before: edges, legend, colours."""
+    kept = {name: getattr(old, name) for name in TASTE}
+    return set_view(session, **kept)

@@ -1,0 +1,68 @@
+"""The range of the colours that fits the values of all that is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.quality import INVERTED
+from slideviz.session.changes_runs import seen_beside
+from slideviz.session.changes_view import set_view
+from slideviz.session.results import Frame
+from slideviz.session.state import Session
+
+_PARTS = 100.0
+"""The range is rounded outwards to about so many parts of it."""
+
+
+def fit_colours(session: Session, every: bool = True) -> Session:
+    """Return the session with colours from the lowest to the highest value.
+
+    Of all steps, so that played a colour says the same, or of the one that is shown, which has
+    more colours then; of both runs where two are compared. Inverted cells have a colour of their
+    own. Unchanged where all values are alike.
+    """
+    limits = _limits(session, every)
+    return session if limits is None else set_view(session, colour_range=limits)
+
+
+def usual_range(session: Session) -> str:
+    """Return in words from where to where the colours range that nobody has chosen."""
+    far = session.view.colour_by == "displacement"
+    return "0 to the largest of all runs" if far else "0 to 1"
+
+
+def _limits(session: Session, every: bool) -> tuple[float, float] | None:
+    what = session.view.colour_by
+    if what == "role" or session.mesh is None:
+        return None
+    lows, highs = [], []
+    for frame in _frames(session, every):
+        values = frame.values(what, session.mesh)
+        values = values[(frame.quality.status != INVERTED) & np.isfinite(values)]
+        if len(values):
+            lows.append(float(values.min()))
+            highs.append(float(values.max()))
+    if not lows or not min(lows) < max(highs):
+        return None
+    return _outwards(min(lows), max(highs))
+
+
+def _frames(session: Session, every: bool) -> set[Frame]:
+    """Return what is seen now, or every step that can be."""
+    shown: set[Frame] = set()
+    for one in (session, seen_beside(session)):
+        if one.frame is not None:
+            shown.add(one.frame)
+        if every:
+            # Nothing is displaced further than in the last step, and each would take its time.
+            far = one.view.colour_by == "displacement"
+            shown.update((*one.frames[:1], *one.frames[-1:]) if far else one.frames)
+    return shown
+
+
+def _outwards(low: float, high: float) -> tuple[float, float]:
+    """Return numbers of few digits around two."""
+    unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
+    first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
+    digits = max(0, round(-np.log10(unit))) + 1
+    return round(float(first), digits), round(float(last), digits)

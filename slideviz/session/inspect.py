@@ -1,0 +1,217 @@
+"""What can be told of cells: which are chosen, which are worst and since when, what one is.
+
+The *measure* of a cell is the quality that the view is coloured by; size-skew where the colours
+say something else. An inverted cell is below every value, so that a choice from 0, where
+qualities and displacements begin, contains it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import SlidevizError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, corner_jacobians
+from slideviz.mesh.surfaces import padded
+from slideviz.session.state import Frame
+from slideviz.terms import CELL_STATES, CellState, ColourBy
+
+WORST = 100
+"""Cells in the list of the worst."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellInfo:
+    """What is told of one cell.
+
+    Attributes
+    ----------
+    cell : int
+        Its number in the mesh, from 0, as in an SU2 file.
+    kind : str
+        Its element type.
+    state : CellState
+    size_skew, size, skew : float
+        Qualities.
+    jacobians : (k,) float64
+        Corner Jacobians, in area or volume; positive where the cell is right.
+    position : (d,) float64
+        The mean of its nodes, in the mesh's length unit.
+    """
+
+    cell: int
+    kind: str
+    state: CellState
+    size_skew: float
+    size: float
+    skew: float
+    jacobians: FloatArray
+    position: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class WorstCells:
+    """The worst cells of a frame, worst first.
+
+    Attributes
+    ----------
+    cells : (k,) int64
+        Their numbers in the mesh.
+    values : (k,) float64
+        Their measure; 0 for an inverted cell.
+    inverted : (k,) bool
+    positions : (k, d) float64
+        The means of their nodes, in the mesh's length unit.
+    steps : (k,) int64
+        The frame at which each was at its worst first; 0 is the undeformed mesh.
+    kinds : tuple of str
+        Their element types.
+    measure : str
+        What ``values`` are.
+    """
+
+    cells: IntArray
+    values: FloatArray
+    inverted: np.ndarray
+    positions: FloatArray
+    steps: IntArray
+    kinds: tuple[str, ...]
+    measure: ColourBy
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+
+def measure(colour_by: ColourBy) -> ColourBy:
+    """Return the quality that the view is coloured by, or size-skew."""
+    return colour_by if colour_by in ("size", "skew") else "size-skew"
+
+
+def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:
+    """Return the worst cells of the frame ``at``, and since when they are.
+
+    Only the listed cells are followed through the frames, so that neither time nor memory grows
+    with the number of cells of all frames together. Ties are in the order of the numbers.
+    """
+    frame, what = frames[at], measure(what)
+    values = frame.values(what)
+    count = min(count, frame.quality.cells)
+    limit = np.partition(values[frame.quality.counted], count - 1)[count - 1]
+    near = np.flatnonzero(values <= limit)
+    if frame.quality.halo is not None:
+        near = near[~frame.quality.halo[near]]
+    cells = near[np.argsort(values[near], kind="stable")[:count]]
+    history = np.stack([each.values(what)[cells] for each in frames])
+    types = frame.mesh.cells.types[cells]
+    return WorstCells(
+        cells,
+        values[cells],
+        frame.quality.status[cells] == INVERTED,
+        middles(frame.mesh, cells),
+        history.argmin(axis=0),
+        tuple(ELEMENTS[int(vtk)].name for vtk in types),
+        what,
+    )
+
+
+def middles(mesh: Mesh, cells: IntArray) -> FloatArray:
+    """Return the means of the nodes of some cells, (k, d)."""
+    return np.array([mesh.points[nodes_of(mesh, int(cell))].mean(axis=0) for cell in cells])
+
+
+def nodes_of(mesh: Mesh, cell: int) -> IntArray:
+    """Return the nodes of a cell, (k,)."""
+    begin, end = mesh.cells.offsets[cell : cell + 2]
+    return mesh.cells.connectivity[begin:end]
+
+
+def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
+    """Return the middle (3,) of a cell, and the diagonal of its bounding box as its size."""
+    points = padded(mesh.points[nodes_of(mesh, cell)])
+    return points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def cell_info(frame: Frame, cell: int) -> CellInfo:
+    """Return what is told of a cell.
+
+    Raises
+    ------
+    MeshError
+        There is no such cell.
+    """
+    mesh, quality = frame.mesh, frame.quality
+    sign = int(quality.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
+    jacobians = corner_jacobians(mesh, cell, sign)
+    status = quality.status[cell]
+    return CellInfo(
+        cell,
+        ELEMENTS[int(mesh.cells.types[cell])].name
+        + (" of the halo" if quality.halo is not None and quality.halo[cell] else ""),
+        CELL_STATES[status],
+        float(quality.values[cell]),
+        float(quality.size[cell]),
+        float(quality.skew[cell]),
+        jacobians,
+        mesh.points[nodes_of(mesh, cell)].mean(axis=0),
+    )
+
+
+def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
+    """Return the cell of a 2D mesh that a point is in; the one of lowest value of several.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    x, y : float
+        In the mesh's length unit.
+    values : (m,) float64
+        Cells whose value is NaN are passed by.
+    """
+    at, first = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1]
+    low, high = np.minimum.reduceat(at, first), np.maximum.reduceat(at, first)
+    here = np.array([x, y])
+    near = ((low <= here) & (here <= high)).all(axis=1) & ~np.isnan(values)
+    found = [cell for cell in np.flatnonzero(near) if _inside(mesh, int(cell), x, y)]
+    return int(min(found, key=lambda cell: values[cell])) if found else None
+
+
+def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
+    """Tell whether a ray from a point crosses the sides of a cell an odd number of times."""
+    a = mesh.points[nodes_of(mesh, cell)]
+    b = np.roll(a, -1, axis=0)
+    crosses = (a[:, 1] > y) != (b[:, 1] > y)
+    a, b = a[crosses], b[crosses]
+    at = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return int((at > x).sum()) % 2 == 1
+
+
+def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
+    """Return the list as rows of texts, without loss of digits."""
+    names = "xyz"[: worst.positions.shape[1]]
+    measured = worst.measure.replace("-", "_")
+    rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []
+    for at, cell in enumerate(worst.cells):
+        numbers = (worst.values[at], *worst.positions[at])
+        texts = [repr(float(number)) for number in numbers]
+        state = "yes" if worst.inverted[at] else "no"
+        rows.append([str(cell), worst.kinds[at], texts[0], state, *texts[1:], str(worst.steps[at])])
+    return rows
+
+
+def write_table(worst: WorstCells, path: Path) -> None:
+    """Write the list as comma-separated values, whole or not at all.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be written.
+    """
+    lines = [",".join(row) for row in table_rows(worst)]
+    with atomic_write(path, SlidevizError) as file:
+        file.write(("\n".join(lines) + "\n").encode())

@@ -1,0 +1,53 @@
+"""Whether motions, as they are typed, put a boundary through another, or have bad files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.case.model import Case, FromFile
+from slideviz.case.motion import check_case, displacements
+from slideviz.deformation.intersection import clash
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import Mesh
+from slideviz.session.jobs import Report, Stopped
+from slideviz.session.state import Session
+
+
+def clash_key(session: Session) -> tuple[object, ...]:
+    """Return what a clash depends on: it need not be looked for again while this is the same."""
+    case = session.case
+    return (session.mesh, case.motions, tuple(sorted(case.roles.items())), case.periodic)
+
+
+def find_clash(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
+    """Return the sentence about a clash, or about a displacement file with mistakes.
+
+    It is empty when there is none, or when the case has other problems: they are told elsewhere.
+    """
+    files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
+    try:
+        if not case.motions or check_case(case, mesh) or stopped():
+            return ""
+        if not all(path.is_file() for path in files):
+            return ""
+        moved = displacements(case, mesh)
+        found = clash(case, mesh, moved.nodes, moved.vectors)
+    except SlidevizError as error:
+        return _first_line(error, files)
+    return found[0].upper() + found[1:] + "." if found else ""
+
+
+def _first_line(error: SlidevizError, files: list[Path]) -> str:
+    """Return the first mistake, without the folders of files, and how many more there are."""
+    first, *others = str(error).splitlines()
+    for path in files:
+        first = first.replace(str(path), path.name)
+    return f"{first} ({len(others)} more)." if others else f"{first}."
+
+
+def set_clash(session: Session, text: str, key: tuple[object, ...]) -> Session:
+    """Return the session with what was found for ``key``, unless that is no longer asked for."""
+    if clash_key(session) != key or session.clash == text:
+        return session
+    return replace(session, clash=text)

@@ -1,0 +1,201 @@
+"""The long jobs of the window as plain functions: open, compute, save.
+
+Each gets ``report(item)``, which may be called from any thread, and ``stopped()``, and raises
+`slideviz.errors.Cancelled` soon after ``stopped()`` became true. Nothing here draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.case.model import Case
+from slideviz.errors import Cancelled, CaseError
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import find_pairs
+from slideviz.mesh.quality import quality
+from slideviz.mesh.surfaces import Surface, find_surfaces
+from slideviz.session.changes import open_mesh
+from slideviz.session.formats import holds_quality
+from slideviz.session.keep import Camera, kept_camera
+from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.state import Frame, Session
+
+Report = Callable[[object], None]
+Stopped = Callable[[], bool]
+
+CASE_SUFFIXES = (".cfg",)
+PHASES = {
+    "classify": "sorting nodes",
+    "solve": "solving",
+    "evaluate": "moving the nodes",
+    "project": "projecting onto the boundaries",
+    "quality": "quality",
+}
+"""Words for people for the phases of a run."""
+
+
+@dataclass(frozen=True)
+class Doing:
+    """What is being done, in words, and how far it is: 0 to 1, or None when nobody knows."""
+
+    text: str
+    fraction: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """The outcome of `open_file`: the session, and the boundaries ready to be drawn.
+
+    ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
+    ``ghosts`` has read the displacement files.
+    """
+
+    session: Session
+    surfaces: tuple[Surface, ...]
+    ghosts: Ghosts
+    kept: bool = False
+    camera: Camera | None = None
+
+
+def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
+    """Return a mesh, or the case of a ``.cfg`` file with its mesh, ready to be shown.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be used; the message says what and where.
+    """
+    from slideviz.mesh.io.files import read
+
+    case, mesh_path = None, path
+    if path.suffix.lower() in CASE_SUFFIXES:
+        report(Doing(f"Reading {path.name}"))
+        case = Case.read(path)
+        if case.mesh_file is None:
+            raise CaseError(f"{path}: the case names no mesh; add a line MESH_FILENAME= FILE")
+        mesh_path, zone = case.mesh_file, case.zone if zone is None else zone
+    report(Doing(f"Reading {mesh_path.name}"))
+
+    def reading(fraction: float) -> None:
+        require_going(stopped)
+        report(Doing(f"Reading {mesh_path.name}", fraction))
+
+    mesh = read(mesh_path, zone=zone, progress=reading)
+    return prepare(mesh, mesh_path, case, report, stopped)
+
+
+def prepare(
+    mesh: Mesh, path: Path | None, case: Case | None, report: Report, stopped: Stopped
+) -> Opened:
+    """Return a mesh that was just read, ready to be shown: boundaries, pairs, quality."""
+    require_going(stopped)
+    report(Doing("Finding the boundaries"))
+    surfaces = find_surfaces(mesh)
+    require_going(stopped)
+    report(Doing("Looking for periodic boundaries"))
+
+    def going_on() -> None:
+        require_going(stopped)
+
+    pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
+    report(Doing("Measuring the cells"))
+    metric = case.quality_metric if case is not None else "knupp"
+    first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
+    going_on()
+    session = open_mesh(first, path, pairs, case)
+    ghosts = Ghosts(mesh)
+    ghosts.moved(session.case)
+    if case is None:
+        return Opened(session, surfaces, ghosts)
+    return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case))
+
+
+def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
+    """Deform the mesh; every step is reported as a `Frame`, what goes on as `Doing`."""
+    from slideviz.deformation.solver import Progress, deform
+
+    furthest = 0.0
+
+    def progress(now: Progress) -> None:
+        nonlocal furthest
+        require_going(stopped)
+        # Sliding solves more than once in a step; a bar that runs back would look broken.
+        furthest = max(furthest, overall(now))
+        phase = PHASES.get(now.phase, now.phase)
+        if case.steps:
+            report(Doing(f"Step {now.step} of {now.total}: {phase}", furthest))
+        elif now.phase == "classify":
+            report(Doing(f"Automatic steps: {phase}"))
+        else:
+            # Nobody knows how many numbers will be tried: the bar only says that it goes on.
+            tried = f"{now.total} step{'s' if now.total > 1 else ''}"
+            report(Doing(f"Trying {tried}: step {now.step}, {phase}"))
+
+    unfinished = True
+
+    def going_on() -> None:
+        # When the last step is there, nothing is gained by dropping it.
+        if unfinished:
+            require_going(stopped)
+
+    for step in deform(case, mesh, progress=progress):
+        unfinished = step.index < step.total
+        report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
+        measured = quality(step.mesh, mesh, case.quality_metric, going_on)
+        report(Frame(step.mesh, measured, step))
+        going_on()
+
+
+_STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
+
+
+def overall(now: object) -> float:
+    """Return how much of the whole run is done, 0 to 1, roughly: phases differ in length."""
+    step, total = getattr(now, "step", 1), getattr(now, "total", 1)
+    phase, fraction = getattr(now, "phase", ""), getattr(now, "fraction", 0.0)
+    start = _STARTS.get(phase, 0.9)
+    later = [value for value in _STARTS.values() if value > start]
+    inside = start + fraction * (min(later, default=0.95) - start)
+    return float((step - 1 + inside) / total)
+
+
+def save_mesh(
+    path: Path,
+    frame: Frame,
+    overwrite: bool,
+    report: Report,
+    stopped: Stopped,
+    base: Mesh | None = None,
+) -> Path:
+    """Write the mesh of a frame, with its quality where the format can hold it.
+
+    Of the undeformed mesh ``base`` the displacement is written, too.
+
+    Raises
+    ------
+    Cancelled
+        It was stopped; what was at ``path`` is as before.
+    """
+    from slideviz.mesh.io.files import write
+
+    report(Doing(f"Writing {path.name}"))
+    data = None
+    if holds_quality(path):
+        measured = frame.quality
+        data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
+    write(path, frame.mesh, overwrite, data, base, lambda: require_going(stopped))
+    return path
+
+
+def require_going(stopped: Stopped) -> None:
+    """Raise if the job was asked to stop.
+
+    Raises
+    ------
+    Cancelled
+        It was.
+    """
+    if stopped():
+        raise Cancelled("stopped, as you asked")

@@ -1,0 +1,91 @@
+"""Long jobs that write what is taken away: quality as a table, the meshes of all steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import SlidevizError
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.session.jobs import Doing, Report, Stopped, require_going, save_mesh
+from slideviz.session.state import Frame
+from slideviz.terms import CELL_STATES
+
+_ROWS = 5_000
+"""Cells written between two looks at whether to stop."""
+
+
+def save_quality(path: Path, frame: Frame, report: Report, stopped: Stopped) -> Path:
+    """Write a CSV file with a row for every cell: id, type, size, skew, size-skew, status, middle.
+
+    Raises
+    ------
+    SlidevizError
+        The file cannot be written.
+    """
+    mesh, found = frame.mesh, frame.quality
+    middles = centroids(mesh)
+    axes = ",".join("xyz"[: mesh.dim])
+    names = {vtk: ELEMENTS[vtk].name for vtk in mesh.cells.by_type}
+    with atomic_write(path, SlidevizError) as file:
+        file.write(f"cell,type,size,skew,size_skew,status,{axes}\n".encode())
+        for start in range(0, len(found), _ROWS):
+            require_going(stopped)
+            report(Doing(f"Writing {path.name}", start / len(found)))
+            part = slice(start, start + _ROWS)
+            rows = zip(
+                mesh.cells.types[part].tolist(),
+                found.size[part].tolist(),
+                found.skew[part].tolist(),
+                found.values[part].tolist(),
+                found.status[part].tolist(),
+                middles[part].tolist(),
+                strict=True,
+            )
+            lines = [
+                f"{cell},{names[kind]},{size!r},{skew!r},{value!r},{CELL_STATES[status]},"
+                + ",".join(map(repr, middle))
+                for cell, (kind, size, skew, value, status, middle) in enumerate(rows, start)
+            ]
+            file.write(("\n".join(lines) + "\n").encode())
+    return path
+
+
+def centroids(mesh: Mesh) -> FloatArray:
+    """Return the mean of the nodes of each cell, (m, d)."""
+    offsets = mesh.cells.offsets
+    total = np.add.reduceat(mesh.points[mesh.cells.connectivity], offsets[:-1], axis=0)
+    return np.asarray(total / np.diff(offsets)[:, None])
+
+
+def step_paths(path: Path, count: int) -> list[Path]:
+    """Return the files of ``count`` steps: the name of ``path`` with a number before its end."""
+    width = len(str(count))
+    return [path.with_name(f"{path.stem}_{k:0{width}d}{path.suffix}") for k in range(1, count + 1)]
+
+
+def save_steps(path: Path, frames: Sequence[Frame], report: Report, stopped: Stopped) -> list[Path]:
+    """Write the mesh of every step, whole files only, and return them.
+
+    Parameters
+    ----------
+    path : Path
+        The name to put numbers into (see `step_paths`).
+    frames : sequence of Frame
+        The steps, without the undeformed mesh.
+
+    Raises
+    ------
+    SlidevizError
+        A file cannot be written; those before it stay.
+    """
+    paths = step_paths(path, len(frames))
+    for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
+        require_going(stopped)
+        report(Doing(f"Writing {target.name}", k / len(frames)))
+        save_mesh(target, frame, False, lambda _: None, stopped)
+    return paths

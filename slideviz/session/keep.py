@@ -1,0 +1,102 @@
+"""How a mesh is looked at, put into a case and taken out again: a session is a case file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from slideviz.case.model import Case
+from slideviz.case.view_keys import SectionText, hyphened
+from slideviz.sections.model import Section
+from slideviz.session.state import Session, ViewState
+from slideviz.terms import SHOWN
+
+Camera = tuple[float, ...]
+"""Position, focal point, direction up, and half the height seen, in parallel projection."""
+
+
+def keep_view(session: Session, camera: Camera | None = None) -> Case:
+    """Return the case of a session with its view in it; what is as at first is left out."""
+    view, first = session.view, ViewState()
+    before = _plain(first)
+    kept = {key: value for key, value in _plain(view).items() if before[key] != value}
+    ranges = {"VIEW_RANGE": view.colour_range, "VIEW_THRESHOLD": view.threshold}
+    kept |= {key: value for key, value in ranges.items() if value is not None}
+    if view.hidden:
+        names = session.mesh.marker_names if session.mesh is not None else ()
+        kept["VIEW_HIDDEN"] = tuple(name for name in names if name in view.hidden)
+    if view.sections:
+        kept["VIEW_SECTIONS"] = tuple(_text(section) for section in view.sections)
+    if camera is not None:
+        kept["VIEW_CAMERA"] = camera
+    return session.case.change(view=kept)
+
+
+def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
+    """Return a view as a case kept it; what the case does not say is taken from ``view``.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The boundaries there are; hidden ones of other names are passed by.
+    """
+    kept, values = case.view, dict[str, Any]()
+    for key, field in (
+        ("VIEW_COLOR", "colour_by"),
+        ("VIEW_RANGE", "colour_range"),
+        ("VIEW_MAP", "colour_map"),
+        ("VIEW_THRESHOLD", "threshold"),
+        ("VIEW_POINTS", "points"),
+        ("VIEW_COPIES", "copies"),
+    ):
+        if key in kept:
+            values[field] = kept[key]
+    if "VIEW_SHOW" in kept:
+        values |= {name: hyphened(name) in kept["VIEW_SHOW"] for name in SHOWN}
+    if "VIEW_HIDDEN" in kept:
+        values["hidden"] = frozenset(kept["VIEW_HIDDEN"]) & frozenset(names)
+    if "VIEW_SECTIONS" in kept:
+        values["sections"] = tuple(_section(text) for text in kept["VIEW_SECTIONS"])
+    return replace(view, **values)
+
+
+def restored(session: Session, source: Path | None) -> Session:
+    """Return a session just opened from what was kept of it: it is of ``source``, and unsaved."""
+    return replace(session, case=session.case.change(source=source), saved=Case())
+
+
+def kept_camera(case: Case) -> Camera | None:
+    """Return the camera that a case kept, if it did."""
+    camera: Camera | None = case.view.get("VIEW_CAMERA")
+    return camera
+
+
+def _plain(view: ViewState) -> dict[str, Any]:
+    """Return the settings that always have a value, by key."""
+    return {
+        "VIEW_COLOR": view.colour_by,
+        "VIEW_MAP": view.colour_map,
+        "VIEW_POINTS": view.points,
+        "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if getattr(view, name)),
+        "VIEW_COPIES": view.copies,
+    }
+
+
+def _text(section: Section) -> SectionText:
+    radius = (section.radius,) if section.kind == "cylinder" else ()
+    numbers = (*radius, *section.direction, *section.origin)
+    return (
+        section.kind,
+        tuple(float(n) for n in numbers),
+        section.whole,
+        section.flat,
+        section.shown,
+    )
+
+
+def _section(text: SectionText) -> Section:
+    kind, numbers, whole, flat, shown = text
+    radius, rest = (numbers[0], numbers[1:]) if kind == "cylinder" else (0.0, numbers)
+    origin, direction = rest[3:], rest[:3]
+    return Section(kind, origin, direction, radius, whole, shown=shown, flat=flat)  # type: ignore[arg-type]

@@ -1,0 +1,110 @@
+"""Where cells are: coordinates as one thinks of the mesh, and the boundary that is nearest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, Marker, Mesh
+from slideviz.mesh.periodic import in_axis_frame
+from slideviz.session.state import Session
+
+NEAR = 4
+"""Nodes of a boundary whose elements are looked at for the nearest point."""
+
+
+@dataclass(frozen=True)
+class Around:
+    """The axis that a mesh repeats about.
+
+    Attributes
+    ----------
+    axis, origin : (3,) tuple of float
+    """
+
+    axis: tuple[float, float, float]
+    origin: tuple[float, float, float]
+
+
+def axis_of(session: Session) -> Around | None:
+    """Return the axis of a session with rotational periodicity, or None."""
+    names = session.case.markers_with("periodic")
+    for pair in session.pairs:
+        if pair.kind == "rotational" and pair.first in names and pair.second in names:
+            return Around(pair.axis, pair.origin)
+    return None
+
+
+def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the names of coordinates, and those of some places.
+
+    Parameters
+    ----------
+    positions : (k, d) float64
+        Cartesian, in the mesh's length unit.
+    around : Around or None
+        Radius, angle in degrees and height about this axis; None: as they are.
+
+    Returns
+    -------
+    names : tuple of d str
+    values : (k, d) float64
+    """
+    dim = positions.shape[1]
+    if around is None:
+        return tuple("xyz"[:dim]), positions
+    at = in_axis_frame(positions, around.axis, around.origin)
+    angle = np.degrees(np.arctan2(at[:, 1], at[:, 0]))
+    along = [name for name, part in zip("xyz", around.axis, strict=True) if abs(part) > 0]
+    names = ("r", "\u03b8 [°]", along[0] if len(along) == 1 else "axial")
+    return names[:dim], np.column_stack([np.hypot(at[:, 0], at[:, 1]), angle, at[:, 2]])[:, :dim]
+
+
+def decimals(values: FloatArray) -> int:
+    """Return after the point how many digits numbers need so that the largest has four."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return 0 if not largest > 0 else int(np.clip(3 - np.floor(np.log10(largest)), 0, 12))
+
+
+def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
+    """Return the name of the boundary nearest to a point (d,), and how far it is; None: none."""
+    found = [(_distance(mesh, marker, point), marker.name) for marker in mesh.markers]
+    far, name = min(found, default=(np.inf, ""))
+    return (name, far) if np.isfinite(far) else None
+
+
+def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
+    """Return how far a point is from the elements of a boundary around its nearest nodes."""
+    nodes, cells = marker.nodes, marker.cells
+    if not len(nodes):
+        return float("inf")
+    shifts = mesh.points[nodes] - point
+    squares = np.einsum("nd,nd->n", shifts, shifts)
+    near = nodes[np.argsort(squares)[:NEAR]]
+    at = np.flatnonzero(np.isin(cells.connectivity, near))
+    elements = np.unique(np.searchsorted(cells.offsets, at, side="right") - 1)
+    best = float(np.sqrt(squares.min()))
+    for element in elements:
+        begin, end = cells.offsets[element : element + 2]
+        corners = mesh.points[cells.connectivity[begin:end]]
+        best = min(best, _to_polygon(corners, point))
+    return best
+
+
+def _to_polygon(corners: FloatArray, point: FloatArray) -> float:
+    """Return the distance from a line (2, d), or from the triangles of a face (k, 3)."""
+    start, end = corners, np.roll(corners, -1, axis=0)
+    along = end - start
+    square = np.maximum(np.einsum("nd,nd->n", along, along), 1e-300)
+    part = np.clip(np.einsum("nd,nd->n", point - start, along) / square, 0.0, 1.0)
+    far = float(np.linalg.norm(start + part[:, None] * along - point, axis=1).min())
+    for k in range(1, len(corners) - 1 if corners.shape[1] == 3 else 0):
+        u, v, w = corners[k] - corners[0], corners[k + 1] - corners[0], point - corners[0]
+        normal = np.cross(u, v)
+        area = float(normal @ normal)
+        if area > 0:
+            a, b = np.cross(w, v) @ normal / area, np.cross(u, w) @ normal / area
+            if a >= 0 and b >= 0 and a + b <= 1:
+                far = min(far, abs(float(w @ normal)) / area**0.5)
+    return far

@@ -1,0 +1,114 @@
+"""What the nodes of the boundaries may do, for the view: moving, sliding, periodic and so on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.errors import MeshError, SlidevizError
+from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.topology import Fans, find_fans
+from slideviz.session.state import Session
+from slideviz.terms import NODE_TYPES, NodeType
+
+
+@dataclass(frozen=True, eq=False)
+class TypedNodes:
+    """Nodes to be drawn as points.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        The nodes, rising.
+    kinds : (k,) int64
+        The place of each node's type in ``NODE_TYPES``.
+    """
+
+    nodes: IntArray
+    kinds: IntArray
+
+    @property
+    def present(self) -> tuple[NodeType, ...]:
+        """Return the types that occur, in the order of ``NODE_TYPES``."""
+        there = set(np.unique(self.kinds).tolist())
+        return tuple(kind for place, kind in enumerate(NODE_TYPES) if place in there)
+
+    def only(self, nodes: IntArray) -> TypedNodes:
+        """Return those that are among ``nodes``."""
+        keep = np.isin(self.nodes, nodes)
+        return TypedNodes(self.nodes[keep], self.kinds[keep])
+
+
+NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+class NodeTypes:
+    """The types of the boundary nodes of a mesh, worked out once for each case."""
+
+    def __init__(self) -> None:
+        self._fans: tuple[Mesh, float, Fans] | None = None
+        self._types: tuple[object, TypedNodes] | None = None
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.__init__()  # type: ignore[misc]
+
+    def of(self, session: Session) -> TypedNodes:
+        """Return the nodes that the view of a session shows as points, whatever is hidden."""
+        if session.mesh is None or session.view.points == "none":
+            return NOTHING
+        if session.view.points == "control":
+            return control_nodes(session)
+        # Steps were computed with the settings of their run, not with those of now.
+        ran = session.frame is not None and session.frame.step is not None
+        return self._typed(session.mesh, (session.ran if ran else None) or session.case)
+
+    def _typed(self, mesh: Mesh, case: Case) -> TypedNodes:
+        roles = tuple(case.roles.get(name, "fixed") for name in mesh.marker_names)
+        period = case.periodic, case.periodic_type, case.axis, case.origin
+        key = (mesh, roles, case.sliding, period, case.feature_angle_deg)
+        if self._types is None or self._types[0] != key:
+            self._types = key, self._classified(mesh, case)
+        return self._types[1]
+
+    def _classified(self, mesh: Mesh, case: Case) -> TypedNodes:
+        from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
+
+        if not mesh.markers:
+            return NOTHING
+        case, _ = roles_of_copies(case, mesh)
+        boundary, angle = boundary_of(mesh), case.feature_angle_deg
+        if self._fans is None or self._fans[:2] != (mesh, angle):
+            self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
+        try:
+            try:
+                _, frame, stands = find_period(case, mesh, boundary)
+            except MeshError:  # until its markers match, the case is as without periodicity
+                alone = case.change(periodic="none", periodic_type="translational")
+                _, frame, stands = find_period(alone, mesh, boundary)
+            classes = find_classes(case, mesh, (boundary, self._fans[2]), frame, stands)
+        except SlidevizError:
+            return NOTHING  # what is wrong with the case is said beside the Run button
+        place = {kind: index for index, kind in enumerate(NODE_TYPES)}
+        kinds = np.full(len(mesh.points), place["internal"])
+        for marker in mesh.markers:
+            if case.roles.get(marker.name) == "periodic":
+                kinds[marker.nodes] = place["periodic"]
+        kinds[classes.surface] = place["sliding_surface"]
+        kinds[classes.edge] = place["sliding_edge"]
+        kinds[classes.fixed] = place["fixed"]
+        kinds[classes.moving] = place["moving"]
+        nodes = np.unique(boundary.nodes)
+        return TypedNodes(nodes, kinds[nodes])
+
+
+def control_nodes(session: Session) -> TypedNodes:
+    """Return the control nodes of the step that is shown; none before the first step."""
+    step = session.frame.step if session.frame is not None else None
+    if step is None:
+        return NOTHING
+    nodes = np.unique(step.control)
+    return TypedNodes(nodes, np.full(len(nodes), list(NODE_TYPES).index("control")))

@@ -1,0 +1,59 @@
+"""A session with a mesh just read: what is guessed of it, and what its case kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.case.model import Case, Reduction
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import Pair
+from slideviz.session.guess import guess_case, guess_roles
+from slideviz.session.keep import kept_view
+from slideviz.session.state import Frame, Session, ViewState
+
+MANY_NODES = 20_000
+"""Boundary nodes from which on a mesh is opened with data reduction."""
+
+
+RELATIVE_TOLERANCE = 1e-5
+
+
+def open_mesh(
+    first: Frame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
+) -> Session:
+    """Return a session with a mesh just read; without a case its roles are guessed."""
+    mesh = first.mesh
+    guesses = {} if case is not None else guess_roles(mesh, pairs)
+    chosen = guess_case(mesh, guesses, pairs) if case is None else case
+    listed = {name: chosen.roles.get(name, "fixed") for name in mesh.marker_names}
+    others = {name: role for name, role in chosen.roles.items() if name not in listed}
+    chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
+    view = kept_view(chosen, ViewState(), mesh.marker_names)
+    # From here on the view is the session's; it goes back into the case when that is saved.
+    chosen = chosen.change(view={})
+    session = Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
+    return session if case is not None else _guess_reduction(session, mesh)
+
+
+def _guess_reduction(session: Session, mesh: Mesh) -> Session:
+    """Return the session with data reduction where all boundary nodes would be too many."""
+    if not mesh.markers:
+        return session
+    count = len(np.unique(np.concatenate([marker.nodes for marker in mesh.markers])))
+    if count <= MANY_NODES:
+        return session
+    case = session.case.change(reduction=suggested_reduction(mesh))
+    why = (
+        f"Data reduction is a guess: without it, {count:,} boundary nodes would need up to "
+        f"{2.6 * 8 * count**2 / 1e9:.0f} GB of memory."
+    )
+    return replace(session, case=case, saved=case, reduction_guess=why)
+
+
+def suggested_reduction(mesh: Mesh) -> Reduction:
+    """Return data reduction with a tolerance that suits the size of the mesh: 1e-5 of it."""
+    return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)

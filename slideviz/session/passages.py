@@ -1,0 +1,143 @@
+"""Neighbouring passages: the images of a mesh under its period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.periodic import Pair, axis_basis, find_pairs, pair_up
+from slideviz.mesh.surfaces import padded
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.sections.polygons import Polygons
+from slideviz.sections.threshold import Choice
+from slideviz.session.guess import guess_by_name
+
+WHOLE_NUMBER = 1e-3
+"""A wheel may miss a whole number of passages by this much."""
+
+_SAME = 1e-9
+
+
+def find_period(
+    mesh: Mesh, case: Case | None = None, pairs: Sequence[Pair] | None = None
+) -> Pair | None:
+    """Return the pair of boundaries whose transformation repeats the mesh, or None.
+
+    A case with periodic boundaries says which. Otherwise it is a guess among the boundaries that
+    match: names that say so come first, then rotations; the ends of every straight duct match.
+    ``pairs`` has those that match, when they are known already.
+
+    Raises
+    ------
+    MeshError
+        The periodic boundaries of the case do not match.
+    """
+    names = case.markers_with("periodic") if case is not None else ()
+    if case is not None and names:
+        return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+
+    def rank(pair: Pair) -> tuple[int, bool]:
+        guesses = [guess_by_name(name) for name in (pair.first, pair.second)]
+        named = sum(guess is not None and guess.role == "periodic" for guess in guesses)
+        return -named, pair.kind != "rotational"
+
+    return min(find_pairs(mesh) if pairs is None else pairs, key=rank, default=None)
+
+
+def passages_around(pair: Pair) -> int | None:
+    """Return how many passages the whole wheel has; None if a translation or no whole number."""
+    if pair.kind != "rotational":
+        return None
+    number = 2.0 * np.pi / pair.period
+    whole = round(number)
+    return whole if abs(number - whole) <= WHOLE_NUMBER * number else None
+
+
+def passages(pair: Pair, count: int | Literal["wheel"]) -> dict[int, FloatArray]:
+    """Return the transformation (4, 4) of each passage by its number; 0 is the mesh itself.
+
+    Parameters
+    ----------
+    pair : Pair
+        The period, from its first marker to its second.
+    count : int or "wheel"
+        Neighbours on each side, or all around. On a wheel no passage comes twice.
+
+    Raises
+    ------
+    CaseError
+        The count is negative, or the period makes no whole wheel.
+    """
+    around = passages_around(pair)
+    if count == "wheel" and around is None:
+        raise CaseError(
+            f"{pair.first!r} and {pair.second!r} repeat by {pair.describe()}, which makes no whole "
+            "wheel; give the number of neighbours on each side"
+        )
+    if count != "wheel" and count < 0:
+        raise CaseError(f"{count} neighbouring passages; give 0 or more")
+    if around is not None and (count == "wheel" or 2 * count + 1 > around):
+        numbers = range(-((around - 1) // 2), around // 2 + 1)
+    else:
+        numbers = range(-int(count), int(count) + 1)
+    return {number: _power(pair, number) for number in numbers}
+
+
+def _power(pair: Pair, number: int) -> FloatArray:
+    """Return the transformation (4, 4) by so many periods."""
+    matrix = np.eye(4)
+    if pair.kind == "translational":
+        matrix[: len(pair.vector), 3] = number * pair.vector
+        return matrix
+    # The exact part of a turn, where there is one, so that a wheel closes.
+    around = passages_around(pair)
+    angle = pair.angle if around is None else np.copysign(2.0 * np.pi / around, pair.angle)
+    cos, sin = np.cos(number * angle), np.sin(number * angle)
+    basis, origin = axis_basis(pair.axis), np.asarray(pair.origin)
+    turn = basis.T @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ basis
+    matrix[:3, :3] = turn
+    matrix[:3, 3] = origin - turn @ origin
+    return matrix
+
+
+def moved(points: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return points (n, d) after a transformation (4, 4), (n, d)."""
+    return (padded(points) @ matrix[:3, :3].T + matrix[:3, 3])[:, : points.shape[1]]
+
+
+def keeps(section: Section, matrix: FloatArray) -> bool:
+    """Tell whether a transformation (4, 4) takes a section onto itself."""
+    axis, origin = section.basis[2], np.asarray(section.origin)
+    turned = matrix[:3, :3] @ axis
+    step = moved(origin[None], matrix)[0] - origin
+    off = abs(step @ axis) if section.kind == "plane" else np.linalg.norm(np.cross(step, axis))
+    size = max(section.radius, float(np.linalg.norm(origin)), float(np.linalg.norm(step)))
+    return bool(np.linalg.norm(np.cross(turned, axis)) <= _SAME and off <= _SAME * size)
+
+
+def show_passages(
+    cutter: Cutter,
+    points: FloatArray,
+    section: Section,
+    matrices: Mapping[int, FloatArray],
+    only: Choice | None = None,
+) -> dict[int, Polygons]:
+    """Return what one section shows of every passage (see `Cutter.show`), by its number.
+
+    Where the period takes the section onto itself, the mesh is cut once.
+    """
+    base: Polygons | None = None
+    found = {}
+    for number, matrix in matrices.items():
+        if keeps(section, matrix):
+            base = cutter.show(points, section, only) if base is None else base
+            found[number] = base.with_points(moved(base.points, matrix))
+        else:
+            found[number] = cutter.show(moved(points, matrix), section, only)
+    return found

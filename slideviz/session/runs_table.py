@@ -1,0 +1,131 @@
+"""The runs of a session as a table for people and for a file, and which of them is best."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.case.motion_words import deformation, describe
+from slideviz.errors import SlidevizError
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.session.runs_words import (
+    control_nodes,
+    end_words,
+    method_words,
+    reduction_words,
+)
+from slideviz.session.state import Run
+from slideviz.terms import PERIODIC_MODES
+
+DIGITS = 4
+QUALITY = f".{DIGITS}f"
+"""How qualities are written for people."""
+
+
+def _of_last(run: Run, name: str) -> float | None:
+    return getattr(run.last.quality, name) if run.last is not None else None
+
+
+def _motions(run: Run) -> str | None:
+    dim = run.last.mesh.dim if run.last is not None else 2
+    return "; ".join(describe(motion, dim) for motion in run.case.motions) or None
+
+
+def _error(run: Run) -> float | None:
+    step = run.last.step if run.last is not None else None
+    return step.max_error if step is not None else None
+
+
+def _misfit(run: Run) -> float | None:
+    found = [frame.step.periodic_misfit for frame in run.frames if frame.step is not None]
+    return max((value for value in found if value is not None), default=None)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its title, what it says of a run, and how that is written for people."""
+
+    title: str
+    value: Callable[[Run], str | float | None]
+    form: str = ""
+
+    def text(self, run: Run) -> str:
+        """Return what it says of a run, for people; a dash where nothing is known."""
+        value = self.value(run)
+        return "–" if value is None else format(value, self.form)
+
+
+COLUMNS: tuple[Column, ...] = (
+    Column("run", lambda run: run.number),
+    Column("name", lambda run: run.name or None),
+    Column("motion", _motions),
+    Column("method", lambda run: method_words(run.case)),
+    Column("periodicity", lambda run: PERIODIC_MODES[run.case.periodic].name),
+    Column("steps", lambda run: len(run.frames)),
+    Column("kernel", lambda run: run.case.kernel),
+    Column("support radius / extent", lambda run: run.case.influence_factor, "g"),
+    Column("control nodes chosen", lambda run: reduction_words(run.case)),
+    Column("minimum quality", lambda run: _of_last(run, "min"), QUALITY),
+    Column("mean quality", lambda run: _of_last(run, "mean"), QUALITY),
+    Column("inverted cells", lambda run: _of_last(run, "inverted"), ",d"),
+    Column("control nodes", control_nodes, ",d"),
+    Column("largest error at control", _error, ".3g"),
+    Column("periodic misfit", _misfit, ".3g"),
+    Column("seconds", lambda run: run.seconds, ".3f"),
+    Column("end", end_words),
+)
+"""What a table of runs has; qualities and control nodes are those of the last step."""
+
+
+def best(runs: Sequence[Run]) -> frozenset[int]:
+    """Return the numbers of the runs of highest minimum quality among those of the same motion.
+
+    Runs of different motions cannot be compared, nor those that did not come to their end; of runs
+    whose minima read alike, all are best, or none where all are.
+    """
+    alike: dict[object, dict[int, float]] = {}
+    for run in runs:
+        if run.last is not None and run.end == "done":
+            group = alike.setdefault(deformation(run.case), {})
+            group[run.number] = round(run.last.quality.min, DIGITS)
+    found: set[int] = set()
+    for group in alike.values():
+        if len(set(group.values())) > 1:
+            found |= {number for number, value in group.items() if value == max(group.values())}
+    return frozenset(found)
+
+
+def described(run: Run) -> str:
+    """Return all that the table says of a run, a line for each column, and what it remarks."""
+    told = [column for column in COLUMNS if column.title != "name" or run.name]
+    lines = [f"{column.title}: {column.text(run)}" for column in told]
+    step = run.last.step if run.last is not None else None
+    if step is not None and step.warnings:
+        lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in step.warnings)]
+    return "\n".join(lines)
+
+
+def table_text(runs: Sequence[Run], delimiter: str = ",") -> str:
+    """Return the table with a line of titles; numbers keep every digit."""
+    out = io.StringIO()
+    rows = csv.writer(out, delimiter=delimiter, lineterminator="\n")
+    rows.writerow([column.title for column in COLUMNS])
+    for run in runs:
+        values = [column.value(run) for column in COLUMNS]
+        rows.writerow(["" if value is None else value for value in values])
+    return out.getvalue()
+
+
+def write_table(path: Path, runs: Sequence[Run]) -> None:
+    """Write the table as CSV.
+
+    Raises
+    ------
+    SlidevizError
+        It cannot be written.
+    """
+    with atomic_write(path, SlidevizError) as file:
+        file.write(table_text(runs).encode())

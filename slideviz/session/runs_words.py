@@ -1,0 +1,164 @@
+"""The runs of a session in words: what each is, and what sets it apart from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case
+from slideviz.case.motion_words import motion_labels
+from slideviz.session.state import Run
+from slideviz.terms import METHODS, PERIODIC_MODES, SLIDING
+
+TOLD = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
+"""Groups of keys whose values are said of a run, the more telling ones first."""
+
+
+def method_words(case: Case) -> str:
+    """Return which method a case asks for, in words."""
+    return (SLIDING[case.sliding] if case.method == "rbf" else METHODS[case.method]).name
+
+
+def run_words(run: Run) -> str:
+    """Return what a run is called: its name, or else its method."""
+    return run.name or method_words(run.case)
+
+
+def _number_words(value: float) -> str:
+    """Return a number as short as it can be without losing a digit."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def reduction_words(case: Case) -> str:
+    """Return how control nodes are chosen, in words."""
+    given = case.reduction
+    if given is None or case.method != "rbf":
+        return "all nodes"
+    part = _number_words(given.relative or given.tolerance)
+    part += " of the extent" if given.relative else ""
+    levels = ", in levels" if given.multilevel else ""
+    most = f", at most {given.max_nodes:,} nodes" if given.max_nodes else ""
+    return f"reduced to {part}{levels}{most}"
+
+
+def steps_words(run: Run) -> str:
+    """Return how many steps a run made, or has made of how many."""
+    made = len(run.frames)
+    step = run.last.step if run.last is not None else None
+    total = step.total if step is not None else run.case.steps
+    auto = ", automatic" if not run.case.steps else ""
+    if run.end == "done" or made == total:
+        return f"{made} step{'' if made == 1 else 's'}{auto}"
+    return f"{made} of {total} steps{auto}" if total else f"{made} steps{auto}"
+
+
+def seconds_words(seconds: float) -> str:
+    """Return a time, as exactly as it matters."""
+    if seconds < 100:
+        return f"{seconds:.3g} s" if seconds >= 0.1 else f"{seconds:.2f} s"
+    return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
+
+
+def end_words(run: Run) -> str:
+    """Return how a run ended, or that it goes on."""
+    return run.end or "running"
+
+
+def control_nodes(run: Run) -> int | None:
+    """Return the control nodes of its last step, if it has one."""
+    step = run.last.step if run.last is not None else None
+    return step.control_nodes if step is not None else None
+
+
+SETTINGS: tuple[Key, ...] = tuple(
+    sorted(
+        (key for key in KEYS.values() if key.group in TOLD and key.said != ""),
+        key=lambda key: (TOLD[key.group], key.rank),
+    )
+)
+"""Settings that tell runs apart; the motions, roles and others have their own words."""
+
+
+def _setting_words(key: Key, case: Case) -> str:
+    """Return a setting in words; nothing where it is as usual, or does nothing."""
+    value = key.get(case)
+    if value is None or key.kind.write(value) == key.default or key.idle(case):
+        return ""
+    if key.field == "reduction":
+        return reduction_words(case)
+    text = key.kind.write(value)
+    if key.kind.entry in ("axis", "point"):
+        text = f"({', '.join(map(_number_words, value))})"
+    elif key.kind.entry == "real":
+        text = _number_words(value)
+    said = key.said or f"{key.label or key.name.replace('_', ' ')} {{}}".lower()
+    return said.format(text + key.unit)
+
+
+def _roles_words(case: Case, others: Sequence[Case]) -> str:
+    """Return the roles of the boundaries whose role differs among cases."""
+    names = dict.fromkeys(name for other in others for name in other.roles)
+    differ = [n for n in names if len({one.roles.get(n, "fixed") for one in others}) > 1]
+    return ", ".join(f"{name} {case.roles.get(name, 'fixed')}" for name in differ)
+
+
+def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
+    """Yield what is told of the settings of a run, and whether that differs among cases."""
+    case = run.case
+
+    def differs(name: str) -> bool:
+        return any(getattr(other, name) != getattr(case, name) for other in cases)
+
+    if case.periodic != "none" or differs("periodic"):
+        yield PERIODIC_MODES[case.periodic].name.removeprefix("periodic, "), differs("periodic")
+    yield steps_words(run), differs("steps")
+    for key in SETTINGS:
+        # What is as usual needs no words: the other runs say that they are not.
+        words = _setting_words(key, case)
+        of = reduction_words if key.field == "reduction" else key.get
+        apart = bool(words) and any(of(other) != of(case) for other in cases)
+        if apart or (words and key.field == "kernel"):
+            yield words, apart
+    nodes = control_nodes(run)
+    if nodes is not None:
+        yield f"{nodes:,} nodes", False
+
+
+def apart(run: Run, among: Sequence[Run]) -> str:
+    """Return what sets a run apart from those of a list, beside its name, in few words.
+
+    Nothing where no other is called as it is: its name or method says enough.
+    """
+    if not any(other is not run and run_words(other) == run_words(run) for other in among):
+        return ""
+    words = [method_words(run.case)] if run.name else []
+    return ", ".join(filter(None, [*words, differing(run, among)]))
+
+
+def differing(run: Run, among: Sequence[Run]) -> str:
+    """Return which settings of a run differ among those of a list, which has it; not its method."""
+    cases = [other.case for other in among]
+    words = [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
+    words += [text for text, differs in _told(run, cases) if differs]
+    return ", ".join(filter(None, words))
+
+
+def brief(run: Run, among: Sequence[Run] = ()) -> str:
+    """Return what sets a run apart, beside its method, in one short line.
+
+    What differs among the runs of a list, which has it, comes first: the rest may be cut off.
+    """
+    cases = [other.case for other in among]
+    words = [] if run.end == "done" else [end_words(run)]
+    if run.name:
+        words.append(method_words(run.case))
+    if run in among:
+        words.append(motion_labels(cases)[among.index(run)])
+        words.append(_roles_words(run.case, cases))
+    told = list(_told(run, cases))
+    words += [text for text, differs in told if differs]
+    words += [text for text, differs in told if not differs]
+    if run.frames:
+        words.append(seconds_words(run.seconds))
+    return " · ".join(filter(None, words))

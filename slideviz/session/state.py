@@ -1,0 +1,201 @@
+"""What the window shows, as frozen values: mesh, case, guesses, computed frames, view settings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from slideviz.case.check import effective
+from slideviz.case.model import Case
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import Pair
+from slideviz.session.results import Frame, Run, cell_displacement
+from slideviz.session.view_state import ViewState
+from slideviz.terms import Role
+
+__all__ = [
+    "Frame",
+    "Guess",
+    "Place",
+    "Run",
+    "Session",
+    "ViewState",
+    "cell_displacement",
+    "essence",
+    "round_above",
+]
+
+
+Place = Literal["open", "boundaries", "motion", "method"]
+"""Where something is put right before a run: a panel, or the choice of a file."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A role that was not chosen but read from the name or from a match, and why."""
+
+    role: Role
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """All that is open: what was read, what is asked, what came out, how it is looked at.
+
+    Attributes
+    ----------
+    mesh : Mesh or None
+        The undeformed mesh; None before anything is open.
+    path : Path or None
+        The mesh file.
+    case : Case
+        What is asked, guesses included.
+    guesses : mapping of str to Guess
+        The boundaries whose role nobody has confirmed yet.
+    pairs : tuple of Pair
+        Boundaries that match each other.
+    first : Frame or None
+        The undeformed mesh with its quality.
+    runs : tuple of Run
+        What was computed, in the order of the starts.
+    shown : int or None
+        The number of the run whose steps are shown.
+    removed : tuple of Run
+        Those taken out of ``runs`` last, which undo brings back.
+    newest : int
+        The highest number that a run was given, removed ones too.
+    saved : Case or None
+        What is on disk, or what was there at the start.
+    reduction_guess : str
+        Why data reduction was switched on without being asked for; empty when it was not.
+    clash : str
+        What the motions put through what, in a sentence; empty as far as is known.
+    invalid : tuple of (Place, str)
+        The fields that show something else than the case has, because it is not valid: the panel,
+        and a sentence. No run starts meanwhile.
+    """
+
+    mesh: Mesh | None = None
+    path: Path | None = None
+    case: Case = field(default_factory=Case)
+    guesses: Mapping[str, Guess] = field(default_factory=dict)
+    pairs: tuple[Pair, ...] = ()
+    first: Frame | None = None
+    runs: tuple[Run, ...] = ()
+    shown: int | None = None
+    saved: Case | None = None
+    view: ViewState = field(default_factory=ViewState)
+    reduction_guess: str = ""
+    clash: str = ""
+    invalid: tuple[tuple[Place, str], ...] = ()
+    removed: tuple[Run, ...] = ()
+    newest: int = 0
+
+    def inputs(self) -> dict[Path, str]:
+        """Return the files that it was read from, and what they are in words."""
+        found = self.case.inputs()
+        return found if self.path is None else found | {self.path: "the mesh that is open"}
+
+    def run(self, number: int | None) -> Run | None:
+        """Return the run of that number, if it is still there."""
+        return next((run for run in self.runs if run.number == number), None)
+
+    @property
+    def run_shown(self) -> Run | None:
+        """Return the run whose steps are shown."""
+        return self.run(self.shown)
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """Return the undeformed mesh and every step of the run that is shown."""
+        run = self.run_shown
+        first = (self.first,) if self.first is not None else ()
+        return first + (run.frames if run is not None else ())
+
+    @property
+    def ran(self) -> Case | None:
+        """Return what the steps shown were computed with."""
+        run = self.run_shown
+        return run.case if run is not None else None
+
+    @property
+    def frame(self) -> Frame | None:
+        """Return the frame that is shown."""
+        frames = self.frames
+        return frames[min(self.view.frame, len(frames) - 1)] if frames else None
+
+    @property
+    def deformed(self) -> Frame | None:
+        """Return the last step of the run that is shown."""
+        run = self.run_shown
+        return run.last if run is not None else None
+
+    @property
+    def unsaved_mesh(self) -> bool:
+        """Tell whether steps are shown whose mesh has not been written."""
+        run = self.run_shown
+        return run is not None and bool(run.frames) and not run.saved
+
+    @property
+    def unsaved_case(self) -> bool:
+        """Tell whether the case differs from what was saved or opened."""
+        return self.mesh is not None and self.saved is not None and self.case != self.saved
+
+    @property
+    def repeatable(self) -> bool:
+        """Tell whether the case, as it is on disk, gives the run that is shown once more."""
+        run = self.run_shown
+        kept = self.case.source is not None and not self.unsaved_case
+        return kept and run is not None and run.end == "done" and not self.outdated
+
+    @property
+    def outdated(self) -> bool:
+        """Tell whether the steps shown were computed with other settings than now."""
+        run = self.run_shown
+        return run is not None and bool(run.frames) and essence(run.case) != essence(self.case)
+
+    @property
+    def colour_range(self) -> tuple[float, float]:
+        """Return the values at the ends of the colour bar."""
+        if self.view.colour_range is not None:
+            return self.view.colour_range
+        if self.view.colour_by != "displacement":
+            return 0.0, 1.0
+        return 0.0, round_above(self.largest_displacement) or 1.0
+
+    @cached_property
+    def largest_displacement(self) -> float:
+        """Return the largest displacement of a node in the last steps of all runs."""
+        if self.mesh is None:
+            return 0.0
+        lasts = [run.last.mesh.points for run in self.runs if run.last is not None]
+        shifts = (np.linalg.norm(points - self.mesh.points, axis=1).max() for points in lasts)
+        return max((float(shift) for shift in shifts), default=0.0)
+
+    def role(self, marker: str) -> Role:
+        """Return the role of a boundary; those nobody named are fixed."""
+        return self.case.roles.get(marker, "fixed")
+
+
+def round_above(value: float) -> float:
+    """Return a number of few digits that is at least ``value``, also after division by five."""
+    if not value > 0:
+        return 0.0
+    power = float(10.0 ** np.floor(np.log10(value)))
+    fit = (
+        digits
+        for digits in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+        if digits * power >= value
+    )
+    return float(f"{next(fit, 10.0) * power:.3g}")
+
+
+def essence(case: Case) -> Case:
+    """Return the case with only what changes the result: no file names, no order of roles."""
+    roles = {name: role for name, role in sorted(case.roles.items()) if role != "fixed"}
+    return replace(effective(case), roles=roles, mesh_out=None, source=None, warnings=(), view={})

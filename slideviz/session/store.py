@@ -1,0 +1,287 @@
+"""The one place where the session changes: holds it, tells those who listen, undoes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from slideviz.case.model import Case
+from slideviz.session.changes_runs import bring_back, remove_run, show_run
+from slideviz.session.state import Guess, Session, ViewState
+
+Listener = Callable[[Session, Session], None]
+Failed = Callable[[Exception], None]
+
+TOGETHER_S = 1.0
+"""Changes of one kind that follow each other so closely are undone as one."""
+DEEPEST = 200
+"""Changes that can be undone."""
+
+WORDS: dict[str, str] = {
+    "set_role": "role",
+    "confirm": "confirming guesses",
+    "add_motion": "new motion",
+    "replace_motion": "motion",
+    "remove_motion": "removing a motion",
+    "move_motion": "order of motions",
+    "add_section": "new section",
+    "replace_section": "section",
+    "remove_section": "removing a section",
+    "lay_flat": "flat view",
+    "show": "hidden boundaries",
+    "isolate": "hidden boundaries",
+    "remove_run": "removing a run",
+    "take_settings": "settings of a run",
+    "set_case": "settings",
+    "fit_colours": "colour range",
+    "set_view": "view",
+}
+"""What the menu calls a change, by the name of its function; others cannot be undone."""
+
+VIEW_WORDS: dict[str, str] = {
+    "colour_by": "colour by",
+    "colour_range": "colour range",
+    "colour_map": "colours",
+    "threshold": "range of cells",
+    "points": "points",
+    "edges": "mesh edges",
+    "undeformed": "undeformed boundaries",
+    "motion_ghost": "motion ghost",
+    "legend": "legend",
+    "triad": "axes",
+    "perspective": "perspective",
+    "sections": "sections",
+    "copies": "neighbours",
+    "hidden": "hidden boundaries",
+}
+"""What the menu calls a change of the view, by the field; it says "view" of several at once."""
+
+
+def tell_all(
+    functions: Iterable[Callable[..., object]], *values: Any, failed: Failed | None = None
+) -> None:
+    """Call every function with the values, also those after one that raises.
+
+    Its error goes to ``failed``; without that, the first one is raised when all were called.
+    """
+    first: Exception | None = None
+    for function in tuple(functions):
+        try:
+            function(*values)
+        except Exception as error:
+            if failed is not None:
+                failed(error)
+            else:
+                first = first or error
+    if first is not None:
+        raise first
+
+
+@dataclass(frozen=True)
+class Memento:
+    """What undo brings back: roles, motions, settings, style of the view, removed runs.
+
+    Attributes
+    ----------
+    removed : frozenset of int
+        The numbers of the runs that were removed then. Those that came later are in none, so
+        that no run is lost by undoing what was done before it.
+    shown : int or None
+        The run that was shown then; it is again if it comes back.
+    """
+
+    case: Case
+    guesses: Mapping[str, Guess]
+    reduction_guess: str
+    style: ViewState
+    removed: frozenset[int] = frozenset()
+    shown: int | None = field(default=None, compare=False)
+
+    @classmethod
+    def of(cls, session: Session) -> Memento:
+        """Return that of a session."""
+        return cls(
+            session.case,
+            session.guesses,
+            session.reduction_guess,
+            session.view.style,
+            frozenset(run.number for run in session.removed),
+            session.shown,
+        )
+
+    def put_into(self, session: Session) -> Session:
+        """Return the session with it; the step that is shown and the like stay."""
+        session = self._put_runs(session)
+        view, style = session.view, self.style
+        # Where the case was saved to does not come back: it is on disk, undone or not.
+        case = self.case.change(
+            source=session.case.source,
+            mesh_out=session.case.mesh_out,
+            warnings=session.case.warnings,
+        )
+        names = ("selected", "frame", "marked", "beside", "swapped")
+        passing = {name: getattr(view, name) for name in names}
+        return replace(
+            session,
+            case=case,
+            guesses=self.guesses,
+            reduction_guess=self.reduction_guess,
+            view=replace(style, **passing),
+        )
+
+    def _put_runs(self, session: Session) -> Session:
+        """Return the session with the runs back that were there, and without removed ones."""
+        for number in sorted({run.number for run in session.removed} - self.removed):
+            session = bring_back(session, number)
+            if number == self.shown:
+                session = show_run(session, number)
+        for run in session.runs:
+            if run.number in self.removed:
+                session = remove_run(session, run.number)
+        return session
+
+
+@dataclass(frozen=True)
+class _Done:
+    """A change that can be undone: what was before, what it was, and when."""
+
+    before: Memento
+    words: str
+    kind: tuple[object, ...]
+    at_s: float
+
+
+class Store:
+    """The session of a window.
+
+    Listeners are called with the old and the new session, in the order in which they came.
+    A change made by a listener is told after the present one has been told to everybody, so
+    that nobody hears of the newer one first. One that raises keeps nobody from hearing: its
+    error goes to ``failed`` or, where that is None, is raised when everybody was told.
+
+    Parameters
+    ----------
+    session : Session, optional
+        The first one.
+    clock : callable
+        Tells the seconds, for the changes that are undone together.
+    """
+
+    def __init__(
+        self, session: Session | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.session = session or Session()
+        self._clock = clock
+        self._listeners: list[Listener] = []
+        self._waiting: list[tuple[Session, Session]] = []
+        self.failed: Failed | None = None
+        self._undo: list[_Done] = []
+        self._redo: list[_Done] = []
+        self._held = False
+
+    def listen(self, listener: Listener) -> None:
+        """Call ``listener(old, new)`` after each change from now on."""
+        self._listeners.append(listener)
+
+    def change(self, function: Callable[..., Session], *values: Any, **named: Any) -> None:
+        """Replace the session by ``function(session, ...)`` and tell the listeners."""
+        old = self.session
+        new = function(old, *values, **named)
+        name = getattr(function, "__name__", "")
+        if name in WORDS:
+            # The first value says which boundary or motion it is, where there are several.
+            which = values[0] if values and isinstance(values[0], (int, str, tuple)) else None
+            words = WORDS[name]
+            if name == "set_view" and len(named) == 1:
+                words = VIEW_WORDS.get(next(iter(named)), words)
+            self._remember(old, new, words, (name, which, *sorted(named)))
+        self.put(new)
+
+    def hold(self, held: bool) -> None:
+        """Take note that the mouse begins to drag something, or ends it.
+
+        What changes meanwhile is undone as one, however long it takes, and apart from the rest.
+        """
+        self._held = held
+        if self._undo:
+            last = self._undo[-1]
+            if held or last.at_s == float("inf"):
+                self._undo[-1] = replace(last, at_s=float("-inf"))
+
+    def put(self, session: Session) -> None:
+        """Replace the session and tell the listeners; the same one again is no news.
+
+        Another mesh cannot be undone: what was done before is forgotten.
+        """
+        if session is self.session:
+            return
+        if session.mesh is not self.session.mesh:
+            self._undo.clear()
+            self._redo.clear()
+        self._waiting.append((self.session, session))
+        self.session = session
+        if len(self._waiting) > 1:
+            return
+        first: Exception | None = None
+        try:
+            while self._waiting:
+                try:
+                    tell_all(self._listeners, *self._waiting[0], failed=self.failed)
+                except Exception as error:
+                    first = first or error
+                self._waiting.pop(0)
+        finally:
+            self._waiting.clear()
+        if first is not None:
+            raise first
+
+    # Undo ------------------------------------------------------------------------------
+
+    @property
+    def can_undo(self) -> str:
+        """Return what would be undone, in words; empty when there is nothing."""
+        return self._undo[-1].words if self._undo else ""
+
+    @property
+    def can_redo(self) -> str:
+        """Return what would be done again, in words; empty when there is nothing."""
+        return self._redo[-1].words if self._redo else ""
+
+    def undo(self) -> None:
+        """Bring back what was before the last change, if there was one."""
+        self._step(self._undo, self._redo)
+
+    def redo(self) -> None:
+        """Make the change again that was undone last, if no other was made since."""
+        self._step(self._redo, self._undo)
+
+    def _step(self, source: list[_Done], target: list[_Done]) -> None:
+        if not source:
+            return
+        done = source.pop()
+        target.append(replace(done, before=Memento.of(self.session), at_s=float("-inf")))
+        self.put(done.before.put_into(self.session))
+
+    def _remember(self, old: Session, new: Session, words: str, kind: tuple[object, ...]) -> None:
+        if new is old or new.mesh is not old.mesh or new.mesh is None:
+            return
+        before = Memento.of(old)
+        if before == Memento.of(new):
+            return
+        self._redo.clear()
+        now = self._clock()
+        last = self._undo[-1] if self._undo else None
+        # Nothing is later than what the mouse still holds, so that it goes with the rest of it.
+        at_s = float("inf") if self._held else now
+        if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
+            self._undo.pop()
+            if last.before != Memento.of(new):
+                self._undo.append(replace(last, at_s=at_s))
+            return
+        self._undo.append(_Done(before, words, kind, at_s))
+        # A run that is no longer kept cannot be brought back.
+        there = {run.number for run in new.removed}
+        self._undo = [d for d in self._undo if d.kind[0] != "remove_run" or d.kind[1] in there]
+        del self._undo[:-DEEPEST]

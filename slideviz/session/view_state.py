@@ -1,0 +1,87 @@
+"""How a mesh is looked at, as a frozen value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from slideviz.terms import ColourBy, PointsShown
+
+if TYPE_CHECKING:
+    from slideviz.sections.model import Section
+
+
+@dataclass(frozen=True)
+class ViewState:
+    """How it is looked at.
+
+    Attributes
+    ----------
+    colour_by : ColourBy
+        What the colours say.
+    colour_range : (float, float) or None
+        Values at the ends of the colour bar; None: 0 to 1 for quality, and 0 to a round number
+        above the largest of all runs for the displacement.
+    colour_map : str
+        One of `slideviz.terms.COLOUR_MAPS`.
+    threshold : (float, float) or None
+        Draw only the cells whose value is in this range; None draws all.
+    points : PointsShown
+        Nodes drawn as points.
+    edges : bool
+        Draw the edges of the cells.
+    undeformed : bool
+        Draw the undeformed boundaries as a ghost.
+    motion_ghost : bool
+        Draw where the motions take the moving boundaries.
+    legend : bool
+        Draw the legend or the colour bar.
+    triad : bool
+        Draw the directions of the axes in a corner.
+    perspective : bool
+        Perspective instead of parallel projection (3D only).
+    sections : tuple of Section
+        Planes and cylinders that cut the mesh.
+    copies : int
+        Passages drawn on each side of a periodic mesh; -1 draws all there are.
+    hidden : frozenset of str
+        Boundaries that are not drawn.
+    selected : tuple of str
+        Boundaries that are highlighted.
+    frame : int
+        Which frame is shown, 0 is the undeformed mesh.
+    marked : int or None
+        The cell that is marked, by its number in the mesh.
+    beside : int or None
+        The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
+    swapped : bool
+        Whether the second view stands to the left of the first.
+    ranges : tuple of (str, (float, float))
+        The colour ranges of what else the view was coloured by.
+    """
+
+    colour_by: ColourBy = "role"
+    colour_range: tuple[float, float] | None = None
+    colour_map: str = "viridis"
+    threshold: tuple[float, float] | None = None
+    points: PointsShown = "none"
+    edges: bool = True
+    undeformed: bool = False
+    motion_ghost: bool = True
+    legend: bool = True
+    triad: bool = True
+    perspective: bool = False
+    sections: tuple[Section, ...] = ()
+    copies: int = 0
+    hidden: frozenset[str] = frozenset()
+    selected: tuple[str, ...] = ()
+    frame: int = 0
+    marked: int | None = None
+    beside: int | None = None
+    swapped: bool = False
+    ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
+
+    @property
+    def style(self) -> ViewState:
+        """Return it without what passes: the step, what is selected or marked, the second view."""
+        return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)

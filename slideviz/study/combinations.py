@@ -1,0 +1,261 @@
+"""Comparing methods: one case by several methods, periodic modes and numbers of steps.
+
+The mesh is read once, and what only the method and the periodic mode decide (topology, classes of
+nodes, tracks) is found once for all numbers of steps. A combination that cannot be is a row that
+says why; it never ends the comparison.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from slideviz import terms
+from slideviz.case.model import Case, Translate
+from slideviz.deformation.setup import Plan, make_plan
+from slideviz.deformation.solver import deform
+from slideviz.deformation.stepping import Progress, Step
+from slideviz.errors import Cancelled, SlidevizError
+from slideviz.mesh.model import FloatArray, Mesh, frozen_array
+from slideviz.mesh.quality import Quality, quality
+from slideviz.rbf.problem import Cycle
+from slideviz.samples.table import sample
+from slideviz.session.jit_warmup import warm_up
+from slideviz.terms import PeriodicMode
+
+METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
+    sliding: (term.name, {"method": "rbf", "sliding": sliding})
+    for sliding, term in terms.SLIDING.items()
+} | {
+    method: (term.name, {"method": method, "sliding": term.slides_by})
+    for method, term in terms.METHODS.items()
+    if method != "rbf"
+}
+"""What each method is called, and what of a case it changes."""
+
+MODES = {mode: term.figure for mode, term in terms.PERIODIC_MODES.items()}
+"""What each PERIODIC_MODE is called."""
+
+AUTO = 0
+"""Number of steps: as many as it takes."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """What is tried.
+
+    Attributes
+    ----------
+    method : str
+        One of ``METHODS``.
+    periodic : PeriodicMode
+    steps : int
+        ``AUTO`` for as many as it takes.
+    """
+
+    method: str
+    periodic: PeriodicMode
+    steps: int
+
+    @property
+    def label(self) -> str:
+        """Return method and mode in words."""
+        return f"{METHODS[self.method][0]}, {MODES[self.periodic]}"
+
+    def applied(self, case: Case) -> Case:
+        """Return the case with this method, mode and number of steps."""
+        return case.change(periodic=self.periodic, steps=self.steps, **METHODS[self.method][1])
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a combination came to.
+
+    Attributes
+    ----------
+    steps : int
+        Steps made.
+    mesh : Mesh or None
+        The last one; None where it was not kept, so that there is no picture of it.
+    quality : Quality
+        Of it.
+    minimum, mean : (steps,) float64
+        Quality after each step.
+    control_nodes : int
+        In the last step.
+    max_error : float
+        The largest of all steps, in the mesh's length unit.
+    condition : float
+        The largest of all steps; NaN where the method has no system.
+    seconds, processor_seconds : float
+        Of the deformation: by the clock, and of all processors together.
+    tolerance : float or None
+        Of the greedy selection, in the mesh's length unit.
+    history : tuple of (int, Cycle)
+        Number of the step, and a cycle of its greedy selection.
+    warnings : tuple of str
+    """
+
+    steps: int
+    mesh: Mesh | None
+    quality: Quality
+    minimum: FloatArray
+    mean: FloatArray
+    control_nodes: int
+    max_error: float
+    condition: float
+    seconds: float
+    processor_seconds: float
+    tolerance: float | None
+    history: tuple[tuple[int, Cycle], ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A combination with its result, or with the reason why there is none."""
+
+    combination: Combination
+    result: Result | None = None
+    problem: str = ""
+
+
+def bounded(rows: Iterable[Row], bytes_kept: int) -> Iterator[Row]:
+    """Yield the rows; meshes are kept until their points take so many bytes, then no more."""
+    kept = 0
+    for row in rows:
+        result = row.result
+        if result is not None and result.mesh is not None:
+            kept += result.mesh.points.nbytes
+            if kept > bytes_kept:
+                yield replace(row, result=replace(result, mesh=None))
+                continue
+        yield row
+
+
+@dataclass(frozen=True, eq=False)
+class _Shared:
+    """What runs with the same method and mode have in common, and the time it took."""
+
+    first: Combination
+    plan: Plan
+    seconds: float
+    processor_seconds: float
+
+    def serves(self, combination: Combination) -> bool:
+        """Tell whether the combination differs in the number of steps alone."""
+        return replace(combination, steps=self.first.steps) == self.first
+
+
+def warm(methods: Iterable[str]) -> None:
+    """Load what the methods load once, so that it does not count as time of a run."""
+    warm_up(lambda: None, lambda: False)
+    made = sample("square", 4, "motion")
+    (block,) = made.case.markers_with("moving")
+    case = made.case.change(motions=(Translate(block, (1e-3, 0.0)),))
+    for method in set(methods) - set(terms.SLIDING):
+        for _ in deform(Combination(method, "none", 1).applied(case), made.mesh):
+            pass
+
+
+def compare(
+    case: Case,
+    mesh: Mesh,
+    wanted: Sequence[Combination],
+    tell: Callable[[Combination, Progress], None] | None = None,
+) -> Iterator[Row]:
+    """Yield a row for each combination, in order.
+
+    Parameters
+    ----------
+    case : Case
+        Method, mode and number of steps are those of the combinations, the rest is its own.
+    mesh : Mesh
+        The undeformed mesh.
+    wanted : sequence of Combination
+    tell : callable, optional
+        Called often; an exception it raises ends the comparison.
+    """
+    shared: _Shared | None = None
+    for combination in wanted:
+        try:
+            if shared is None or not shared.serves(combination):
+                shared = None  # the old one need not be kept while the new one is made
+                shared = _share(combination, case, mesh)
+            yield Row(combination, _result(combination, case, mesh, shared, tell))
+        except Cancelled:
+            raise
+        except SlidevizError as problem:
+            yield Row(combination, problem=str(problem))
+        except MemoryError:
+            yield Row(combination, problem="out of memory; a coarser mesh or DATA_REDUCTION= YES")
+        except Exception as problem:  # one that fails must not take the others with it
+            yield Row(combination, problem=f"internal error ({type(problem).__name__}: {problem})")
+
+
+def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
+    clock = _Clock()
+    with clock:
+        plan = make_plan(combination.applied(case), mesh)
+    return _Shared(combination, plan, clock.seconds, clock.processor)
+
+
+def _result(
+    combination: Combination,
+    case: Case,
+    mesh: Mesh,
+    shared: _Shared,
+    tell: Callable[[Combination, Progress], None] | None,
+) -> Result:
+    """Return the result of a combination; only the deformation is timed."""
+    applied = combination.applied(case)
+    progress = (lambda now: tell(combination, now)) if tell else None
+    pulled = deform(applied, mesh, progress, shared.plan)
+    clock = _Clock(shared.seconds, shared.processor_seconds)
+    steps: list[Step] = []
+    quality_of: list[tuple[float, float]] = []
+    while True:
+        with clock:
+            step = next(pulled, None)
+        if step is None:
+            break
+        if steps:  # of the steps before the last only the numbers are needed
+            steps[-1] = replace(steps[-1], mesh=mesh)
+        steps.append(step)
+        found = quality(step.mesh, mesh, applied.quality_metric)
+        quality_of.append((found.min, found.mean))
+    minimum, mean = np.array(quality_of).T
+    return Result(
+        steps=len(steps),
+        mesh=steps[-1].mesh,
+        quality=found,
+        minimum=frozen_array(minimum, np.float64),
+        mean=frozen_array(mean, np.float64),
+        control_nodes=steps[-1].control_nodes,
+        max_error=max(step.max_error for step in steps),
+        condition=max(step.condition for step in steps),
+        seconds=clock.seconds,
+        processor_seconds=clock.processor,
+        tolerance=shared.plan.reduction.tolerance if shared.plan.reduction else None,
+        history=tuple((step.index, cycle) for step in steps for cycle in step.history),
+        warnings=steps[-1].warnings,
+    )
+
+
+class _Clock:
+    """``with clock:`` adds the time of the block, by the clock and of all processors."""
+
+    def __init__(self, seconds: float = 0.0, processor: float = 0.0) -> None:
+        self.seconds, self.processor = seconds, processor
+
+    def __enter__(self) -> None:
+        self.seconds -= time.perf_counter()
+        self.processor -= time.process_time()
+
+    def __exit__(self, *_: object) -> None:
+        self.seconds += time.perf_counter()
+        self.processor += time.process_time()

@@ -1,0 +1,108 @@
+"""Panels of a comparison: which rows are drawn together, and with which line.
+
+Where both methods and periodic modes vary, each method has a panel and each mode a line, as in
+the thesis (Figures 5.5, 5.7, 5.8), or the other way round where there are fewer modes; otherwise
+there is one panel with a line for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from slideviz.case.model import Case
+from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.periodic import pair_up
+from slideviz.plots.spanwise import Profile, along, along_radius
+from slideviz.study.combinations import METHODS, MODES, Result, Row
+
+Span = Literal["r", "x", "y", "z"]
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A row with the name and the number of its line in a panel."""
+
+    label: str
+    series: int
+    row: Row
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Rows that are drawn together; ``title`` is empty where there is one panel only."""
+
+    title: str
+    lines: tuple[Line, ...]
+
+
+def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
+    """Return rows with a result in panels; a line has the same look in each."""
+    asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
+    done = [row for row in rows if row.result is not None]
+    methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
+    # What has a line for each; the other has the panels.
+    lined = 0 if modes == 1 or modes < methods else 1
+    other = 1 - lined
+    found: dict[str, list[Line]] = {title: [] for title in asked[other]}
+    for row in done:
+        titles = _titles(row)
+        line = Line(titles[lined], asked[lined].index(titles[lined]), row)
+        found[titles[other]].append(line)
+    several = len(found) > 1
+    made = [Panel(title if several else "", tuple(lines)) for title, lines in found.items()]
+    return tuple(panel for panel in made if panel.lines)
+
+
+def _titles(row: Row) -> tuple[str, str]:
+    """Return what method and mode of a row are called."""
+    return METHODS[row.combination.method][0], MODES[row.combination.periodic]
+
+
+Profiler = Callable[[Line], Profile]
+"""Makes the profile of a line along the span."""
+
+
+def result_of(line: Line) -> Result:
+    """Return the result of a line; it has one, or it would not be drawn."""
+    assert line.row.result is not None
+    return line.row.result
+
+
+def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
+    """Return what makes profiles along the span; None where nothing says what the span is.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : Mesh
+        The undeformed mesh. Its cells say which layer a cell is in, so that layers of cells stay
+        together while they bend.
+    span : {"r", "x", "y", "z"}, optional
+        When left out: the radius of a 3D mesh that repeats by rotation, z of another 3D mesh,
+        nothing of a 2D mesh.
+    """
+    axis, origin, turns = case.axis, case.origin, False
+    names = case.markers_with("periodic")
+    if names and span in (None, "r"):
+        try:
+            first = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+            turns = first.kind == "rotational"
+            axis, origin = (first.axis, first.origin) if turns else (axis, origin)
+        except (MeshError, CaseError):
+            pass  # the rows say it
+    if span is None and mesh.dim == 2:
+        return None
+    where = span or ("r" if turns else "z")
+
+    def profile(line: Line) -> Profile:
+        values = result_of(line).quality.values
+        if where == "r":
+            made = along_radius(mesh, values, axis, origin, label=line.label)
+        else:
+            made = along(mesh, values, where, label=line.label)
+        return replace(made, series=line.series)
+
+    return profile

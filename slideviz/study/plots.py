@@ -1,0 +1,284 @@
+"""Figures of a comparison: against steps, step by step, histogram, span, convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from slideviz.errors import CaseError
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.quality import INVERTED
+from slideviz.plots import draw as plots
+from slideviz.plots.spanwise import spanwise
+from slideviz.plots.style import PRINT
+from slideviz.plots.ticks import rounded_out
+from slideviz.study.combinations import Row
+from slideviz.study.panels import Line, Panel, Profiler, panels, result_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 7.0
+"""Inches; that of a page's text, at which letters are 8 points or more."""
+
+_BINS = 25
+"""Intervals of a histogram, each wide enough to see the dashes of its lines."""
+_WIDE = 8.0
+"""Times that differ more than so many times need a logarithmic axis."""
+_LAST = ("minimum", "mean")
+_QUIET = replace(PRINT, legend=False)
+
+
+def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
+    """Yield the names and figures of a comparison.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Rows without a result are left out.
+    span : callable or None
+        What makes the profile of a row along the span; see `profiler`.
+    """
+    numbers = list(dict.fromkeys(row.combination.steps for row in rows))
+    if len({row.result.steps for row in rows if row.result}) > 1:
+        yield "steps", _grid(panels(rows), (_minimum, _mean, _seconds))
+    for number in numbers:
+        group = panels([row for row in rows if row.combination.steps == number])
+        lines = [line for panel in group for line in panel.lines]
+        if not lines:
+            continue
+        name = steps_name(number)
+        yield f"histogram_{name}", _grid(group, (_histogram(lines),), across=True)
+        if any(len(result_of(line).minimum) > 1 for line in lines):
+            yield f"by_step_{name}", _grid(group, (_by_step,), across=True)
+        if any(result_of(line).history for line in lines):
+            yield f"convergence_{name}", _grid(group, (_convergence,), across=True)
+        if span is not None:
+            yield f"spanwise_{name}", _grid(group, (_span(span, "minimum"), _span(span, "mean")))
+
+
+def steps_name(number: int) -> str:
+    """Return the end of the names of files about a number of steps."""
+    return f"{number:02d}_steps" if number else "auto_steps"
+
+
+def save_figure(
+    figure: Figure,
+    folder: Path,
+    name: str,
+    dpi: int = 200,
+    suffixes: Sequence[str] = (".png", ".svg"),
+) -> list[Path]:
+    """Write a figure as PNG and SVG, each whole or not at all; return the paths.
+
+    Raises
+    ------
+    CaseError
+        A file cannot be written.
+    """
+    paths = []
+    for suffix in suffixes:
+        data = BytesIO()
+        figure.savefig(data, format=suffix[1:], dpi=dpi)
+        paths.append(folder / f"{name}{suffix}")
+        with atomic_write(paths[-1], CaseError) as file:
+            file.write(data.getvalue())
+    return paths
+
+
+_Draw = Callable[["Axes", Sequence[Line]], None]
+
+
+def _outcomes(lines: Sequence[Line]) -> list[plots.Outcome]:
+    found = []
+    for line in lines:
+        result = result_of(line)
+        found.append(
+            plots.Outcome(
+                line.label,
+                result.steps,
+                result.quality.min,
+                result.quality.mean,
+                result.quality.inverted,
+                result.processor_seconds,
+                result.control_nodes,
+                result.max_error,
+                line.series,
+            )
+        )
+    return found
+
+
+def _minimum(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
+
+
+def _mean(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
+
+
+def _seconds(axes: Axes, lines: Sequence[Line]) -> None:
+    plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
+
+
+def _histogram(every: Sequence[Line]) -> _Draw:
+    """Return what draws some of the lines, with the intervals that suit all."""
+    good = [_values(line)[~_inverted(line)] for line in every]
+    values = np.concatenate([*good, [1.0]])
+    edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
+
+    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+        runs = [
+            plots.QualityRun(line.label, _values(line), _inverted(line), line.series)
+            for line in lines
+        ]
+        # Logarithmic: few bad cells matter among many good ones.
+        plots.histogram(axes, runs, edges=edges, log=True, style=_QUIET)
+
+    return draw
+
+
+def _inverted(line: Line) -> np.ndarray:
+    found = result_of(line).quality
+    return np.asarray(found.status[found.counted] == INVERTED)
+
+
+def _values(line: Line) -> np.ndarray:
+    found = result_of(line).quality
+    return found.values[found.counted]
+
+
+def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
+    runs = []
+    for line in lines:
+        result = result_of(line)
+        numbers = np.arange(1, result.steps + 1)
+        runs.append(plots.StepRun(line.label, numbers, result.minimum, result.mean, line.series))
+    plots.quality_by_step(axes, runs, _QUIET)
+
+
+def _convergence(axes: Axes, lines: Sequence[Line]) -> None:
+    runs = []
+    for line in lines:
+        if not result_of(line).history:
+            continue
+        cycles = [cycle for step, cycle in result_of(line).history if step == 1]
+        runs.append(
+            plots.GreedyRun(
+                line.label,
+                np.array([cycle.control_nodes for cycle in cycles]),
+                np.array([cycle.error for cycle in cycles]),
+                np.array([cycle.level for cycle in cycles]),
+                result_of(line).tolerance,
+                line.series,
+            )
+        )
+    plots.convergence(axes, runs, style=_QUIET)
+
+
+def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
+    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+        spanwise(axes, [make(line) for line in lines], what, style=_QUIET)
+
+    return draw
+
+
+def _grid(group: Sequence[Panel], draws: Sequence[_Draw], across: bool = False) -> Figure:
+    """Return a figure with a row for each panel, or a column if ``across``, and one legend."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    count = len(group)
+    shape = (1, count) if across else (count, len(draws))
+    figure = Figure(figsize=(WIDTH, 0.9 + shape[0] * (3.0 if across else 2.1)))
+    figure.set_layout_engine("constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(*shape, squeeze=False)
+    for number, panel in enumerate(group):
+        for column, draw in enumerate(draws):
+            here = axes[0, number] if across else axes[number, column]
+            draw(here, panel.lines)
+            if panel.title and column == 0:
+                here.set_title(panel.title, fontsize=PRINT.size + 1, loc="left")
+            if across and number:
+                here.set_ylabel("")
+            if not across and number < count - 1:
+                here.set_xlabel("")
+    for together in [axes[0]] if across else axes.T:
+        _same_height(together)
+    if _seconds in draws:
+        _readable_seconds(list(axes[:, list(draws).index(_seconds)]))
+    for inner in axes[0, 1:] if across else ():
+        inner.tick_params(labelleft=False)
+    _one_legend(figure)
+    return figure
+
+
+def _one_legend(figure: Figure) -> None:
+    """Put one legend for all axes below them, lines first and what markers mean last."""
+    handles: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    labels = [name for name in handles if name not in _LAST]
+    labels += [name for name in _LAST if name in handles]
+    crosses = [
+        line for axes in figure.axes for line in axes.lines if _is_cross(str(line.get_gid()))
+    ]
+    if crosses:
+        labels.append("has inverted cells")
+        handles[labels[-1]] = crosses[0]
+    if labels:
+        figure.legend(
+            [handles[name] for name in labels],
+            labels,
+            loc="outside lower center",
+            ncols=len(labels) if len(labels) < 5 else 3,
+            fontsize=PRINT.size,
+            handlelength=3.2,
+            frameon=False,
+        )
+
+
+def _is_cross(gid: str) -> bool:
+    return gid.startswith("inverted:")
+
+
+def _same_height(together: Sequence[Axes]) -> None:
+    """Give axes the limits that hold all of them, so that they can be compared."""
+    scales = {axes.get_yscale() for axes in together}
+    log = "log" in scales
+    for axes in together:
+        axes.set_yscale("log" if log else "linear")
+        axes.relim()
+        axes.autoscale_view()
+    limits = [axes.get_ylim() for axes in together if axes.lines or axes.patches]
+    low = min((low for low, _ in limits if low > 0.0 or not log), default=None)
+    high = max((high for _, high in limits), default=None)
+    for axes in together:
+        axes.set_ylim(low, high)
+
+
+def _readable_seconds(together: Sequence[Axes]) -> None:
+    """Let times that differ much be told apart: a logarithmic axis with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    values = np.concatenate([line.get_ydata() for axes in together for line in axes.lines])
+    values = values[values > 0.0]
+    if not len(values) or values.max() < _WIDE * values.min():
+        return
+    low, high = values.min() / 1.5, values.max() * 1.5
+    # Three numbers a decade, and of many decades one.
+    parts = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    for axes in together:
+        axes.set_yscale("log")
+        axes.set_ylim(low, high)
+        axes.yaxis.set_major_locator(LogLocator(subs=parts))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -1,0 +1,145 @@
+"""The table of a comparison: as CSV, and as lines for a terminal."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+from slideviz.errors import CaseError
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.study.combinations import Result, Row
+
+Value = str | int | float
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table.
+
+    Attributes
+    ----------
+    meaning : str
+    value : callable
+        Of a result.
+    head, form : str
+        Head and format on a terminal, which shows the columns that have one.
+    """
+
+    meaning: str
+    value: Callable[[Result], Value]
+    head: str = ""
+    form: str = ""
+
+
+COLUMNS: Mapping[str, Column] = {
+    "steps_made": Column("steps made, which STEPS= auto chooses", lambda r: r.steps, "steps", "d"),
+    "min": Column("lowest quality", lambda r: r.quality.min, "min", ".6f"),
+    "mean": Column("mean quality", lambda r: r.quality.mean, "mean", ".6f"),
+    "inverted": Column("inverted cells", lambda r: r.quality.inverted, "inverted", "d"),
+    "unproven": Column("cells neither proved valid nor inverted", lambda r: r.quality.unproven),
+    "control_nodes": Column(
+        "control nodes in the last step", lambda r: r.control_nodes, "control nodes", "d"
+    ),
+    "max_error": Column(
+        "largest error of a boundary node before it is corrected, of all steps, in the mesh's "
+        "length unit",
+        lambda r: r.max_error,
+        "max error",
+        ".1e",
+    ),
+    "condition": Column("largest condition number of a system", lambda r: r.condition),
+    "seconds": Column(
+        "time of the deformation by the clock, classification included",
+        lambda r: r.seconds,
+        "seconds",
+        ".3f",
+    ),
+    "processor_seconds": Column(
+        "the same, of all processors together", lambda r: r.processor_seconds
+    ),
+}
+"""What ``compare.csv`` has after method, periodic and steps; the last column is ``problem``."""
+
+KEY_COLUMNS = ("method", "periodic", "steps")
+
+
+def csv_text(rows: Sequence[Row]) -> str:
+    """Return the table as CSV; numbers with all their digits, nothing where there is no result."""
+    out = StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*KEY_COLUMNS, *COLUMNS, "problem"])
+    for row in rows:
+        tried = row.combination
+        values: list[Value] = [""] * len(COLUMNS)
+        if row.result is not None:
+            found = [column.value(row.result) for column in COLUMNS.values()]
+            values = ["" if value != value else value for value in found]  # NaN is not itself
+        writer.writerow([tried.method, tried.periodic, tried.steps or "auto", *values, row.problem])
+    return out.getvalue()
+
+
+def history_text(rows: Sequence[Row]) -> str:
+    """Return the convergence of the greedy selections as CSV, a line for each cycle."""
+    out = StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    columns = ("step", "cycle", "level", "error", "control_nodes", "seconds")
+    writer.writerow([*KEY_COLUMNS, *columns])
+    for row in rows:
+        tried = row.combination
+        for step, cycle in row.result.history if row.result else ():
+            values = [getattr(cycle, name) for name in columns[1:]]
+            writer.writerow([tried.method, tried.periodic, tried.steps or "auto", step, *values])
+    return out.getvalue()
+
+
+def save_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all.
+
+    Raises
+    ------
+    CaseError
+        It cannot be written.
+    """
+    with atomic_write(path, CaseError) as file:
+        file.write(text.encode())
+
+
+def terminal_head() -> str:
+    """Return the line above the rows on a terminal."""
+    shown = [_cell(column.head, column) for column in COLUMNS.values() if column.head]
+    return "  ".join([f"{'method':<7} {'periodic':<8}", *shown])
+
+
+def terminal_line(row: Row, told: list[str] | None = None) -> str:
+    """Return a row for a terminal; the reason where there is no result.
+
+    ``told`` has the reasons given so far, and gets those given here: each is written once, and
+    later by its number.
+    """
+    tried = row.combination
+    begin = f"{tried.method:<7} {tried.periodic:<8}"
+    if row.result is None:
+        steps = _cell(str(tried.steps or "auto"), COLUMNS["steps_made"])
+        return f"{begin}  {steps}  not possible {_reason(row.problem, told)}"
+    shown = [
+        _cell(format(column.value(row.result), column.form), column)
+        for column in COLUMNS.values()
+        if column.head
+    ]
+    return "  ".join([begin, *shown])
+
+
+def _reason(problem: str, told: list[str] | None) -> str:
+    """Return a number and the reason, or the number alone where it was told before."""
+    told = [] if told is None else told
+    if problem in told:
+        return f"[{told.index(problem) + 1}]"
+    told.append(problem)
+    return f"[{len(told)}]: {' '.join(problem.split())}"
+
+
+def _cell(text: str, column: Column) -> str:
+    return text.rjust(max(len(column.head), 8 if column.form.endswith("f") else 5))

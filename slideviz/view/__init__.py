@@ -1,1 +1,0 @@
-"""What is seen, without Qt: state, scenes, pictures."""

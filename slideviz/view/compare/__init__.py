@@ -1,1 +1,0 @@
-"""One case by several methods: computed, tabled, plotted."""

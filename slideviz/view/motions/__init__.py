@@ -1,1 +1,0 @@
-"""Motions before they are computed: ghosts, what these hit, and their words."""

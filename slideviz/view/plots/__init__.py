@@ -1,1 +1,0 @@
-"""Curves and histograms, and what they are made of."""

@@ -1,1 +1,0 @@
-"""Cuts through a mesh: planes and cylinders, in space and laid flat."""

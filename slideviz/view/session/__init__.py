@@ -1,1 +1,0 @@
-"""What is open, computed and shown, as frozen values, and what changes it."""
