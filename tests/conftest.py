@@ -5,3 +5,6 @@ from hypothesis import settings
 # No test fails because a machine was busy for a moment.
 settings.register_profile("slideviz", deadline=None)
 settings.load_profile("slideviz")
+
+# Plotters, scenes and small meshes that the tests of several rooms draw.
+pytest_plugins = ["tests.scenes"]

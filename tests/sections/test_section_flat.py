@@ -7,7 +7,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
 from tests.builders import cube, grid, passage, ring
-from tests.view.test_section import areas
+from tests.sections.test_section import areas
 
 
 def turned(mesh, degrees):

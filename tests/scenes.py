@@ -1,3 +1,5 @@
+"""Plotters, scenes and small meshes that the tests of several rooms draw."""
+
 import numpy as np
 import pytest
 import pyvista as pv
