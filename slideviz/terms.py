@@ -121,6 +121,8 @@ SLIDING: dict[Sliding, Term] = {
         "the displacement at once: takes longer.",
     ),
 }
+SLIDES = " or ".join(value for value in SLIDING if value != "none")
+"""The values that let nodes slide, for sentences."""
 
 Method = Literal["rbf", "idw", "elastic"]
 

@@ -55,6 +55,20 @@ def test_only_what_has_a_tip_is_explained():
     assert not terms.tips(terms.PERIODIC_TYPES)
 
 
+def test_each_value_has_what_computes_or_draws_it():
+    from matplotlib import colormaps
+
+    from slideviz.mesh import skew
+    from slideviz.rbf import kernels, methods
+    from slideviz.study.combinations import METHODS
+
+    assert methods.METHODS.keys() == terms.SLIDING.keys()
+    assert skew.METRICS.keys() == terms.METRICS.keys()
+    assert kernels.KERNELS.keys() == terms.KERNELS.keys()
+    assert set(terms.COLOUR_MAPS) <= set(colormaps)
+    assert set(METHODS) == {*terms.SLIDING, *terms.METHODS} - {"rbf"}
+
+
 def test_it_loads_nothing_of_slideviz_and_no_numpy():
     code = "import sys, slideviz.terms; print(*sys.modules)"
     call = [sys.executable, "-c", code]

@@ -11,7 +11,7 @@ from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, mov
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
-from slideviz.terms import ROLES
+from slideviz.terms import ROLES, SLIDES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -170,7 +170,7 @@ def _periodic_problems(case: Case, mesh: Mesh) -> Iterator[str]:
         )
     if case.periodic == "moving" and case.sliding == "none":
         yield (
-            "PERIODIC_MODE= moving needs a sliding method: set SLIDING_MODE= ps or ds, or "
+            f"PERIODIC_MODE= moving needs a sliding method: set SLIDING_MODE= {SLIDES}, or "
             "choose PERIODIC_MODE= fixed"
         )
     if mesh.dim == 2 and case.periodic != "none":
@@ -192,7 +192,7 @@ def idle_roles(case: Case) -> tuple[str, ...]:
     if sliding and case.sliding == "none":
         found.append(
             f"SLIDING_MODE= none: {', '.join(sliding)} will not slide, but stay as they are; with "
-            "SLIDING_MODE= ps or ds they do"
+            f"SLIDING_MODE= {SLIDES} they do"
         )
     return tuple(found)
 

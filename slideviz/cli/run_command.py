@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.terms import SLIDES
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -239,7 +241,7 @@ def _advice(report: dict) -> str:
     if report["method"] != "rbf":
         ideas.append("METHOD= rbf")
     if report["sliding"] == "none":
-        ideas.append("SLIDING_MODE= ps or ds")
+        ideas.append(f"SLIDING_MODE= {SLIDES}")
     if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":
         ideas.append("PERIODIC_MODE= moving for a repeating mesh")
     ideas.append("another role for the boundaries near these cells")
