@@ -13,11 +13,10 @@ from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.export.film_pair import Told
     from slideviz.export.reel import Reel
     from slideviz.mesh.model import Mesh
     from slideviz.scene.moved import Zoom
-    from slideviz.session.state import Frame
+    from slideviz.session.state import Frame, Run
 
 SMOOTH = 4
 """Films of fewer steps are told that images can be put in between."""
@@ -31,24 +30,21 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.run_command import read_case
     from slideviz.export.encode import kind_of
     from slideviz.export.film import film as draw
-    from slideviz.export.film_pair import film_pair, pair_size
+    from slideviz.export.film import require_pair
     from slideviz.export.reel import Reel, check_film
+    from slideviz.session.opening import of_runs
 
     file = arguments.output
     reel = Reel(arguments.size, arguments.fps, arguments.hold, arguments.between)
     check_film(file, reel, overwrite=arguments.force)  # before the work, not after it
     if arguments.beside:
-        pair_size(reel.pixels(file))
+        require_pair(reel.pixels(file))
     case = read_case(arguments)
     if kind_of(file) != ".png":  # of pictures it is not known yet how many there will be
         require_places(arguments, Output(file, "-o"))
-    runs = _runs(arguments, case)
-    look = {"colour_by": arguments.color, "zoom": arguments.zoom}
-    look["overwrite"] = arguments.force
-    if len(runs) == 2:
-        drawing = film_pair((runs[0], runs[1]), file, reel, **look)
-    else:
-        drawing = draw(runs[0].frames, file, reel, **look)
+    first, runs = _runs(arguments, case)
+    session = of_runs(first, runs, arguments.color)
+    drawing = draw(session, file, reel, zoom=arguments.zoom, overwrite=arguments.force)
     with Bar(not arguments.quiet) as bar, closing(drawing):
         for drawn in drawing:
             bar.count(drawn.done, drawn.total, "image")
@@ -59,25 +55,29 @@ def film(arguments: argparse.Namespace) -> int:
     return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
 
 
-def _runs(arguments: argparse.Namespace, case: Case) -> list[Told]:
-    """Return the run of the case, and the one with the changes of ``--beside``."""
-    from slideviz import read
+def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
+    """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
+    from slideviz import quality, read
     from slideviz.cli.run_command import changed
     from slideviz.errors import CaseError
-    from slideviz.export.film_pair import Told
     from slideviz.scene.moved import require_detail
+    from slideviz.session.state import Frame, Run
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     mesh = read(case.mesh_file, zone=case.zone)
     require_detail(arguments.zoom, mesh)
+    first = Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))
     if not arguments.beside:
-        return [Told("", _frames(arguments, case, mesh))]
+        return first, [Run(1, case, _frames(arguments, case, mesh), "done")]
     if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
         raise CaseError("--beside: two runs beside each other must deform the same mesh")
     keys = [text.partition("=")[0].strip().upper() for text in arguments.beside]
-    return [Told(_words(one, keys), _frames(arguments, one, mesh)) for one in (case, other)]
+    return first, [
+        Run(number, one, _frames(arguments, one, mesh), "done", name=_words(one, keys))
+        for number, one in enumerate((case, other), start=1)
+    ]
 
 
 def _words(case: Case, keys: list[str]) -> str:
@@ -94,37 +94,37 @@ def _words(case: Case, keys: list[str]) -> str:
     return ", ".join(words)
 
 
-def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Frame]:
-    """Return the undeformed mesh and every step, with their quality."""
+def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Frame, ...]:
+    """Return every step with its quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.session.state import Frame
 
-    frames = [Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))]
+    frames = []
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             found = quality(step.mesh, reference=mesh, metric=case.quality_metric)
             frames.append(Frame(step.mesh, found, step))
     for warning in step.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
-    return frames
+    return tuple(frames)
 
 
-def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Told]) -> None:
+def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Run]) -> None:
     from slideviz.cli.report import counted
 
     for run in runs:
         last = run.frames[-1].quality
         name = f"{run.name}: " if run.name else ""
-        steps = counted(len(run.frames) - 1, "step")
+        steps = counted(len(run.frames), "step")
         print(f"{name}{steps}, min {last.min:.6g}, mean {last.mean:.6g}, {last.inverted} inverted")
-    most = max(len(run.frames) for run in runs)
+    most = 1 + max(len(run.frames) for run in runs)
     print(f"film: {arguments.output} ({reel.count(most)} images, {reel.pace(most):.3g} a second)")
     if most - 1 < SMOOTH and not arguments.between:
         print("few steps; --between 20 puts 20 images between two of them")
 
 
-def _tell_inverted(arguments: argparse.Namespace, run: Told) -> None:
+def _tell_inverted(arguments: argparse.Namespace, run: Run) -> None:
     last = run.frames[-1].quality
     if last.inverted:
         name = f"{run.name}: " if run.name else ""

@@ -58,10 +58,12 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["write"] += time.perf_counter()
     if arguments.picture:
         from slideviz.export.picture import SIZE, picture
+        from slideviz.session.opening import of_runs
+        from slideviz.session.state import Frame, Run
 
-        named = replace(last.mesh, name=output.name)
-        size = arguments.picture_size or SIZE
-        picture(named, arguments.picture, mesh, found, size, arguments.zoom)
+        named = Frame(replace(last.mesh, name=output.name), found, last)
+        session = of_runs(Frame(mesh, before), [Run(1, case, (named,), "done")])
+        picture(session, arguments.picture, arguments.picture_size or SIZE, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
     report = run_report(case, mesh, steps, found, seconds)
     report["quality"]["undeformed"] = {"min": before.min, "mean": before.mean}

@@ -22,28 +22,6 @@ class Drawn:
     total: int
 
 
-def expose(
-    frames: int, file: Path, reel: Reel, draw: Callable[[float], Pixels]
-) -> Generator[Drawn, None, None]:
-    """Yield after each image that the encoder took.
-
-    Parameters
-    ----------
-    frames : int
-        The undeformed mesh and every step.
-    file : Path
-    reel : Reel
-    draw : callable
-        Draws a position in the film: the number of a step, or something between two.
-    """
-
-    def drawing(position: float) -> Generator[object, Any, Pixels]:
-        yield None
-        return draw(position)
-
-    yield from told(exposing(frames, file, reel, drawing))
-
-
 def told(pieces: Generator[object, Any, None]) -> Generator[Drawn, None, None]:
     """Yield how far the pieces of a film are, all done here."""
     run = here(pieces)
@@ -59,9 +37,17 @@ def exposing(
     reel: Reel,
     draw: Callable[[float], Generator[object, Any, Pixels]],
 ) -> Generator[object, Any, None]:
-    """Yield what `expose` does, and between the pieces of it; what is written is written beside.
+    """Yield `Drawn` after each image that the encoder took, and between the pieces of it.
 
-    ``draw`` draws in pieces, too.
+    Parameters
+    ----------
+    frames : int
+        The undeformed mesh and every step.
+    file : Path
+    reel : Reel
+    draw : callable
+        Draws a position in the film in pieces: the number of a step, or something between two.
+        What is written is written beside.
     """
     total, pace = reel.count(frames), reel.pace(frames)
     samples = []

@@ -1,178 +1,40 @@
 """The steps of a deformation as a film: MP4, GIF, or one picture each.
 
-`film` draws the quality of the steps, `film_of` what a view shows. Both are generators that draw
-one image between two pulls: whoever pulls them owns progress and cancel. Closing one early
-leaves no file. They must be pulled in the thread that may draw.
+Films are generators that draw one image between two pulls: whoever pulls them owns progress and
+cancel. Closing one early leaves no file. They must be pulled in the thread that may draw.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from slideviz.color_scheme import PAPER, Look
 from slideviz.errors import SlidevizError
 from slideviz.export.encode import Pixels
-from slideviz.export.exposure import Drawn, expose, exposing, told
-from slideviz.export.mark_words import name_mark
-from slideviz.export.offscreen import (
-    LETTERS,
-    font_scale,
-    image_of,
-    offscreen,
-    write_title,
-)
-from slideviz.export.portrait import Portrait
+from slideviz.export.exposure import Drawn, exposing, told
+from slideviz.export.offscreen import LETTERS
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure, letters_across, panes
 from slideviz.export.reel import USUAL, Reel, check_film
-from slideviz.export.titles import LETTER_WIDTH, LONGEST, place_words, title_words
-from slideviz.mesh.quality import quality
-from slideviz.mesh.surfaces import Surface
+from slideviz.export.titles import (
+    DETAIL,
+    LETTER_WIDTH,
+    LONGEST,
+    caption,
+    fitting,
+    place_words,
+    title_words,
+)
+from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.moved import Zoom
-from slideviz.session.pieces import Beside, GoingOn, appearing, never
+from slideviz.session.pieces import Beside, GoingOn, never
 from slideviz.session.state import Frame, Session
-from slideviz.terms import ColourBy
 
-if TYPE_CHECKING:
-    from slideviz.scene.scene import Scene
-
-
-def film(
-    frames: Sequence[Frame],
-    file: str | Path,
-    reel: Reel = USUAL,
-    *,
-    colour_by: ColourBy = "size-skew",
-    zoom: Zoom = "auto",
-    overwrite: bool = False,
-) -> Generator[Drawn, None, None]:
-    """Yield after each image of a film that shows the quality of the steps.
-
-    Parameters
-    ----------
-    frames : sequence of Frame
-        The undeformed mesh and every step.
-    file : str or Path
-        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    reel : Reel
-        Size, speed, and images in between.
-    colour_by : {"size-skew", "size", "skew", "displacement"}
-        What the colours say; their range is the same in all images.
-    zoom : Detail, "auto" or "all"
-        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
-    overwrite : bool
-        Allow files that exist.
-
-    Raises
-    ------
-    SlidevizError
-        There are no steps, the film cannot be made like that, or the file cannot be written.
-    """
-    path = Path(file)
-    require_steps(frames, path, reel, overwrite)
-    with offscreen(reel.pixels(path)) as plotter:
-        first, *_, last = (frame.mesh for frame in frames)
-        seen = [frame.mesh for frame in frames]
-        portrait = Portrait(plotter, last, first, colour_by, zoom, seen)
-
-        def draw(position: float) -> Pixels:
-            shot = shot_at(frames, position)
-            portrait.show(shot.frame)
-            words = portrait.caption(shot.words, shot.frame.quality)
-            write_title(plotter, words, PAPER)
-            return image_of(plotter)
-
-        yield from expose(len(frames), path, reel, draw)
-
-
-def film_of(
-    session: Session,
-    surfaces: Sequence[Surface],
-    file: str | Path,
-    reel: Reel = USUAL,
-    *,
-    like: Scene | None = None,
-    overwrite: bool = False,
-) -> Generator[Drawn, None, None]:
-    """Yield after each image of a film of what a view shows, step by step.
-
-    Parameters and errors as of `filming_of`.
-    """
-    yield from told(filming_of(session, surfaces, file, reel, like=like, overwrite=overwrite))
-
-
-def filming_of(
-    session: Session,
-    surfaces: Sequence[Surface],
-    file: str | Path,
-    reel: Reel = USUAL,
-    *,
-    like: Scene | None = None,
-    overwrite: bool = False,
-) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image of a film of what a view shows, and between its pieces.
-
-    Parameters
-    ----------
-    session : Session
-        What is shown and how; its frames are the steps.
-    surfaces : sequence of Surface
-        The boundaries of its mesh.
-    file : str or Path
-        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
-    reel : Reel
-        Size, speed, and images in between.
-    like : Scene, optional
-        The view whose camera, colours and ghosts are taken.
-    overwrite : bool
-        Allow files that exist.
-
-    Raises
-    ------
-    SlidevizError
-        There are no steps, the film cannot be made like that, or the file cannot be written.
-    """
-    from slideviz.scene.scene import Scene
-
-    path, size = Path(file), reel.pixels(Path(file))
-    frames = session.frames
-    require_steps(frames, path, reel, overwrite)
-    look: Look = like.look if like is not None else PAPER
-    letters = size[0] / (LETTER_WIDTH * LETTERS * font_scale(size))
-    longest = LONGEST.format(len(frames) - 1)
-    with offscreen(size) as plotter:
-        yield None
-        plotter.render_window.Render()  # begins with the graphics
-        scene = Scene(plotter, look, LETTERS * font_scale(size))
-        # The camera looks at what is there when the mesh is opened.
-        widest = yield Beside(lambda _: max(frames, key=lambda frame: frame.mesh.extent))
-        yield from scene.opening(_showing(session, widest), surfaces)
-        if like is not None:
-            scene.set_motion_ghosts(like.motion_ghosts)
-            scene.take_camera(like)
-        yield from appearing(plotter)
-
-        def draw(position: float) -> Generator[object, Any, Pixels]:
-            shot = yield Beside(lambda going_on: shot_at(frames, position, going_on))
-            scene.update(_showing(session, shot.frame))
-            words = title_words(session, shot.frame, shot.place, letters, longest)
-            write_title(plotter, words, look)
-            name_mark(plotter, scene, LETTERS * font_scale(size))
-            yield None
-            return image_of(plotter)
-
-        yield from exposing(len(frames), path, reel, draw)
-
-
-def _showing(session: Session, frame: Frame) -> Session:
-    """Return the session with one frame in the place of all its steps, colours as they are."""
-    run = session.run_shown
-    assert run is not None
-    runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
-    # The range of the whole run: that of one frame would change from image to image.
-    view = replace(session.view, frame=1, colour_range=session.colour_range)
-    return replace(session, runs=runs, view=view)
+_NARROWEST = 160
+"""Pixels that each of two pictures beside each other has at least for the mesh."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +49,128 @@ class Shot:
     place: str
 
 
+Titles = Callable[[Sequence[Shot]], tuple[Sequence[str], float]]
+"""Returns the words above what is shown, and the size of their letters; 1 is the usual one."""
+
+
+def film(
+    session: Session,
+    file: str | Path,
+    reel: Reel = USUAL,
+    *,
+    zoom: Zoom = "auto",
+    overwrite: bool = False,
+) -> Generator[Drawn, None, None]:
+    """Yield after each image of a film that shows what one run, or two, did to a mesh.
+
+    Of two runs beside each other the film has the steps of the run that has more of them. Of the
+    other it shows the step that is as far deformed, or, with images in between, a mesh between
+    two steps.
+
+    Parameters
+    ----------
+    session : Session
+        Made of the runs (`slideviz.session.opening.of_runs`).
+    file : str or Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    reel : Reel
+        Size, speed, and images in between.
+    zoom : Detail, "auto" or "all"
+        What part of the mesh is seen; "auto" is the whole, unless what moved is tiny in it.
+    overwrite : bool
+        Allow files that exist.
+
+    Raises
+    ------
+    SlidevizError
+        There are no steps, the film cannot be made like that, or the file cannot be written.
+    """
+    path = Path(file)
+    figure = film_figure(reel.pixels(path), both=session.view.beside is not None)
+    if figure.both:
+        require_pair(figure.size)
+    with Studio.of_runs(session, zoom) as studio:
+        runs = studio.shown(session, figure)
+        titles = _titles_of_runs(runs, figure, studio.shows_detail, reel.between > 0)
+        yield from told(filming(studio, figure, path, reel, titles=titles, overwrite=overwrite))
+
+
+def film_figure(size: tuple[int, int], both: bool = False) -> Figure:
+    """Return what the images of a film have unless something else is asked for."""
+    return Figure(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
+
+
+def filming(
+    studio: Studio,
+    figure: Figure,
+    file: Path,
+    reel: Reel,
+    *,
+    titles: Titles | None = None,
+    overwrite: bool = False,
+) -> Generator[object, Any, None]:
+    """Yield `Drawn` after each image of a film of what a studio shows, and between its pieces.
+
+    Parameters
+    ----------
+    studio : Studio
+        Knows the session, whose steps are shown, and the camera.
+    figure : Figure
+        What an image has.
+    file : Path
+        A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
+    reel : Reel
+        Speed, and images in between.
+    titles : callable, optional
+        Other words above the images than run, step and quality.
+    overwrite : bool
+        Allow files that exist.
+
+    Raises
+    ------
+    SlidevizError
+        There are no steps, the film cannot be made like that, or the file cannot be written.
+    """
+    runs = studio.shown(studio.session, figure)
+    for one in runs:
+        require_steps(one.frames, file, reel, overwrite)
+    write = titles or _titles(runs[0], figure)
+    count = max(len(one.frames) for one in runs)
+    yield from posing(studio, figure)
+
+    def draw(position: float) -> Generator[object, Any, Pixels]:
+        shots = []
+        for one in runs:
+            at = position * (len(one.frames) - 1) / (count - 1)
+            at = round(at, 9 if reel.between else 0)
+            shots.append((yield Beside(partial(shot_at, one.frames, at))))
+        shown = [_showing(one, shot.frame) for one, shot in zip(runs, shots, strict=True)]
+        return (yield from studio.drawing(shown, figure, write(shots)))
+
+    yield from exposing(count, file, reel, draw)
+
+
+def posing(studio: Studio, figure: Figure) -> Generator[object, Any, None]:
+    """Let a studio look as for a film: the step that needs most room is seen whole."""
+    yield from studio.arranging()
+    frames = studio.session.frames
+    widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
+    studio.pose(figure, widest)
+    yield None
+
+
+def require_pair(size: tuple[int, int]) -> None:
+    """Raise SlidevizError where a film is too narrow for two runs beside each other."""
+    figure = film_figure(size, both=True)
+    room = panes(figure, figure.gap)[0].size[0]
+    if room < _NARROWEST:
+        least = size[0] + 2 * (_NARROWEST - room)
+        raise SlidevizError(
+            f"{size[0]}x{size[1]} pixels are too narrow for two runs beside each other; take "
+            f"{least + least % 2} or more in width, or less in height"
+        )
+
+
 def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
     """Raise SlidevizError when there is nothing to make a film of, or it cannot be made so."""
     if len(frames) < 2:
@@ -197,17 +181,11 @@ def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bo
 def shot_at(frames: Sequence[Frame], position: float, going_on: GoingOn = never) -> Shot:
     """Return a step, or, between two steps, a mesh on the way from one to the next."""
     step, steps = int(position), len(frames) - 1
-    words, place = _words(position, steps), place_words(position, steps)
+    place = place_words(position, steps)
     if position == step:
-        return Shot(frames[step], words, place)
+        return Shot(frames[step], place or f"step {step} of {steps}", place)
     frame = _blend(frames[step], frames[step + 1], position - step, frames[0], going_on)
-    return Shot(frame, f"{words}, interpolated", place)
-
-
-def _words(position: float, steps: int) -> str:
-    if position == 0:
-        return "undeformed"
-    return f"step {position:.{0 if position == int(position) else 2}f} of {steps}"
+    return Shot(frame, place, place)
 
 
 def _blend(start: Frame, end: Frame, part: float, first: Frame, going_on: GoingOn) -> Frame:
@@ -216,3 +194,56 @@ def _blend(start: Frame, end: Frame, part: float, first: Frame, going_on: GoingO
     mesh = end.mesh.with_points(points)
     found = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
     return Frame(mesh, found, end.step)
+
+
+def _showing(session: Session, frame: Frame) -> Session:
+    """Return the session with one frame in the place of all its steps, colours as they are."""
+    run = session.run_shown
+    assert run is not None
+    runs = tuple(replace(run, frames=(frame,)) if one is run else one for one in session.runs)
+    # The range of the whole run: that of one frame would change from image to image.
+    view = replace(session.view, frame=1, colour_range=session.colour_range)
+    return replace(session, runs=runs, view=view)
+
+
+def _titles(session: Session, figure: Figure) -> Titles:
+    """Return what writes run, step and quality above the images."""
+    letters = figure.size[0] / (LETTER_WIDTH * figure.scale)
+    longest = LONGEST.format(len(session.frames) - 1)
+
+    def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
+        (shot,) = shots
+        return [title_words(session, shot.frame, shot.place, letters, longest)], 1.0
+
+    return write
+
+
+def _titles_of_runs(runs: Sequence[Session], figure: Figure, detail: bool, between: bool) -> Titles:
+    """Return what writes step and quality above the images, and what two runs are called."""
+    pair, what = len(runs) == 2, runs[0].view.colour_by
+
+    def words(session: Session, place: str, found: Quality) -> str:
+        run, text = session.run_shown, caption(place, found, what)
+        if pair and run is not None:
+            return f"{run.name}{DETAIL if detail else ''}\n{text}"
+        return text + (DETAIL if detail else "")
+
+    # Letters must not change from image to image.
+    far = LONGEST if between else "step {0} of {0}"
+    every = [
+        words(one, far.format(len(one.frames) - 1), frame.quality)
+        for one in runs
+        for frame in one.frames
+    ]
+    longest = max((line for text in every for line in text.splitlines()), key=len)
+    letters = letters_across(panes(figure, figure.gap)[0] if pair else figure)
+
+    def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
+        texts = [
+            words(one, shot.words, shot.frame.quality)
+            for one, shot in zip(runs, shots, strict=True)
+        ]
+        found, part = fitting([*texts, longest], letters)
+        return found[:-1], part
+
+    return write

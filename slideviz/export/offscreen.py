@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from slideviz.color_scheme import Look
 from slideviz.errors import SlidevizError
 from slideviz.export.screen import x_answers
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.scene.color_legend import set_letters
 
 SMALLEST, LARGEST = 64, 8192
@@ -69,25 +68,24 @@ def font_scale(size: tuple[int, int]) -> float:
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
-def write_title(plotter: Any, words: str, look: Look, letters: float = TITLE) -> None:
-    """Write ``words``, a line or two, along the upper edge, in place of what stood there.
+def write_title(plotter: Any, words: str, look: Look, letters: float, room: float) -> None:
+    """Write a line or two along the upper edge, in the middle of so many pixels of height.
 
     They begin at the left, so that those of a film do not tremble when a digit more comes, and
-    pictures have them where films do. ``letters`` is their height in pixels, at normal size.
+    pictures have them where films do. ``letters`` is their height in pixels.
     """
     import pyvista as pv
 
-    scale = font_scale(tuple(plotter.window_size))
     title = pv.Text(words)
-    set_letters(title.prop, look, letters * scale)
+    set_letters(title.prop, look, letters)
     title.prop.SetLineSpacing(1.25)
     # The mesh of a view that was zoomed into may lie behind.
     title.prop.SetBackgroundColor(*pv.Color(look.background_top).float_rgb)
     title.prop.SetBackgroundOpacity(0.7)
     title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-    middle = (10 + 10 * len(words.splitlines())) * scale
-    title.GetPositionCoordinate().SetValue(CAPTION_AT, 1.0 - middle / plotter.window_size[1])
+    high = 1.0 - 0.5 * room / plotter.window_size[1]
+    title.GetPositionCoordinate().SetValue(CAPTION_AT, high)
     plotter.add_actor(title, name="title", reset_camera=False, render=False)
 
 
@@ -116,17 +114,3 @@ def check_png(file: Path) -> None:
     """Raise SlidevizError when the name of a picture does not end with .png."""
     if file.suffix.lower() != ".png":
         raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
-
-
-def write_png(plotter: Any, file: Path, transparent: bool = False) -> None:
-    """Write what the plotter shows as a PNG file, whole or not at all.
-
-    Raises
-    ------
-    SlidevizError
-        The name does not end with .png, or the file cannot be written.
-    """
-    check_png(file)
-    data = png_bytes(image_of(plotter, transparent))
-    with atomic_write(file) as out:
-        out.write(data)

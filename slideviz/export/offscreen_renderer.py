@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.color_scheme import PAPER, Look
+from slideviz.color_scheme import PAPER
 from slideviz.export.mark_words import name_mark
 from slideviz.export.offscreen import (
     LETTERS,
@@ -23,9 +23,11 @@ from slideviz.export.offscreen import (
     resize,
     write_title,
 )
-from slideviz.export.picture_options import GAP, Figure, panes, title_of, titles_of
+from slideviz.export.picture_options import Figure, headings, panes
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.surfaces import Surface
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.surfaces import Surface, find_surfaces
+from slideviz.scene.moved import Overview, Zoom, lengths
 from slideviz.session.changes import seen_beside, show_frame
 from slideviz.session.pieces import appearing, whole
 from slideviz.session.state import Session
@@ -46,18 +48,41 @@ class Studio:
         The boundaries of its mesh.
     like : Scene, optional
         The view whose camera, colours and ghosts are taken.
+    overview : Overview, optional
+        What is seen, and from where, if there is no such view: every step of the runs shown.
     """
 
     def __init__(
-        self, session: Session, surfaces: Sequence[Surface], like: Scene | None = None
+        self,
+        session: Session,
+        surfaces: Sequence[Surface],
+        like: Scene | None = None,
+        overview: Overview | None = None,
     ) -> None:
         self.session = session
         self.surfaces = surfaces
         self.like = like
+        self.overview = overview
         self._stack = ExitStack()
         self._plotter: Any = None
         self._scene: Any = None
         self._making = self._make()
+
+    @classmethod
+    def of_runs(cls, session: Session, zoom: Zoom = "auto") -> Studio:
+        """Return one that shows what the runs of a session did to its mesh.
+
+        Raises
+        ------
+        SlidevizError
+            The detail has not as many coordinates as the mesh, or is no part of it.
+        """
+        base = session.mesh
+        assert base is not None
+        lasts = [run.last.mesh for run in session.runs if run.last is not None]
+        farthest = max(lasts, key=lambda mesh: float(lengths(mesh, base).max()), default=base)
+        overview = Overview.of(farthest, base, zoom)
+        return cls(session, find_surfaces(base) if base.dim == 2 else (), overview=overview)
 
     def arranging(self) -> Iterator[None]:
         """Yield between the pieces of what has to be done before the first picture.
@@ -76,10 +101,13 @@ class Studio:
         self._plotter.render_window.Render()  # begins with the graphics
         yield
         self._scene = Scene(self._plotter, PAPER)
-        yield from self._scene.opening(Figure().showing(self.session), self.surfaces)
+        shown, overview = Figure().showing(self.session), self.overview
+        part = None if overview is None else overview.cells
+        yield from self._scene.opening(shown, self.surfaces, part)
         if self.like is not None:
             self._scene.set_motion_ghosts(self.like.motion_ghosts)
-        yield from appearing(self._plotter)
+        if overview is None:  # else nobody waits for it
+            yield from appearing(self._plotter)
 
     def __enter__(self) -> Studio:
         return self
@@ -95,6 +123,11 @@ class Studio:
     def close(self) -> None:
         """Give the graphics back."""
         self._stack.close()
+
+    @property
+    def shows_detail(self) -> bool:
+        """Tell whether what moved is shown larger, with the rest of the mesh out of sight."""
+        return self.overview is not None and self.overview.detail is not None
 
     @property
     def beside(self) -> Session | None:
@@ -129,20 +162,34 @@ class Studio:
         frame : int, optional
             Another step than the session shows.
         """
-        check_size(figure.size)
         shown = self.session if frame is None else show_frame(self.session, frame)
+        check_size(figure.size)
         yield from self.arranging()
+        sessions = self.shown(shown, figure)
+        if aim:
+            self._aim(sessions[0], figure)
+        return (yield from self.drawing(sessions, figure, headings(sessions, figure)))
+
+    def shown(self, session: Session, figure: Figure) -> tuple[Session, ...]:
+        """Return what stands in a picture of a session, from left to right: it, or two runs."""
         other = self.beside if figure.both else None
-        if other is None:
-            return (yield from self._pane(shown, figure, aim))
-        pair = ordered(shown, other)
-        gap = max(round(GAP * figure.scale), 1)
-        first, second = panes(figure, gap)
-        titles, part = titles_of(pair, first)
-        left = yield from self._pane(pair[0], first, aim, (titles[0], part))
-        # The same camera, so that a length is as long in both.
-        right = yield from self._pane(pair[1], second, False, (titles[1], part))
-        between = np.repeat(left[:, -1:], gap, axis=1)
+        return (session,) if other is None else ordered(session, other)
+
+    def drawing(
+        self, sessions: Sequence[Session], figure: Figure, titles: tuple[Sequence[str], float]
+    ) -> Generator[None, None, Pixels]:
+        """Return the picture of one session or two with titles, and yield between the pieces.
+
+        The camera stays where it is: in both a length is as long. Titles come with the size of
+        their letters, where 1 is that of others.
+        """
+        words, part = titles
+        if len(sessions) == 1:
+            return (yield from self._pane(sessions[0], figure, (words[0], part)))
+        first, second = panes(figure, figure.gap)
+        left = yield from self._pane(sessions[0], first, (words[0], part))
+        right = yield from self._pane(sessions[1], second, (words[1], part))
+        between = np.repeat(left[:, -1:], figure.gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
     def pose(self, figure: Figure, frame: int | None = None) -> Scene:
@@ -150,7 +197,7 @@ class Studio:
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.arranging():
             pass
-        self._prepare(shown, figure)
+        self._aim(shown, figure)
         scene: Scene = self._scene
         return scene
 
@@ -189,63 +236,64 @@ class Studio:
         self,
         session: Session,
         figure: Figure,
-        aim: bool = True,
-        title: tuple[str, float] | None = None,
+        title: tuple[str, float],
     ) -> Generator[None, None, Pixels]:
-        self._prepare(session, figure, aim)
+        self._prepare(session, figure)
         yield
-        plotter = self._plotter
+        plotter, (words, part) = self._plotter, title
         plotter.remove_actor("title", reset_camera=False, render=False)
-        if figure.headed and session.frame is not None:
-            words, part = title or (title_of(session, figure), 1.0)
-            write_title(plotter, words, self._scene.look)
-            # Of the same size as the other letters; of a film as they are there.
-            drawn = plotter.actors["title"]
-            scale = figure.scale / (LETTERS if figure.film else 1.0)
-            drawn.prop.SetFontSize(round(TITLE * scale * part))
-            high = 1.0 - 0.5 * figure.title_room * scale / figure.size[1]
-            drawn.GetPositionCoordinate().SetValue(drawn.GetPosition()[0], high)
+        if words:
+            room = figure.title_room * figure.scale
+            # Those of a film are smaller than its other letters: it has more to say.
+            letters = TITLE * part * figure.scale / (LETTERS if figure.film else 1.0)
+            write_title(plotter, words, self._scene.look, letters, room)
         name_mark(plotter, self._scene, figure.scale)
         return image_of(plotter, figure.background == "transparent")
 
-    def _prepare(self, session: Session, figure: Figure, aim: bool = True) -> None:
+    def _prepare(self, session: Session, figure: Figure) -> None:
+        """Show a session in the size of a picture; the camera stays."""
         plotter, scene = self._plotter, self._scene
         resize(plotter, figure.size)
         scene.stage.font_scale = figure.scale
         scene.stage.has_legend = figure.legend
         scene.stage.has_plate = figure.background != "transparent"
         scene.update(figure.showing(session))
-        scene.set_look(self._look(figure))
         if figure.background == "transparent":
             plotter.set_background("white")  # a gradient would stay opaque
-        if aim:
-            self._aim(figure)
         self._keep_room(figure)
-
-    def _look(self, figure: Figure) -> Look:
-        return self.like.look if figure.background == "shown" and self.like is not None else PAPER
-
-    def _aim(self, figure: Figure) -> None:
-        """Look from where the view looks."""
-        scene, camera = self._scene, self._plotter.camera
-        if self.like is not None:
-            scene.take_camera(self.like)
-        if figure.fill:
-            scene.fit()
-        elif self.like is not None:
-            _keep_width(scene, self.like)
-        if camera.parallel_projection:
-            camera.parallel_scale = camera.parallel_scale / (1.0 - self._top(figure))
-
-    def _top(self, figure: Figure) -> float:
-        """Return which part of the height is the title's."""
-        return min(figure.title_room * figure.scale / figure.size[1], 0.3) if figure.headed else 0.0
 
     def _keep_room(self, figure: Figure) -> None:
         """Keep the rooms of legend and title free of the mesh."""
         right = self._scene.stage.strip() / figure.size[0]
-        self._plotter.camera.SetWindowCenter(right, self._top(figure))
+        self._plotter.camera.SetWindowCenter(right, figure.top)
         self._plotter.renderer.ResetCameraClippingRange()
+
+    def _aim(self, session: Session, figure: Figure) -> None:
+        """Look from where the view looks, in its colours, at what a picture shows."""
+        scene, camera, like = self._scene, self._plotter.camera, self.like
+        if figure.both and self.beside is not None:
+            figure = panes(figure, figure.gap)[0]
+        scene.set_look(PAPER if like is None or figure.background != "shown" else like.look)
+        self._prepare(session, figure)
+        if like is not None:
+            scene.take_camera(like)
+        if self.overview is not None:
+            scene.look_along(self.overview, self._seen(figure))
+        elif figure.fill:
+            scene.fit()
+        elif like is not None:
+            _keep_width(scene, like)
+        # Below the title; a detail has the width that was asked for.
+        if camera.parallel_projection and not self.shows_detail:
+            camera.parallel_scale = camera.parallel_scale / (1.0 - figure.top)
+        self._keep_room(figure)
+
+    def _seen(self, figure: Figure) -> Iterator[Mesh]:
+        """Yield the states of the mesh that an overview must show whole."""
+        for run in self.session.runs:
+            yield from (frame.mesh for frame in run.frames)
+        if figure.film and self.session.mesh is not None:
+            yield self.session.mesh
 
 
 def ordered(first: Session, second: Session) -> tuple[Session, Session]:

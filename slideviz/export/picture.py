@@ -1,44 +1,44 @@
-"""A picture of the quality of a mesh, drawn off-screen for the command line."""
+"""Pictures of what runs did to a mesh, as the command line wants them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from slideviz.color_scheme import PAPER
-from slideviz.export.offscreen import check_png, offscreen, write_png, write_title
-from slideviz.export.portrait import Portrait
+from slideviz.case.model import Case
+from slideviz.export.encode import Pixels
+from slideviz.export.offscreen import check_png
+from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.picture_options import Figure
+from slideviz.export.titles import DETAIL, caption
 from slideviz.mesh.model import Mesh
-from slideviz.mesh.quality import Quality
-from slideviz.mesh.quality import quality as measure
 from slideviz.scene.moved import Zoom
-from slideviz.session.state import Frame
+from slideviz.session.opening import of_runs
+from slideviz.session.pieces import whole
+from slideviz.session.state import Frame, Run, Session
 
-SIZE = (1600, 1000)
+SIZE = Figure.size
+WHITE = 250
+"""Above this in red, green and blue, a pixel is background."""
+_SMALL = 10
+"""Pixels: cells smaller than this, on average, are drawn without edges."""
 
 
 def picture(
-    mesh: Mesh,
-    file: str | Path,
-    reference: Mesh | None = None,
-    quality: Quality | None = None,
-    size: tuple[int, int] = SIZE,
-    zoom: Zoom = "auto",
+    session: Session, file: str | Path, size: tuple[int, int] = SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of a mesh coloured by size-skew.
+    """Write a PNG of a mesh in the colours of its quality, with that in words.
 
-    A 2D mesh is shown whole. Of a 3D mesh the half behind a plane is shown, cells uncut, with
-    its boundaries; the plane goes through what moved most and along the way it moved.
+    A 2D mesh is shown whole. Of a 3D mesh the half behind a plane is shown, cells uncut; the
+    plane goes through what moved most and along the way it moved.
 
     Parameters
     ----------
-    mesh : Mesh
-        The deformed mesh.
+    session : Session
+        Shows a run, or a mesh alone (`slideviz.session.opening.of_runs`).
     file : str or Path
         The PNG file.
-    reference : Mesh, optional
-        The undeformed mesh: for the quality, and for where to cut.
-    quality : Quality, optional
-        That of ``mesh``, when it is known already.
     size : (int, int)
         Width and height in pixels.
     zoom : Detail, "auto" or "all"
@@ -50,10 +50,36 @@ def picture(
         The size cannot be drawn, or the file cannot be written.
     """
     check_png(Path(file))
-    found = quality or measure(mesh, reference)
-    with offscreen(size) as plotter:
-        base = reference if reference is not None else mesh
-        portrait = Portrait(plotter, mesh, base, zoom=zoom)
-        portrait.show(Frame(mesh, found))
-        write_title(plotter, portrait.caption(Path(mesh.name).name, found), PAPER)
-        write_png(plotter, Path(file))
+    assert session.frame is not None
+    with Studio.of_runs(session, zoom) as studio:
+        words = caption(Path(session.frame.mesh.name).name, session.frame.quality)
+        words += DETAIL if studio.shows_detail else ""
+        studio.write(Figure(size, title=True, heading=words), Path(file))
+
+
+def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixels]:
+    """Return a square picture (side, side, 3) of each mesh, without legend, all from one camera.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        What became of the mesh.
+    base : Mesh
+        The undeformed mesh.
+    side : int
+        Pixels.
+    """
+    runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
+    session = of_runs(Frame(base, frames[0].quality), runs)
+    with Studio.of_runs(session) as studio:
+        figure = Figure((side, side), legend=False, edges=False, both=False, film=True)
+        scene = studio.pose(figure)
+
+        def draw(run: Run, figure: Figure) -> Pixels:
+            shown = replace(session, shown=run.number)
+            return whole(studio.drawing([shown], figure, ([""], 1.0)))
+
+        inked = int((draw(runs[0], figure) < WHITE).any(axis=2).sum())
+        # Edges of small cells would hide their colours.
+        figure = replace(figure, edges=inked >= scene.polygons * _SMALL**2)
+        return [draw(run, figure) for run in runs]

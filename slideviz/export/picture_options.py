@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from slideviz.export.offscreen import CAPTION_AT, SMALLEST, font_scale
+from slideviz.export.offscreen import CAPTION_AT, LETTERS, SMALLEST, font_scale
 from slideviz.export.titles import (
     LETTER_WIDTH,
     LONGEST,
     fitting,
-    name_words,
     pair_titles,
     place_words,
     title_words,
@@ -61,6 +60,8 @@ class Figure:
         Draw the cell that is marked, if one is, and name it.
     lines : int
         Lines of the title.
+    heading : str
+        The title itself, if it is another one.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -77,6 +78,7 @@ class Figure:
     named: bool = False
     marked: bool = True
     lines: int = 1
+    heading: str = ""
 
     @property
     def headed(self) -> bool:
@@ -87,6 +89,16 @@ class Figure:
     def title_room(self) -> float:
         """Return how many pixels at the top are the title's, at normal letter size."""
         return TITLE_ROOM + 20.0 * (self.lines - 1)
+
+    @property
+    def top(self) -> float:
+        """Return which part of the height is the title's."""
+        return min(self.title_room * self.scale / self.size[1], 0.3) if self.headed else 0.0
+
+    @property
+    def gap(self) -> int:
+        """Return how many pixels are between two pictures beside each other."""
+        return max(round(GAP * self.scale), 1)
 
     @property
     def scale(self) -> float:
@@ -127,7 +139,9 @@ def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     sizes = (first, height), (max(width - first - gap, 1), height)
     # Letters go by the height, which is that of the whole.
     lines = 2 if figure.title else 1
-    left, right = (replace(figure, size=size, named=True, lines=lines) for size in sizes)
+    left, right = (
+        replace(figure, size=size, both=False, named=True, lines=lines) for size in sizes
+    )
     return replace(left, legend=False), right
 
 
@@ -137,8 +151,6 @@ def title_of(session: Session, figure: Figure) -> str:
     assert frame is not None
     steps = len(session.frames) - 1
     at, letters = min(session.view.frame, steps), figure.size[0] / (LETTER_WIDTH * figure.scale)
-    if not figure.title:
-        return name_words(session, letters)
     longest = LONGEST.format(steps) if figure.film else ""
     return title_words(session, frame, place_words(at, steps), letters, longest)
 
@@ -148,8 +160,24 @@ def titles_of(pair: Sequence[Session], figure: Figure) -> tuple[list[str], float
 
     ``figure`` is the narrower of both; 1 is the size of other titles.
     """
-    letters = (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / (LETTER_WIDTH * figure.scale)
-    return fitting(pair_titles(pair, figure.title), letters)
+    return fitting(pair_titles(pair, figure.title), letters_across(figure))
+
+
+def headings(shown: Sequence[Session], figure: Figure) -> tuple[list[str], float]:
+    """Return the words above a picture of one session or two, and how large their letters are."""
+    if len(shown) == 2:
+        return titles_of(shown, panes(figure, figure.gap)[0])
+    if not figure.headed:
+        return [""], 1.0
+    if figure.heading:
+        return fitting([figure.heading], letters_across(figure))
+    return [title_of(shown[0], figure)], 1.0
+
+
+def letters_across(figure: Figure) -> float:
+    """Return how many letters a line of the title has room for."""
+    letters = LETTER_WIDTH * figure.scale / (LETTERS if figure.film else 1.0)
+    return (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / letters
 
 
 def words_of_size(figure: Figure) -> str:

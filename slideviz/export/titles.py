@@ -4,16 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from slideviz.export.portrait import caption
+from slideviz.mesh.quality import Quality
 from slideviz.session.runs_words import apart, differing, method_words, run_words
 from slideviz.session.state import Frame, Run, Session
+from slideviz.terms import ColourBy
 
 LETTER_WIDTH = 9.6
 """Pixels that a letter of a title takes, at normal size."""
+DETAIL = " (whole mesh; detail shown)"
+"""Beside the quality of a mesh of which a part is seen."""
 _SMALLEST = 0.6
 """Letters of two titles beside each other become so small, as a part of their size."""
 LONGEST = "step {0}.00 of {0}, interpolated"
 """The place in a film that needs most room: a title must not change from image to image."""
+
+
+def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
+    """Return what a picture shows, and the quality there, in a line."""
+    what = "" if colour_by == "size-skew" else "size-skew "
+    text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
+    if found.inverted:
+        text += f", {found.inverted} of {found.cells} cells inverted"
+    return text
 
 
 def place_words(position: float, steps: int) -> str:
@@ -77,12 +89,6 @@ def title_words(
             if len(text) <= letters:
                 return text
     return text
-
-
-def name_words(session: Session, letters: float) -> str:
-    """Return which run or mesh is shown, without its quality, in so many letters."""
-    names = ["Undeformed"] if session.view.frame == 0 else names_of(session)
-    return next((name for name in names if len(name) <= letters), names[-1])
 
 
 def pair_names(pair: Sequence[Session]) -> list[str]:

@@ -160,12 +160,14 @@ def film_of_passage(path: Path) -> Path:
     from slideviz.export.film import film
     from slideviz.export.reel import Reel
     from slideviz.mesh.quality import quality as quality_of
-    from slideviz.session.state import Frame
+    from slideviz.session.opening import of_runs
+    from slideviz.session.state import Frame, Run
 
     made = sample("passage", 24)
-    steps = deform(made.case.change(motions=FAR), made.mesh)
-    frames = [Frame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps]
-    frames.insert(0, Frame(made.mesh, quality_of(made.mesh)))
-    for _ in film(frames, path, Reel((480, 300), 5.0, 1.5, 1), overwrite=True):
+    case = made.case.change(motions=FAR)
+    steps = deform(case, made.mesh)
+    frames = tuple(Frame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps)
+    session = of_runs(Frame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")])
+    for _ in film(session, path, Reel((480, 300), 5.0, 1.5, 1), overwrite=True):
         pass
     return path

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
 
 from slideviz.color_scheme import COLOUR_MAP, INVERTED_COLOUR
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, facet_connectivity, lifted, padded
 
 VALUES = "values"
+CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
+"""Names under which VTK's surfaces keep where cells and points come from."""
 LIFT = 1e-4
 """Lines of a 2D mesh are drawn this part of its extent above the cells."""
 
@@ -73,11 +76,40 @@ def cell_shape(mesh: Mesh) -> Any:
     return shape
 
 
-def volume(mesh: Mesh) -> Any:
-    """Return all cells of a mesh as an UnstructuredGrid, in the order of the cells."""
-    cells = mesh.cells
-    flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-    return pv.UnstructuredGrid(flat, cells.types, padded(mesh.points))
+def part_shape(mesh: Mesh, cells: IntArray) -> Any:
+    """Return some cells (k,) of a mesh as PolyData: themselves in 2D, their outside in 3D.
+
+    Its cell data ``CELL`` are the owners of the polygons, numbers in the mesh; its point data
+    ``POINT`` the nodes.
+    """
+    offsets, corners, nodes = _corners_of(mesh, cells)
+    points = lifted(mesh.points[nodes], 0.0)
+    table = pv.CellArray.from_arrays(offsets, corners)
+    if mesh.dim == 2 or not len(cells):
+        shape = pv.PolyData()
+        shape.points = points
+        shape.SetPolys(table)
+        shape.point_data[POINT], shape.cell_data[CELL] = nodes, cells
+        return shape
+    grid = pv.UnstructuredGrid()
+    grid.points = points
+    grid.SetCells(numpy_to_vtk(mesh.cells.types[cells], deep=True), table)
+    shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
+    shape.point_data[POINT] = nodes[shape.point_data[POINT]]
+    shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
+    return shape
+
+
+def _corners_of(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return offsets (k + 1,) and corners of some cells in new numbers of nodes, and the nodes."""
+    every = mesh.cells
+    sizes = every.offsets[cells + 1] - every.offsets[cells]
+    offsets = np.concatenate(([0], np.cumsum(sizes)))
+    ramp = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
+    old = every.connectivity[np.repeat(every.offsets[cells], sizes) + ramp]
+    used = np.zeros(len(mesh.points), bool)
+    used[old] = True
+    return offsets, (np.cumsum(used) - 1)[old], np.flatnonzero(used)
 
 
 def place(shape: Any, points: FloatArray, lift: float = 0.0) -> None:

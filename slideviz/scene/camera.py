@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import to_display
 from slideviz.scene.stage import Stage
 
@@ -60,27 +62,34 @@ class Eye:
     def look_from(self, side: str, parallel: bool) -> None:
         """Look at everything from a side: a key of `SIDES`."""
         towards, up = SIDES[side]
+        self.turn(np.asarray(towards, float), np.asarray(up, float), parallel)
+        self.fit()
+
+    def turn(self, towards: FloatArray, up: FloatArray, parallel: bool) -> None:
+        """Look at the middle from a direction (3,), from the mesh to the camera."""
         bounds = np.array(self.stage.plotter.bounds).reshape(3, 2)
         centre = bounds.mean(axis=1)
         camera = self._camera
         camera.focal_point = centre
         away = max(np.ptp(bounds, axis=1).max(), 1e-300)
-        camera.position = centre + np.asarray(towards, float) * away
+        camera.position = centre + towards * away
         camera.up = up
         camera.parallel_projection = parallel
-        self.fit()
 
-    def fit(self) -> None:
-        """Make everything fill the view, from the present side, beside the legend's strip."""
+    def fit(self, clouds: Iterable[FloatArray] = ()) -> None:
+        """Make everything fill the view, from the present side, beside the legend's strip.
+
+        ``clouds`` are more points (n, 3) to be seen: where the same things are at other steps.
+        """
         self.shift()
-        found = self._whole()
+        found = self._whole(clouds)
         if found is None:
             return
         centre, half, depth = found
         self.aim(centre, half, depth)
         self._fitted = self.place
 
-    def _whole(self) -> tuple[Any, float, float] | None:
+    def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
         """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
         eyes = [self] if self.beside is None else [self, self.beside]
         shapes = [shape for eye in eyes for shape in eye._shapes()]
@@ -88,9 +97,10 @@ class Eye:
             return None
         axes = self._axes()
         # Not all points at once: of large meshes, a copy of them takes longer than all else.
-        along = [axes @ np.asarray(shape.points).T for shape in shapes]
-        low = np.min([one.min(axis=1) for one in along], axis=0)
-        high = np.max([one.max(axis=1) for one in along], axis=0)
+        clouds = chain((np.asarray(shape.points) for shape in shapes), clouds)
+        along = (axes @ points.T for points in clouds)
+        ends = np.array([(one.min(axis=1), one.max(axis=1)) for one in along])
+        low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
         extent = high - low
         half = max(eye._half(extent) for eye in eyes)
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))

@@ -13,9 +13,8 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, lifted
 from slideviz.scene import actors
-from slideviz.scene.actors import VALUES
+from slideviz.scene.actors import VALUES, part_shape
 from slideviz.scene.stage import Stage
-from slideviz.scene.threshold import part_shape
 from slideviz.session.inspect import nodes_of
 from slideviz.session.state import Session
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from slideviz.color_scheme import SELECTED_COLOUR
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import VALUES, Band, Drawn
+from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn
 from slideviz.scene.shaders import see_through
 from slideviz.scene.stage import Stage
 from slideviz.session.state import Session
@@ -38,10 +38,17 @@ def recoloured(old: Session | None, new: Session) -> bool:
 
 
 class CellLayer:
-    """All cells of a 2D mesh, or the outside of a 3D mesh without markers."""
+    """All cells of a 2D mesh; of a 3D mesh the outside of a part, or of all without markers.
+
+    Attributes
+    ----------
+    part : (k,) int64 or None
+        The cells of a 3D mesh that are drawn; None is all of them.
+    """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
+        self.part: IntArray | None = None
         self.shape: Any = None
         self.actor: Any = None
 
@@ -52,13 +59,17 @@ class CellLayer:
         if mesh.dim == 2:
             shape = actors.cell_shape(mesh)
         elif not surfaces:
-            shape = actors.volume(mesh).extract_surface(algorithm="geometry")
+            part = np.arange(len(mesh.cells)) if self.part is None else self.part
+            shape = actors.part_shape(mesh, part)
             shape.cell_data[VALUES] = np.zeros(shape.n_cells)
         else:
             return
         self.shape = shape
         self.actor = self.stage.add(shape, "cells", lighting=mesh.dim == 3)
         self.actor.prop.line_width = 1.0
+        if mesh.dim == 3:
+            # Together 1: more would give other colours than the bar has.
+            self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
 
     def clear(self) -> None:
         """Forget the mesh."""
@@ -68,21 +79,23 @@ class CellLayer:
         """Return the data set of the cells."""
         return [] if self.shape is None else [self.shape]
 
+    def points(self, mesh: Mesh) -> FloatArray:
+        """Return the points (k, d) of the cells drawn in another state of the mesh."""
+        if self.shape is None or mesh.dim == 2:
+            return mesh.points
+        return np.asarray(mesh.points[self.shape.point_data[POINT]])
+
     def update(self, old: Session | None, new: Session) -> None:
         """Show another state."""
         if self.actor is None or new.mesh is None or new.frame is None:
             return
         by_value = new.view.colour_by != "role"
         if old is None or old.frame is not new.frame:
-            if new.mesh.dim == 2:
-                actors.place(self.shape, new.frame.mesh.points)
-            else:
-                ids = self.shape.point_data["vtkOriginalPointIds"]
-                actors.place(self.shape, new.frame.mesh.points[ids])
+            actors.place(self.shape, self.points(new.frame.mesh))
         if by_value and recoloured(old, new):
             values = self.stage.values(new)
             if new.mesh.dim == 3:
-                values = values[self.shape.cell_data["vtkOriginalCellIds"]]
+                values = values[self.shape.cell_data[CELL]]
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.look.cell

@@ -9,7 +9,6 @@ import numpy as np
 
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.scene.actors import volume
 
 TINY = 0.05
 """Moved boundaries smaller than this part of the mesh are shown in detail."""
@@ -54,6 +53,42 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
         ends = zip("xyz", low, high, strict=False)
         box = ", ".join(f"{axis} from {a:.6g} to {b:.6g}" for axis, a, b in ends)
         raise SlidevizError(f"a detail about {place} misses the mesh, which has {box}")
+
+
+@dataclass(frozen=True, eq=False)
+class Overview:
+    """Which cells of a mesh are seen, and from where, as long as nobody chooses that.
+
+    Attributes
+    ----------
+    cells : (k,) int64
+        Those of a 3D mesh that are drawn.
+    towards, up : (3,) float64
+        From the mesh to the camera, and what is up.
+    detail : Detail or None
+        The part that is seen; None is everything.
+    """
+
+    cells: IntArray
+    towards: FloatArray
+    up: FloatArray
+    detail: Detail | None
+
+    @classmethod
+    def of(cls, mesh: Mesh, base: Mesh, zoom: Zoom = "auto") -> Overview:
+        """Return that of a deformed mesh, whose nodes were where they are in ``base``.
+
+        A 2D mesh is seen from above. Of a 3D mesh the half behind a plane is seen, cells uncut;
+        the plane goes through what moved most and along the way it moved.
+
+        Raises
+        ------
+        SlidevizError
+            The detail has not as many coordinates as the mesh, or is no part of it.
+        """
+        require_detail(zoom, base)
+        detail = tiny_motion(mesh, base) if zoom == "auto" else zoom
+        return cls(*half_of(mesh, base), detail if isinstance(detail, Detail) else None)
 
 
 def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
@@ -111,13 +146,15 @@ def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
         free = along < 0.5 * along.max()
         across = int(np.argmax(np.where(free, extent, -1.0))) if free.any() else int(along.argmin())
     # By where the cells were: what lay in one layer of a structured mesh stays together.
-    middle = volume(base).cell_centers().points[:, across]
+    cells = base.cells
+    total = np.add.reduceat(base.points[cells.connectivity, across], cells.offsets[:-1])
+    middle = total / np.diff(cells.offsets)
     behind = np.flatnonzero(middle <= centre[across] + 1e-3 * extent[across])
     normal = np.zeros(3)
     normal[across] = 1.0
     up = np.array([0.0, 1.0, 0.0]) if across == 2 else np.array([0.0, 0.0, 1.0])
-    cells = behind if len(behind) else np.arange(len(mesh.cells))
-    return cells, normal + 0.4 * np.cross(up, normal) + 0.3 * up, up
+    shown = behind if len(behind) else np.arange(len(cells))
+    return shown, normal + 0.4 * np.cross(up, normal) + 0.3 * up, up
 
 
 def _moved_body(base: Mesh, length: FloatArray) -> IntArray:

@@ -7,21 +7,22 @@ thread that owns the plotter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from slideviz.color_scheme import LIGHT, Look
-from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.surfaces import Surface
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick, pick_cell
-from slideviz.scene.actors import Drawn
+from slideviz.scene.actors import CELL, Drawn
 from slideviz.scene.camera import Eye
 from slideviz.scene.ghosts import GhostLayer
 from slideviz.scene.legend import LegendLayer
 from slideviz.scene.marked_cell import MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
+from slideviz.scene.moved import Overview
 from slideviz.scene.passages import CopyLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
@@ -87,6 +88,11 @@ class Scene:
         """Return the boundaries, by name."""
         return self._boundaries.drawn
 
+    @property
+    def polygons(self) -> int:
+        """Return how many polygons of cells are drawn: of a 2D mesh, all its cells."""
+        return 0 if self._cells.shape is None else int(self._cells.shape.n_cells)
+
     # What is in the scene ---------------------------------------------------------------
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -94,9 +100,15 @@ class Scene:
         for _ in self.opening(session, surfaces):
             pass
 
-    def opening(self, session: Session, surfaces: Sequence[Surface]) -> Iterator[None]:
-        """Draw another mesh, and yield between the pieces of that."""
+    def opening(
+        self, session: Session, surfaces: Sequence[Surface], part: IntArray | None = None
+    ) -> Iterator[None]:
+        """Draw another mesh, and yield between the pieces of that.
+
+        Of a 3D mesh ``part`` are the cells (k,) to draw where no boundaries are.
+        """
         self.clear()
+        self._cells.part = part
         if session.mesh is None:
             return
         self.session = session
@@ -160,6 +172,20 @@ class Scene:
     def look_from(self, side: str) -> None:
         """Look at all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
         self.eye.look_from(side, self._parallel())
+
+    def look_along(self, view: Overview, meshes: Iterable[Mesh]) -> None:
+        """Look at all that is drawn of some states of the mesh, or at the detail of a view."""
+        mesh = self.session.mesh
+        assert mesh is not None
+        self.eye.turn(view.towards, view.up, True)
+        if view.detail is None:
+            self.eye.fit(padded(self._cells.points(one)) for one in meshes)
+            return
+        width, height = self.plotter.window_size
+        free = max(width - self.stage.strip(), 1.0)
+        half = view.detail.width / min(free, 1.3 * height) * height / 2.0
+        self.eye.shift()
+        self.eye.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
 
     def _parallel(self) -> bool:
         mesh = self.session.mesh
@@ -233,7 +259,7 @@ class Scene:
             (one.actor, one.surface.owner) for name, one in self.drawn.items() if name not in hidden
         ]
         if self._cells.actor is not None:
-            owner = self._cells.shape.cell_data["vtkOriginalCellIds"]
+            owner = self._cells.shape.cell_data[CELL]
             shown.append((self._cells.actor, np.asarray(owner)))
         return shown
 

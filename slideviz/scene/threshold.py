@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk
 
-from slideviz.mesh.model import IntArray, Mesh
-from slideviz.mesh.surfaces import Surface, lifted
+from slideviz.mesh.model import IntArray
+from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import VALUES
+from slideviz.scene.actors import CELL, POINT, VALUES, part_shape
 from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
 from slideviz.scene.shaders import see_through
 from slideviz.scene.stage import Stage
@@ -20,8 +18,6 @@ from slideviz.sections.threshold import chosen_cells
 from slideviz.session.state import Session
 
 NAME = "chosen"
-CELL, POINT = "vtkOriginalCellIds", "vtkOriginalPointIds"
-"""Names under which VTK's surfaces keep where cells and points come from."""
 
 
 class ChosenLayer:
@@ -122,39 +118,3 @@ class ChosenLayer:
             self.actor = self.stage.add(self.shape, NAME, lighting=mesh.dim == 3)
             self.actor.prop.line_width = 1.0
             self.actor.prop.ambient, self.actor.prop.diffuse = 0.6, 0.4
-
-
-def part_shape(mesh: Mesh, cells: IntArray) -> Any:
-    """Return some cells (k,) of a mesh as PolyData: themselves in 2D, their outside in 3D.
-
-    Its cell data ``CELL`` are the owners of the polygons, numbers in the mesh; its point data
-    ``POINT`` the nodes.
-    """
-    offsets, corners, nodes = _connectivity(mesh, cells)
-    points = lifted(mesh.points[nodes], 0.0)
-    table = pv.CellArray.from_arrays(offsets, corners)
-    if mesh.dim == 2 or not len(cells):
-        shape = pv.PolyData()
-        shape.points = points
-        shape.SetPolys(table)
-        shape.point_data[POINT], shape.cell_data[CELL] = nodes, cells
-        return shape
-    grid = pv.UnstructuredGrid()
-    grid.points = points
-    grid.SetCells(numpy_to_vtk(mesh.cells.types[cells], deep=True), table)
-    shape = grid.extract_surface(algorithm="geometry", pass_pointid=True, pass_cellid=True)
-    shape.point_data[POINT] = nodes[shape.point_data[POINT]]
-    shape.cell_data[CELL] = cells[shape.cell_data[CELL]]
-    return shape
-
-
-def _connectivity(mesh: Mesh, cells: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Return offsets (k + 1,) and corners of some cells in new numbers of nodes, and the nodes."""
-    every = mesh.cells
-    sizes = every.offsets[cells + 1] - every.offsets[cells]
-    offsets = np.concatenate(([0], np.cumsum(sizes)))
-    ramp = np.arange(offsets[-1]) - np.repeat(offsets[:-1], sizes)
-    old = every.connectivity[np.repeat(every.offsets[cells], sizes) + ramp]
-    used = np.zeros(len(mesh.points), bool)
-    used[old] = True
-    return offsets, (np.cumsum(used) - 1)[old], np.flatnonzero(used)

@@ -13,7 +13,8 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.guess import guess_case, guess_roles
 from slideviz.session.keep import kept_view
-from slideviz.session.state import Frame, Session, ViewState
+from slideviz.session.state import Frame, Run, Session, ViewState
+from slideviz.terms import ColourBy
 
 MANY_NODES = 20_000
 """Boundary nodes from which on a mesh is opened with data reduction."""
@@ -57,3 +58,25 @@ def _guess_reduction(session: Session, mesh: Mesh) -> Session:
 def suggested_reduction(mesh: Mesh) -> Reduction:
     """Return data reduction with a tolerance that suits the size of the mesh: 1e-5 of it."""
     return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
+
+
+def of_runs(first: Frame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew") -> Session:
+    """Return a session that shows the last step of a run, with that of a second one beside it.
+
+    Parameters
+    ----------
+    first : Frame
+        The undeformed mesh.
+    runs : sequence of Run
+        Of that mesh: none, one or two, each with another number.
+    colour_by : {"size-skew", "size", "skew", "displacement"}
+        What the colours say; their range holds all runs.
+    """
+    last, beside = 0, None
+    if runs:
+        last = len(runs[0].frames)
+        beside = runs[1].number if len(runs) > 1 else None
+    case = runs[0].case if runs else Case()
+    view = ViewState(colour_by=colour_by, frame=last, beside=beside)
+    shown = runs[0].number if runs else None
+    return Session(first.mesh, None, case, first=first, runs=tuple(runs), shown=shown, view=view)

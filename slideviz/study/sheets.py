@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from slideviz.export.offscreen import image_of, offscreen
-from slideviz.export.portrait import Portrait
+from slideviz.export.picture import pictures_alike
 from slideviz.mesh.model import Mesh
-from slideviz.mesh.quality import Quality
-from slideviz.mesh.surfaces import padded
 from slideviz.session.state import Frame
 from slideviz.study.combinations import METHODS, MODES, Result, Row
-from slideviz.study.page import WHITE, Image, Page, Place, compose, tile_width
+from slideviz.study.page import Image, Page, Place, compose, tile_width
 from slideviz.study.wanted import TITLES, reasons, words_for
 
 if TYPE_CHECKING:
@@ -24,8 +19,6 @@ DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
 _OVERSAMPLED = 2
 """Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
-_SMALL = 10
-"""Pixels: cells smaller than this, on average, are drawn without edges."""
 
 
 def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
@@ -63,7 +56,8 @@ def sheet(rows: Sequence[Row], base: Mesh) -> Figure | None:
     names = [tuple(name for _, name in axis.values()) for axis in (methods, modes)]
     if len(modes) == 1 or len(methods) > 2 * len(modes):  # the methods beside each other
         names, places = names[::-1], {at[::-1]: row for at, row in places.items()}
-    drawn = _images(list(kept.values()), base, tile_width(len(names[0]), len(names[1])))
+    side = int(tile_width(len(names[0]), len(names[1])) * DPI * _OVERSAMPLED)
+    drawn = pictures_alike([Frame(*one) for one in kept.values()], base, side)
     images = dict(zip(kept, drawn, strict=True))
     inverted = any(found.inverted for _, found in kept.values())
     return compose(_page((names[0], names[1]), places, rows, images, inverted))
@@ -121,38 +115,3 @@ def _numbers(result: Result) -> str:
     found = result.quality
     text = f"min {found.min:.3f}, mean {found.mean:.3f}"
     return f"{text}\n{found.inverted} inverted" if found.inverted else text
-
-
-def _images(results: Sequence[tuple[Mesh, Quality]], base: Mesh, inches: float) -> list[Image]:
-    """Return a picture of each mesh, all seen by the same camera."""
-    side = int(inches * DPI * _OVERSAMPLED)
-    with offscreen((side, side)) as plotter:
-        portrait = Portrait(plotter, results[0][0], base)
-        if portrait.detail is None:
-            _fit(plotter, [base, *(mesh for mesh, _ in results)])
-        shown = list(plotter.actors.values())
-        images: list[Image] = []
-        for mesh, found in results:
-            portrait.show(Frame(mesh, found))
-            for name in list(plotter.scalar_bars.keys()):
-                plotter.remove_scalar_bar(name, render=False)
-            if not images and _crowded(image_of(plotter), shown):
-                for actor in shown:
-                    actor.prop.show_edges = False
-            images.append(image_of(plotter))
-    return images
-
-
-def _crowded(image: Image, actors: Sequence[Any]) -> bool:
-    """Tell whether cells are so small that their edges would hide their colours."""
-    cells = sum(actor.mapper.dataset.n_cells for actor in actors)
-    return int((image < WHITE).any(axis=2).sum()) < cells * _SMALL**2
-
-
-def _fit(plotter: Any, meshes: Sequence[Mesh]) -> None:
-    """Let the camera see all meshes, in the middle of the picture."""
-    low = np.min([padded(mesh.points).min(axis=0) for mesh in meshes], axis=0)
-    high = np.max([padded(mesh.points).max(axis=0) for mesh in meshes], axis=0)
-    plotter.camera.SetWindowCenter(0.0, 0.0)
-    plotter.renderer.ResetCameraScreenSpace(np.stack([low, high], axis=1).ravel(), 0.98)
-    plotter.renderer.ResetCameraClippingRange()

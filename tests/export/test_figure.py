@@ -9,8 +9,10 @@ from matplotlib.colors import to_rgb
 
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
-from slideviz.export import film, vector
 from slideviz.export import offscreen_renderer as studio_module
+from slideviz.export import vector
+from slideviz.export.exposure import told
+from slideviz.export.film import filming
 from slideviz.export.mark_words import mark_words
 from slideviz.export.offscreen_renderer import Studio, sees_all
 from slideviz.export.picture_options import TITLE_ROOM, Figure, panes, title_of, words_of_size
@@ -231,26 +233,23 @@ def test_drawings_of_two_runs_stand_as_the_views_do(session, studio):
     assert right.get_text().startswith("Run 1, no sliding")
 
 
-def test_a_film_has_the_titles_of_its_preview(session, studio, square, tmp_path, monkeypatch):
-    said = {"film": [], "studio": []}
-    for name, module in (("film", film), ("studio", studio_module)):
-        write = module.write_title
+def test_a_film_has_the_titles_of_its_preview(session, studio, tmp_path, monkeypatch):
+    said = []
+    write = studio_module.write_title
 
-        def keep(plotter, text, look, *, name=name, write=write):
-            said[name].append(text)
-            write(plotter, text, look)
+    def keep(plotter, text, *rest):
+        said.append(text)
+        write(plotter, text, *rest)
 
-        monkeypatch.setattr(module, "write_title", keep)
-    for _ in film.film_of(
-        session, find_surfaces(square), tmp_path / "a%d.png", Reel((640, 400)), like=studio._scene
-    ):
-        pass
+    monkeypatch.setattr(studio_module, "write_title", keep)
     figure = Figure((640, 400), title=True, both=False, film=True)
+    for _ in told(filming(studio, figure, tmp_path / "a%d.png", Reel())):
+        pass
     for frame in range(3):
         studio.session = changes.show_frame(session, frame)
         studio.image(figure.within((320, 300)))
-    assert said["studio"] == said["film"]
-    assert said["film"][2].startswith("Run 1, no sliding, step 2 of 2: min")
+    assert said[:3] == said[3:]
+    assert said[2].startswith("Run 1, no sliding, step 2 of 2: min")
 
 
 def test_sizes_in_words():

@@ -9,14 +9,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
-from slideviz.export.film import film, film_of
+from slideviz.export import offscreen_renderer as studio_module
+from slideviz.export.exposure import told
+from slideviz.export.film import film, film_figure, filming
 from slideviz.export.offscreen import font_scale, offscreen
+from slideviz.export.offscreen_renderer import Studio
 from slideviz.export.reel import Reel, check_film
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
+from slideviz.session.opening import of_runs
 from slideviz.session.state import Frame, Run
 
 SMALL = (320, 200)
@@ -34,7 +39,19 @@ def leaning(mesh, steps=3, by=0.9):
 
 
 def shoot(frames, file, reel, **options):
-    return [(d.done, d.total) for d in film(frames, file, reel, **options)]
+    return [(d.done, d.total) for d in film(shown(frames), file, reel, **options)]
+
+
+def shown(frames):
+    """A session of a run with these steps."""
+    return of_runs(frames[0], [Run(1, Case(), tuple(frames[1:]), "done")])
+
+
+def film_of(session, file, reel, like=None):
+    """Film what a view shows."""
+    figure = replace(film_figure(reel.size), fill=like is None)
+    with Studio(session, find_surfaces(session.mesh), like) as studio:
+        yield from told(filming(studio, figure, file, reel))
 
 
 def mp4_images(file):
@@ -132,7 +149,7 @@ def test_the_camera_sees_every_step_whole(tmp_path, square):
         shoot(order, tmp_path / f"{name}%d.png", Reel(SMALL))
         for k in range(3):
             with Image.open(tmp_path / f"{name}{k}.png") as picture:
-                drawn = np.asarray(picture)[20:, :255].min(axis=2) < 200
+                drawn = np.asarray(picture)[20:, :240].min(axis=2) < 200
             assert drawn.any()
             assert not drawn[:, 0].any()
             assert not drawn[:, -1].any()
@@ -153,17 +170,17 @@ def test_few_images_are_shown_longer_and_many_ten_a_second():
 
 
 def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, monkeypatch):
-    from slideviz.export import film as module
-
-    seen = []
-    draw = module.Portrait.show
+    seen, words = [], []
+    draw, write = Studio.drawing, studio_module.write_title
     monkeypatch.setattr(
-        module.Portrait, "show", lambda self, frame: (seen.append(frame), draw(self, frame))
+        Studio,
+        "drawing",
+        lambda self, shown, *rest: (seen.append(shown[0].frame), draw(self, shown, *rest))[1],
     )
-    words = []
-    write = module.write_title
     monkeypatch.setattr(
-        module, "write_title", lambda p, text, *rest: (words.append(text), write(p, text, *rest))
+        studio_module,
+        "write_title",
+        lambda p, text, *rest: (words.append(text), write(p, text, *rest)),
     )
     drawn = shoot(frames[:2], tmp_path / "s%d.png", Reel(SMALL, between=1))
     assert drawn[-1] == (3, 3)
@@ -189,7 +206,7 @@ def test_pictures_go_into_a_folder_that_is_made(tmp_path, frames):
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a_%02d.png", "steps"])
 def test_closing_it_early_leaves_nothing(tmp_path, frames, name):
-    drawing = film(frames, tmp_path / name, Reel(SMALL))
+    drawing = film(shown(frames), tmp_path / name, Reel(SMALL))
     assert next(drawing).done == 1
     assert next(drawing).done == 2
     drawing.close()
@@ -200,10 +217,10 @@ def test_closing_it_early_leaves_nothing(tmp_path, frames, name):
 def test_a_film_of_before_stays_until_the_new_one_is_done(tmp_path, frames, name):
     asked = tmp_path / name.replace("00", "%02d")
     (tmp_path / name).write_bytes(b"before")
-    drawing = film(frames, asked, Reel(SMALL))
+    drawing = film(shown(frames), asked, Reel(SMALL))
     with pytest.raises(SlidevizError, match=rf"{re.escape(name)} exists already; choose another"):
         next(drawing)
-    drawing = film(frames, asked, Reel(SMALL), overwrite=True)
+    drawing = film(shown(frames), asked, Reel(SMALL), overwrite=True)
     next(drawing)
     drawing.close()
     assert (tmp_path / name).read_bytes() == b"before"
@@ -255,7 +272,7 @@ def test_a_folder_without_permission_is_told(tmp_path, monkeypatch):
 
 def test_without_steps_there_is_no_film(tmp_path, frames):
     with pytest.raises(SlidevizError, match="there are no steps to make a film of; run the case"):
-        next(film(frames[:1], tmp_path / "a.mp4"))
+        next(film(shown(frames[:1]), tmp_path / "a.mp4"))
 
 
 def test_an_encoder_that_fails_or_is_not_there_is_told(tmp_path, frames, monkeypatch):
@@ -293,9 +310,9 @@ def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
         like = Scene(plotter, PAPER, font_scale(SMALL))
         like.open(ran, surfaces)
         plotter.camera.parallel_scale *= 3.0
-        drawing = film_of(ran, surfaces, tmp_path / "v%d.png", Reel(SMALL), like=like)
+        drawing = film_of(ran, tmp_path / "v%d.png", Reel(SMALL), like=like)
         assert [drawn.done for drawn in drawing] == [1, 2, 3, 4]
-    whole = [d.done for d in film_of(ran, surfaces, tmp_path / "w%d.png", Reel(SMALL))]
+    whole = [d.done for d in film_of(ran, tmp_path / "w%d.png", Reel(SMALL))]
     assert whole == [1, 2, 3, 4]
 
     def covered(name):
@@ -310,21 +327,21 @@ def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
 def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran, monkeypatch):
     ran = replace(ran, view=replace(ran.view, colour_by="displacement"))
     seen = []
-    update = Scene.update
+    draw = Studio.drawing
 
-    def watch(self, session):
-        seen.append((session.colour_range, session.frame))
-        return update(self, session)
+    def watch(self, shown, *rest):
+        seen.extend((one.colour_range, one.frame) for one in shown)
+        return draw(self, shown, *rest)
 
-    monkeypatch.setattr(Scene, "update", watch)
-    for _ in film_of(ran, find_surfaces(ran.mesh), tmp_path / "v%d.png", Reel(SMALL)):
+    monkeypatch.setattr(Studio, "drawing", watch)
+    for _ in film_of(ran, tmp_path / "v%d.png", Reel(SMALL)):
         pass
     assert {span for span, _ in seen} == {ran.colour_range}
     assert [frame for _, frame in seen] == list(ran.frames)
 
 
 def test_cancelling_the_film_of_a_view_leaves_nothing(tmp_path, ran):
-    drawing = film_of(ran, find_surfaces(ran.mesh), tmp_path / "v.mp4", Reel(SMALL))
+    drawing = film_of(ran, tmp_path / "v.mp4", Reel(SMALL))
     next(drawing)
     with suppress(KeyboardInterrupt):
         drawing.throw(KeyboardInterrupt())

@@ -334,12 +334,14 @@ def test_a_film_that_fails_is_told(ran, film, answers, tmp_path, qtbot):
     assert not film.filming
 
 
-def test_an_error_nobody_expected_is_no_finished_film(ran, film, answers, tmp_path, qtbot):
+def test_an_error_nobody_expected_is_no_finished_film(
+    ran, film, answers, tmp_path, qtbot, monkeypatch
+):
     answers("ask_save", tmp_path / "out.gif")
     film.form.kind.show_value(".gif")
     made = []
     film.made.connect(made.append)
-    film.studio.surfaces = None
+    monkeypatch.setattr(film_module, "shot_at", None)
     with qtbot.waitSignal(film.failed, timeout=10_000):
         film.make.click()
     qtbot.wait(50)

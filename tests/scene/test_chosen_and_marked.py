@@ -11,11 +11,10 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
-from slideviz.scene.actors import VALUES
+from slideviz.scene.actors import VALUES, part_shape
 from slideviz.scene.marked_cell import DOT, FACES, OUTLINE
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
-from slideviz.scene.threshold import part_shape
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.inspect import nodes_of

@@ -17,16 +17,12 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.export.exposure import Drawn
-from slideviz.export.film import filming_of
+from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
-from slideviz.export.reel import Reel
 from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.bar import QuietBar
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, to_image
-from slideviz.scene.scene import Scene
-from slideviz.session.pieces import Beside
 
 PREVIEW = (360, 225)
 
@@ -125,21 +121,10 @@ class FilmDialog(QDialog):
     def _drawing(self) -> Generator[object, Any, None]:
         """Draw the first and the last image, from one place, in pieces."""
         figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
-        yield from self._pose(figure)
+        yield from posing(self.studio, figure)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
             pixels = yield from self.studio.picturing(figure, aim=False, frame=frame)
             label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
-
-    def _pose(self, figure: Figure) -> Generator[object, Any, Scene]:
-        """Return the scene as the film sees it: the step that needs most room is seen whole."""
-        yield from self.studio.arranging()
-        frames = self.studio.session.frames
-        widest = yield Beside(
-            lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent)
-        )
-        scene = self.studio.pose(figure, widest)
-        yield None
-        return scene
 
     # Filming ---------------------------------------------------------------------------
 
@@ -154,13 +139,9 @@ class FilmDialog(QDialog):
             return
         self._previewing.stop()
         self._file = file
-        self._turns.start(self._filming(file, self.form.figure, self.form.reel))
+        figure, reel = self.form.figure, self.form.reel
+        self._turns.start(filming(self.studio, figure, file, reel, overwrite=True))
         self._show_filming(True)
-
-    def _filming(self, file: Path, figure: Figure, reel: Reel) -> Generator[object, Any, None]:
-        session = figure.showing(self.studio.session)
-        scene = yield from self._pose(figure)
-        yield from filming_of(session, self.studio.surfaces, file, reel, like=scene, overwrite=True)
 
     def _came(self, drawn: Drawn) -> None:
         self.bar.setRange(0, drawn.total)
