@@ -141,8 +141,10 @@ def filming(
     def draw(position: float) -> Generator[object, Any, Pixels]:
         shots = []
         for one in runs:
-            at = position * (len(one.frames) - 1) / (count - 1)
-            at = round(at, 9 if reel.between else 0)
+            at = position
+            if len(one.frames) < count:  # as far deformed
+                part = (len(one.frames) - 1) / (count - 1)
+                at = round(position * part, 9 if reel.between else 0)
             shots.append((yield Beside(partial(shot_at, one.frames, at))))
         shown = [_showing(one, shot.frame) for one, shot in zip(runs, shots, strict=True)]
         return (yield from studio.drawing(shown, figure, write(shots)))

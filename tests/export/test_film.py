@@ -1,6 +1,8 @@
+import gc
 import os
 import re
 import stat
+import weakref
 from contextlib import suppress
 from dataclasses import replace
 
@@ -21,6 +23,7 @@ from slideviz.export.reel import Reel, check_film
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
+from slideviz.scene.stage import Stage
 from slideviz.session.opening import of_runs
 from slideviz.session.state import Frame, Run
 
@@ -346,3 +349,28 @@ def test_cancelling_the_film_of_a_view_leaves_nothing(tmp_path, ran):
     with suppress(KeyboardInterrupt):
         drawing.throw(KeyboardInterrupt())
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeypatch, count):
+    added, scenes = [], []
+    add, draw = Stage.add, Studio.drawing
+    monkeypatch.setattr(
+        Stage, "add", lambda self, *rest, **more: (added.append(1), add(self, *rest, **more))[1]
+    )
+
+    def watch(self, *rest):
+        scenes.append(weakref.ref(self._scene))
+        added_before.append(len(added))
+        return draw(self, *rest)
+
+    added_before = []
+    monkeypatch.setattr(Studio, "drawing", watch)
+    frames = leaning(square)
+    runs = [Run(k, Case(), frames[1:], "done", name=str(k)) for k in range(1, count + 1)]
+    for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", Reel((640, 300))):
+        pass
+    assert len(scenes) == 4
+    assert {len(added), *added_before} == {len(added)}, "no actor is made again"
+    gc.collect()
+    assert all(scene() is None for scene in scenes)

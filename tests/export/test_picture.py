@@ -6,9 +6,12 @@ from PIL import Image
 from slideviz.case.model import Case
 from slideviz.color_scheme import COLOUR_MAP
 from slideviz.errors import MeshError, SlidevizError
-from slideviz.export.picture import picture
+from slideviz.export.picture import picture, pictures_alike
 from slideviz.mesh.quality import quality
+from slideviz.scene.actors import CELL, POINT, VALUES
 from slideviz.scene.moved import Detail, half_of, tiny_motion
+from slideviz.scene.scene import Scene
+from slideviz.session.changes import set_view
 from slideviz.session.opening import of_runs
 from slideviz.session.state import Frame, Run
 
@@ -120,3 +123,28 @@ def test_a_detail_needs_a_coordinate_for_each_direction(tmp_path, square):
     with pytest.raises(SlidevizError, match=r"a picture of 20x9000 pixels cannot be drawn; .* 64"):
         picture(shown(square), tmp_path / "a.png", size=(20, 9000))
     assert not list(tmp_path.iterdir())
+
+
+def test_a_part_of_a_3d_mesh_is_drawn_with_its_outside_and_follows_the_steps(cube, plotter):
+    cells, _, _ = half_of(cube, cube)
+    scene, session = Scene(plotter), shown(cube.with_points(cube.points * 1.5), cube)
+    for _ in scene.opening(set_view(session, frame=0, colour_by="size-skew"), (), cells):
+        pass
+    shape = plotter.actors["cells"].mapper.dataset
+    assert scene.polygons == shape.n_cells
+    assert set(shape.cell_data[CELL]) <= set(cells)
+    assert not scene.drawn, "no boundary of the other half"
+    nodes = shape.point_data[POINT]
+    scene.update(session)
+    assert np.allclose(shape.points, 1.5 * cube.points[nodes])
+    values = session.frame.quality.values
+    assert np.allclose(shape.cell_data[VALUES], values[shape.cell_data[CELL]])
+
+
+def test_pictures_to_compare_have_one_camera_and_no_legend(square):
+    wide, high = (square.with_points(square.points * scale) for scale in ([2.0, 1.0], [1.0, 2.0]))
+    images = pictures_alike([Frame(mesh, quality(mesh)) for mesh in (wide, high)], square, 200)
+    boxes = [np.ptp(np.argwhere(image.min(axis=2) < 250), axis=0) for image in images]
+    assert boxes[0] == pytest.approx(boxes[1][::-1], abs=2)
+    assert boxes[0][1] == pytest.approx(2 * boxes[0][0], abs=4)
+    assert boxes[0][1] > 0.85 * 200
