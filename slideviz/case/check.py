@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from slideviz.case.key import BOUNDARIES, FILES, MOTION
+from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, moves, named
 from slideviz.case.motion_text import read_motions, write_motions
@@ -197,13 +197,6 @@ def idle_roles(case: Case) -> tuple[str, ...]:
     return tuple(found)
 
 
-_WITHOUT_EFFECT = {
-    "curved": "CURVED= YES is without effect: curved boundaries are found and followed anyway",
-    "direction": "PERIODIC_DIRECTION is without effect: matching the periodic markers finds the "
-    "direction",
-}
-"""Settings that change no result, which files of RBF-SliDe have: what is said of them."""
-
 _SLIDES = {
     ("idw", "ds"): "direct sliding acts like pseudo sliding here: inverse distance weighting "
     "solves no system that nodes could slide in (edges first, then surfaces, each put back on its "
@@ -227,7 +220,7 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     """Return sentences about settings that the chosen method, or none, uses."""
     usual = type(case)()
     idle = [
-        f"{key.name}= YES" if key.get(case) is True else key.name
+        _with_switch(key, case)
         for key in KEYS.values()
         if key.method not in (None, case.method) and key.get(case) != key.get(usual)
     ]
@@ -235,14 +228,20 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     if idle:
         found.append(f"METHOD= {case.method} does not use {', '.join(idle)}")
     found += [
-        sentence
-        for field, sentence in _WITHOUT_EFFECT.items()
-        if getattr(case, field) != getattr(usual, field)
+        f"{_with_switch(key, case)} is without effect: {key.no_effect}"
+        for key in KEYS.values()
+        if key.no_effect and key.get(case) != key.get(usual)
     ]
     return tuple(Note(text) for text in found)
+
+
+def _with_switch(key: Key, case: Case) -> str:
+    """Return what a message calls a setting: that it is on, or its key."""
+    return f"{key.name}= YES" if key.get(case) is True else key.name
 
 
 def effective(case: Case) -> Case:
     """Return the case without the settings that change no result."""
     usual = type(case)()
-    return case.change(**{field: getattr(usual, field) for field in _WITHOUT_EFFECT})
+    fields = (key.field for key in KEYS.values() if key.no_effect)
+    return case.change(**{field: getattr(usual, field) for field in fields})

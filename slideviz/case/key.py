@@ -59,6 +59,8 @@ class Key:
         The only method that uses it.
     unless : callable
         Why it does nothing in a case that has that method; empty where it does something.
+    no_effect : str
+        Why it changes no result of any case, for those that RBF-SliDe's files have.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Key:
     said: str | None = None
     method: Method | None = None
     unless: Callable[[Case], str] = lambda _: ""
+    no_effect: str = ""
 
     @property
     def title(self) -> str:

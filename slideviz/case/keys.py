@@ -137,7 +137,9 @@ _ROWS = (
         "for x, y, z or r, theta, z) is found by matching the markers.",
         put_direction,
         get_direction,
+        field="direction",
         said="",
+        no_effect="matching the periodic markers finds the direction",
     ),
     setting(
         "PERIODIC_AXIS",
@@ -278,6 +280,7 @@ _ROWS = (
         "curved",
         "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
         said="",
+        no_effect="curved boundaries are found and followed anyway",
     ),
     setting(
         "FEATURE_ANGLE",

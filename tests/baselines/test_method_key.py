@@ -43,7 +43,7 @@ def test_settings_that_the_method_does_not_use_are_told():
     assert idle_settings(Case(method="elastic", sliding="ds")) == ()
     case = Case(method="elastic", reduction=Reduction(), kernel="gaussian", influence_factor=1.0)
     assert idle_settings(case) == (
-        "METHOD= elastic does not use DATA_REDUCTION= YES, RBF_KERNEL, INFLUENCE_FACTOR",
+        "METHOD= elastic does not use INFLUENCE_FACTOR, RBF_KERNEL, DATA_REDUCTION= YES",
     )
     assert idle_settings(Case(idw_power=2.0, idw_fixed_weight=2.0)) == (
         "METHOD= rbf does not use IDW_POWER, IDW_FIXED_WEIGHT",
@@ -55,7 +55,7 @@ def test_settings_that_the_method_does_not_use_are_told():
 def test_settings_without_effect_are_told_and_change_no_result():
     made = sample("square", 6, "motion")
     given = made.case.change(curved=True, direction=1)
-    curved, direction = idle_settings(given)
+    direction, curved = idle_settings(given)
     assert curved.startswith("CURVED= YES is without effect")
     assert direction.startswith("PERIODIC_DIRECTION is without effect")
     assert effective(given) == effective(made.case) == made.case
