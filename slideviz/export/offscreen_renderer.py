@@ -125,6 +125,11 @@ class Studio:
         self._stack.close()
 
     @property
+    def fills(self) -> bool:
+        """Tell whether a picture may show the mesh larger than the view, which has all of it."""
+        return self.like is None or self.like.sees_all(0.02)
+
+    @property
     def shows_detail(self) -> bool:
         """Tell whether what moved is shown larger, with the rest of the mesh out of sight."""
         return self.overview is not None and self.overview.detail is not None
@@ -309,23 +314,3 @@ def _keep_width(scene: Scene, like: Scene) -> None:
         free.append(max(width - one.stage.strip(), 1.0) / max(height, 1))
     if scene.plotter.camera.parallel_projection and free[0] < free[1]:
         scene.plotter.camera.parallel_scale *= free[1] / free[0]
-
-
-def sees_all(scene: Scene) -> bool:
-    """Tell whether the whole mesh is in a view, so that a picture of it may show it larger."""
-    mesh, plotter = scene.session.mesh, scene.plotter
-    if mesh is None:
-        return True
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    box = np.zeros((2, 3))
-    box[0, : mesh.dim], box[1, : mesh.dim] = low, high
-    renderer = plotter.renderer
-    for corner in np.ndindex(2, 2, 2):
-        place = [*box[corner, range(3)], 1.0]
-        renderer.SetWorldPoint(*place)
-        renderer.WorldToDisplay()
-        x, y, _ = renderer.GetDisplayPoint()
-        width, height = plotter.window_size
-        if not (-0.02 * width <= x <= 1.02 * width and -0.02 * height <= y <= 1.02 * height):
-            return False
-    return True

@@ -183,15 +183,18 @@ class Eye:
         self.shift()
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
-    def sees_all(self) -> bool:
-        """Tell whether the boxes around all that should be seen are within the view."""
+    def sees_all(self, slack: float = SLACK) -> bool:
+        """Tell whether the boxes around all that should be seen are within the view.
+
+        They may be outside by ``slack``, a part of its size.
+        """
         boxes = [np.array(shape.bounds).reshape(3, 2) for shape in self._shapes()]
         corners = [np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes]
         if not corners:
             return True
         seen = to_display(self.stage.plotter, np.concatenate(corners))
         size = np.array(self.stage.plotter.window_size)
-        return bool((seen >= -SLACK * size).all() and (seen <= (1 + SLACK) * size).all())
+        return bool((seen >= -slack * size).all() and (seen <= (1 + slack) * size).all())
 
     def loses_some(self) -> bool:
         """Tell whether a node of what should be seen is outside the view, or below the legend."""

@@ -17,7 +17,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick, pick_cell
 from slideviz.scene.actors import CELL, Drawn
-from slideviz.scene.camera import Eye
+from slideviz.scene.camera import SLACK, Eye
 from slideviz.scene.ghosts import GhostLayer
 from slideviz.scene.legend import LegendLayer
 from slideviz.scene.marked_cell import MarkLayer
@@ -202,9 +202,9 @@ class Scene:
         """Make everything fill the view, from the present side, beside the legend's strip."""
         self.eye.fit()
 
-    def sees_all(self) -> bool:
-        """Tell whether nothing of the mesh is outside the view."""
-        return self.eye.sees_all()
+    def sees_all(self, slack: float = SLACK) -> bool:
+        """Tell whether nothing of the mesh is outside the view, or by a part of it only."""
+        return self.eye.sees_all(slack)
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
         """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""

@@ -14,7 +14,7 @@ from slideviz.export import vector
 from slideviz.export.exposure import told
 from slideviz.export.film import filming
 from slideviz.export.mark_words import mark_words
-from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.offscreen_renderer import Studio
 from slideviz.export.picture_options import TITLE_ROOM, Figure, panes, title_of, words_of_size
 from slideviz.export.reel import Reel
 from slideviz.export.titles import fitting, pair_titles
@@ -349,9 +349,11 @@ def test_the_legend_of_a_drawing_lies_on_a_plate(studio):
 
 def test_whether_a_view_sees_all(studio):
     scene = studio.pose(PLAIN)
-    assert sees_all(scene)
+    view = Studio(scene.session, (), scene)
+    assert view.fills
     scene.plotter.camera.parallel_scale *= 0.3
-    assert not sees_all(scene)
+    assert not view.fills
+    view.close()
 
 
 def test_formats_and_what_they_leave_out(square, cube):

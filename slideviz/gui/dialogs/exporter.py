@@ -8,7 +8,7 @@ from pathlib import Path
 from qtpy.QtCore import QObject
 
 from slideviz.errors import SlidevizError
-from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.offscreen_renderer import Studio
 from slideviz.export.picture_options import Figure
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
 from slideviz.gui.dialogs.film import FilmDialog
@@ -86,7 +86,7 @@ class Exports(QObject):
                 size,
                 legend=shown.legend,
                 edges=shown.edges,
-                fill=sees_all(view.scene),
+                fill=studio.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
             )
             copy_image(to_image(studio.image(figure)))

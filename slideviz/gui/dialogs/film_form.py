@@ -16,7 +16,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import LARGEST, SMALLEST
-from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.offscreen_renderer import Studio
 from slideviz.export.picture_options import Figure
 from slideviz.export.reel import FPS, SIZES, Reel, check_film
 from slideviz.gui.widgets.choice import Choice
@@ -61,7 +61,7 @@ class FilmForm(QWidget):
         self.white.setChecked(True)
         self.fill = QCheckBox("Fill the images with the mesh")
         self.fill.setToolTip("Else they show what the view shows of the mesh.")
-        self.fill.setChecked(studio.like is None or sees_all(studio.like))
+        self.fill.setChecked(studio.fills)
         self.mark = QCheckBox("Marked cell")
         self.mark.setToolTip("Its outline, with its number and its value.")
         form = QFormLayout(self)

@@ -24,7 +24,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
-from slideviz.export.offscreen_renderer import Studio, sees_all
+from slideviz.export.offscreen_renderer import Studio
 from slideviz.export.picture_options import BACKGROUNDS, Figure, words_of_size
 from slideviz.export.vector import MOST_CELLS
 from slideviz.gui.responsiveness.turns import Turns, raise_again
@@ -218,8 +218,7 @@ class PictureDialog(QDialog):
 
     def _take(self, kept: str) -> None:
         """Show what was chosen the last time, or what makes a good figure."""
-        like = self.studio.like
-        usual = replace(Figure(), fill=like is None or sees_all(like))
+        usual = replace(Figure(), fill=self.studio.fills)
         known = asdict(usual)
         try:
             known.update(json.loads(kept) if kept else {})
