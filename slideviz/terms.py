@@ -324,18 +324,3 @@ SHOWN: dict[Shown, Term] = {
     "perspective": Term("Perspective", "Perspective instead of parallel projection (3D meshes)."),
 }
 """What is drawn or not; a case file writes them with hyphens."""
-
-SectionKind = Literal["plane", "cylinder"]
-
-
-@dataclass(frozen=True)
-class SectionTerm(Term):
-    """A shape of sections; ``in_2d`` is what it is called in a mesh of two dimensions."""
-
-    in_2d: str = ""
-
-
-SECTION_KINDS: dict[SectionKind, SectionTerm] = {
-    "plane": SectionTerm("Plane", in_2d="Line"),
-    "cylinder": SectionTerm("Cylinder", in_2d="Circle"),
-}

@@ -8,9 +8,10 @@ import pytest
 from PIL import Image
 
 import slideviz as sv
+from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.cli import run
 from slideviz.cli.parser import parse
-from slideviz.cli.section_options import cylinder, glued, plane
+from slideviz.cli.section_options import about_axis, glued, plane
 from slideviz.samples.table import sample, write_sample
 from slideviz.terms import COLOUR_MAPS, QUANTITIES
 from tests.builders import cube, passage, square
@@ -49,7 +50,7 @@ def report(capsys, folder, mesh, *options, out="x.png"):
     ],
 )
 def test_planes(text, origin, direction):
-    found = plane(text)
+    found = plane(text).section
     assert (found.kind, found.origin, found.direction) == ("plane", origin, direction)
 
 
@@ -60,12 +61,13 @@ def test_planes(text, origin, direction):
         ("0.25,x", (0, 0, 0), (1, 0, 0), True),
         ("0.25,0,1,1", (0, 0, 0), (0, 1, 1), True),
         ("0.25,0,1,0,3,4,5", (3, 4, 5), (0, 1, 0), True),
+        ("0.25,y,3,4,5", (3, 4, 5), (0, 1, 0), True),
     ],
 )
 def test_cylinders(text, origin, direction, given):
-    found = cylinder(text)
+    found = about_axis(SECTION_SHAPES["cylinder"], text)
     section = found.section
-    assert (section.kind, section.radius, found.given) == ("cylinder", 0.25, given)
+    assert (section.kind, section.radius, found.axis) == ("cylinder", 0.25, given)
     assert (section.origin, section.direction) == (origin, direction)
 
 

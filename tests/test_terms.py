@@ -25,7 +25,6 @@ TABLES = {
     terms.ColourMap: terms.COLOUR_MAPS,
     terms.PointsShown: terms.POINTS_SHOWN,
     terms.Shown: terms.SHOWN,
-    terms.SectionKind: terms.SECTION_KINDS,
 }
 
 

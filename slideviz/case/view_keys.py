@@ -12,16 +12,11 @@ import numpy as np
 
 from slideviz.case.key import VIEW, Key
 from slideviz.case.model import Case
+from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.case.values import NAMES, Kind, choice, vector_text, whole
 from slideviz.case.words import list_of, number, shown
 from slideviz.errors import CaseError
 from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
-
-FORMS = {"plane": 6, "cylinder": 7}
-"""Numbers of a section: normal and point of a plane; radius, axis and point of a cylinder."""
-
-FLAT = {"plane": "flat", "cylinder": "unrolled"}
-"""What stands at the end of a section that is laid flat beside the view."""
 
 HIDDEN = "hidden"
 """What stands at the very end of a section that is not drawn."""
@@ -73,25 +68,27 @@ def read_sections(text: str) -> tuple[SectionText, ...]:
         drawn = items[-1].lower() != HIDDEN if items else True
         if not drawn:
             items.pop()
-        flat = bool(items) and items[-1].lower() == FLAT.get(form)
+        shape = SECTION_SHAPES.get(form)
+        word = "flat" if shape is None else shape.flat
+        flat = bool(items) and items[-1].lower() == word and shape is not None
         if flat:
             items.pop()
         how = items[-1].lower() if items else ""
-        if form not in FORMS or how not in ("whole", "cut"):
+        if shape is None or how not in ("whole", "cut"):
             raise CaseError(
-                f"section {place}: {shown(part.strip())} does not begin with plane or cylinder and "
-                f"end with whole or cut, and after that {FLAT.get(form, 'flat')}, {HIDDEN} or "
-                "nothing"
+                f"section {place}: {shown(part.strip())} does not begin with {names()} and end "
+                f"with whole or cut, and after that {word}, {HIDDEN} or nothing"
             )
         values = tuple(number(item) for item in items[1:-1])
-        if len(values) != FORMS[form]:
+        if len(values) != shape.count:
             raise CaseError(
-                f"section {place}: a {form} has {FORMS[form]} numbers, {len(values)} are given"
+                f"section {place}: a {form} has {shape.count} numbers, {len(values)} are given"
             )
-        if not np.linalg.norm(values[:3] if form == "plane" else values[1:4]) > 0:
+        if not np.linalg.norm(values[-6:-3]) > 0:
             raise CaseError(f"section {place}: its direction has no length")
-        if form == "cylinder" and values[0] <= 0:
-            raise CaseError(f"section {place}: the radius {values[0]:g} is not above 0")
+        fault = shape.size.fault(values[0]) if shape.size is not None else ""
+        if fault and shape.size is not None:
+            raise CaseError(f"section {place}: the {shape.size.word} {values[0]:g} {fault}")
         found.append((form, values, how == "whole", flat, drawn))
     return tuple(found)
 
@@ -101,7 +98,7 @@ def write_sections(sections: tuple[SectionText, ...]) -> str:
     texts = []
     for form, values, whole_cells, flat, drawn in sections:
         words = [form, *(repr(float(v)) for v in values), "whole" if whole_cells else "cut"]
-        words += [FLAT[form]] * flat + [HIDDEN] * (not drawn)
+        words += [SECTION_SHAPES[form].flat] * flat + [HIDDEN] * (not drawn)
         texts.append(f"({', '.join(words)})")
     return " ; ".join(texts) or "( )"
 
@@ -111,9 +108,11 @@ SECTIONS = Kind(
     read_sections,
     write_sections,
     details=(
-        "(plane, nx, ny, nz, x, y, z, whole | cut): normal and a point",
-        "(cylinder, r, ax, ay, az, x, y, z, whole | cut): radius, axis and a point on it",
-        "after that flat (plane) or unrolled (cylinder): laid flat beside the view",
+        *(
+            f"({shape.value}, {shape.numbers}, whole | cut): {shape.meaning}"
+            for shape in SECTION_SHAPES.values()
+        ),
+        "after that flat (plane) or unrolled (others): laid flat beside the view",
         "at the very end hidden: kept, but not drawn",
     ),
 )
@@ -140,7 +139,7 @@ VIEW_ROWS = (
     _row("VIEW_SHOW", words(tuple(map(hyphened, SHOWN))), "What is drawn beside the boundaries."),
     _row("VIEW_COPIES", whole(-1), "Passages drawn on each side; -1 draws all."),
     _row("VIEW_HIDDEN", NAMES, "Boundaries that are not drawn."),
-    _row("VIEW_SECTIONS", SECTIONS, "Planes and cylinders that cut the mesh."),
+    _row("VIEW_SECTIONS", SECTIONS, f"Sections of the mesh, each by a {names()}."),
     _row(
         "VIEW_CAMERA",
         numbers(10, "ten numbers"),

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from slideviz.case.section_shapes import SECTION_SHAPES
+
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
@@ -47,7 +49,7 @@ def section(arguments: argparse.Namespace) -> int:
     # Of the mesh itself, where it is cut: its copies have the same cells.
     ids = pieces[0].cell_ids if len(pieces[0]) else joined(list(pieces.values())).cell_ids
     if not len(ids):
-        why = _miss(mesh.points[cutter.used], chosen)
+        why = chosen.shape.miss(chosen, mesh.points[cutter.used])
         raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
     if arguments.range:
         painted = painted.within(*arguments.range)
@@ -83,8 +85,9 @@ def _check_usage(arguments: argparse.Namespace) -> None:
     """Leave with code 2 where options contradict each other."""
     if arguments.color == "displacement" and not (arguments.reference or arguments.case):
         arguments.wrong_usage("--color displacement needs --reference UNDEFORMED")
-    if arguments.unrolled and arguments.plane:
-        arguments.wrong_usage("--unrolled is for a --cylinder; a plane is flat already")
+    if arguments.unrolled and arguments.asked.section.shape.terms.flat != "unrolled":
+        able = (f"--{name}" for name, row in SECTION_SHAPES.items() if row.flat == "unrolled")
+        arguments.wrong_usage(f"--unrolled is for a {' or '.join(able)}; a plane is flat already")
 
 
 def _section_and_passages(
@@ -96,16 +99,17 @@ def _section_and_passages(
     from slideviz.errors import CaseError
     from slideviz.session.passages import find_period, passages
 
-    asked = arguments.plane or arguments.cylinder.section
-    chosen = replace(asked, whole=mesh.dim == 2 if arguments.whole is None else arguments.whole)
-    no_axis = arguments.cylinder is not None and not arguments.cylinder.given
+    asked = arguments.asked
+    chosen = replace(
+        asked.section, whole=mesh.dim == 2 if arguments.whole is None else arguments.whole
+    )
     pair: Pair | None = None
-    if no_axis or arguments.copies:
+    if not asked.axis or arguments.copies:
         # The undeformed mesh, for a deformed one need not repeat exactly.
         pair = find_period(base or mesh, case)
-    if no_axis and case is not None:
+    if not asked.axis and case is not None:
         chosen = replace(chosen, direction=case.axis, origin=case.origin)
-    elif no_axis and pair is not None and pair.kind == "rotational":
+    elif not asked.axis and pair is not None and pair.kind == "rotational":
         chosen = replace(chosen, direction=pair.axis, origin=pair.origin)
     if not arguments.copies:
         return chosen, {0: np.eye(4)}
@@ -117,28 +121,14 @@ def _section_and_passages(
     return chosen, passages(pair, arguments.copies)
 
 
-def _miss(points: FloatArray, chosen: Section) -> str:
-    """Return why a section cuts no cell of these points (n, d), and where it would."""
-    import numpy as np
-
-    low, high = chosen.reach(points)
-    if chosen.kind == "cylinder":
-        return f"misses the mesh, which has radii {low:.6g} to {high:.6g} about this axis"
-    normal = np.abs(chosen.basis[2])
-    if not normal[: points.shape[1]].any():
-        return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
-    axis = int(np.argmax(normal))
-    if normal[axis] > 1.0 - 1e-12:
-        ends = points[:, axis].min(), points[:, axis].max()
-        return f"misses the mesh, which has {'xyz'[axis]} from {ends[0]:.6g} to {ends[1]:.6g}"
-    return f"misses the mesh; moved along its normal by {low:.6g} to {high:.6g} it would cut it"
-
-
 def _as_json(chosen: Section) -> dict[str, Any]:
+    size = chosen.shape.terms.size
+    own = {} if size is None else {size.field: chosen.size}
     return {
         "kind": chosen.kind,
         "origin": list(chosen.origin),
         "direction": list(chosen.direction),
-        "radius": chosen.radius or None,
+        "radius": None,
+        **own,
         "whole": chosen.whole,
     }

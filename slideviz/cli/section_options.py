@@ -1,16 +1,18 @@
-"""The options of ``slideviz section``, and how its planes and cylinders are written."""
+"""The options of ``slideviz section``, and how its sections are written."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES, SectionKind
+from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms, names
+from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -20,13 +22,6 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MOST_COPIES = 100
 """On each side: more could neither be told apart nor be drawn in reasonable time."""
 
-PLANE_HELP = (
-    "normal and a point: nx,ny,nz,x,y,z (2D: nx,ny,x,y); or an axis and a coordinate, as in z=0.5"
-)
-CYLINDER_HELP = (
-    "radius, then the axis: x, y, z, or its direction ax,ay,az, or direction and a point on it "
-    "ax,ay,az,cx,cy,cz; without axis that of the rotational period, else z"
-)
 CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
 EXAMPLES = """\
 examples:
@@ -43,20 +38,17 @@ def add_section(calls: argparse._SubParsersAction) -> None:
 
     section = calls.add_parser(
         "section",
-        help="picture of a plane or cylinder through a mesh",
+        help=f"picture of a {names()} through a mesh",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     section.add_argument("mesh", type=Path)
     add = section.add_argument
     where = section.add_mutually_exclusive_group(required=True)
-    where.add_argument("--plane", type=plane, help=PLANE_HELP)
-    where.add_argument(
-        "--cylinder",
-        type=cylinder,
-        metavar="R[,AXIS]",
-        help=CYLINDER_HELP,
-    )
+    for name, row in SECTION_SHAPES.items():
+        where.add_argument(
+            f"--{name}", type=reader(row), dest="asked", metavar=row.metavar, help=row.option
+        )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(
         section,
@@ -72,7 +64,9 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
     view = section.add_mutually_exclusive_group()
     view.add_argument(
-        "--unrolled", action="store_true", help="cylinder laid flat to (z, r theta), the default"
+        "--unrolled",
+        action="store_true",
+        help="what has an axis laid flat, a cylinder to (z, r theta), the default",
     )
     view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
     add(
@@ -104,7 +98,7 @@ def glued(argv: Sequence[str]) -> list[str]:
     for word in argv:
         if (
             words
-            and words[-1] in ("--plane", "--range", "--cylinder", "--zoom")
+            and words[-1] in (*(f"--{name}" for name in SECTION_SHAPES), "--range", "--zoom")
             and re.match(r"-[\d.]", word)
         ):
             words[-1] += "=" + word
@@ -113,7 +107,20 @@ def glued(argv: Sequence[str]) -> list[str]:
     return words
 
 
-def plane(text: str) -> Section:
+@dataclass(frozen=True)
+class Asked:
+    """A section as it was asked for; ``axis`` is false where its axis was left out."""
+
+    section: Section
+    axis: bool = True
+
+
+def reader(row: ShapeTerms) -> Callable[[str], Asked]:
+    """Return what reads the sections of a shape."""
+    return partial(about_axis, row) if row.size is not None else plane
+
+
+def plane(text: str) -> Asked:
     """Return the plane that a text like ``0,0,1,0,0,0.5`` or ``z=0.5`` means."""
     word, sign, value = text.partition("=")
     if sign:
@@ -121,30 +128,25 @@ def plane(text: str) -> Section:
             raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z, as in z=0.5")
         normal = _AXES[word.strip()]
         (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
-        return _section("plane", [at * part for part in normal], normal)
+        return Asked(_section("plane", [at * part for part in normal], normal))
     values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
     half = len(values) // 2
-    return _section("plane", values[half:], values[:half])
+    return Asked(_section("plane", values[half:], values[:half]))
 
 
-@dataclass(frozen=True)
-class Cylinder:
-    """A cylinder as it was asked for; ``given`` is false where the axis was left out."""
-
-    section: Section
-    given: bool
-
-
-def cylinder(text: str) -> Cylinder:
-    """Return the cylinder that a text like ``0.25``, ``0.25,x`` or ``0.25,0,0,1`` means."""
-    radius, _, axis = text.partition(",")
-    (size,) = _numbers(radius, (1,), "a radius, as in 0.25 or 0.25,x")
-    if axis.strip() in _AXES:
-        return Cylinder(_section("cylinder", (), _AXES[axis.strip()], size), True)
+def about_axis(row: ShapeTerms, text: str) -> Asked:
+    """Return the section that a text like ``0.25``, ``0.25,x`` or ``0.25,0,0,1`` means."""
+    assert row.size is not None
+    number, _, axis = text.partition(",")
+    (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
-        return Cylinder(_section("cylinder", (), _AXES["z"], size), False)
+        return Asked(_section(row.value, (), _AXES["z"], size), False)
+    word, _, point = axis.partition(",")
+    if word.strip() in _AXES:
+        at = _numbers(point, (3,), "x, y or z, then cx,cy,cz") if point else ()
+        return Asked(_section(row.value, at, _AXES[word.strip()], size))
     values = _numbers(axis, (3, 6), "x, y, z, ax,ay,az or ax,ay,az,cx,cy,cz")
-    return Cylinder(_section("cylinder", values[3:], values[:3], size), True)
+    return Asked(_section(row.value, values[3:], values[:3], size))
 
 
 def limits(text: str) -> tuple[float, float]:
@@ -178,10 +180,7 @@ def neighbours(text: str) -> int | Literal["wheel"]:
 
 
 def _section(
-    kind: SectionKind,
-    origin: Sequence[float],
-    direction: Sequence[float],
-    radius: float = 0.0,
+    kind: str, origin: Sequence[float], direction: Sequence[float], size: float = 0.0
 ) -> Section:
     """Return a section, whose mistakes are those of the command line."""
     from slideviz.errors import CaseError
@@ -190,7 +189,7 @@ def _section(
     x, y, z, *_ = *origin, 0.0, 0.0, 0.0
     a, b, c, *_ = *direction, 0.0, 0.0, 0.0
     try:
-        return Section(kind, (x, y, z), (a, b, c), radius)
+        return Section.of(kind, (x, y, z), (a, b, c), size)
     except CaseError as problem:
         raise argparse.ArgumentTypeError(str(problem)) from problem
 

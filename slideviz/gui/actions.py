@@ -8,6 +8,7 @@ from functools import partial
 from qtpy.QtGui import QAction, QActionGroup, QKeySequence
 from qtpy.QtWidgets import QMainWindow, QMenu
 
+from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.gui.tool_bar import ToolBar
 from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.runs_menu import fill_compare
@@ -17,12 +18,6 @@ from slideviz.session import changes
 from slideviz.session.colors import usual_range
 from slideviz.session.state import Session
 from slideviz.terms import SHOWN, Shown
-
-CUTS = {
-    3: {"add_plane": "&Cut by a plane", "add_cylinder": "Cut by a c&ylinder"},
-    2: {"add_plane": "&Cut by a line", "add_cylinder": "Cut by a circl&e"},
-}
-"""What the actions that add a section are called, by the dimensions of the mesh."""
 
 TOGGLES: dict[Shown, str] = {
     "edges": "E",
@@ -192,11 +187,9 @@ class Actions:
         self.compare = self._menu(menu, "compare", "Co&mpare with")
         self.compare.aboutToShow.connect(lambda: fill_compare(self.compare, window.store))
         menu.addAction(self._add("show_all", "Show &all boundaries", window.show_all, "Shift+A"))
-        for name, text, keys in (
-            ("add_plane", CUTS[3]["add_plane"], "C"),
-            ("add_cylinder", CUTS[3]["add_cylinder"], "Shift+C"),
-        ):
-            menu.addAction(self._add(name, text, partial(self._add_section, name), keys))
+        for kind, row in SECTION_SHAPES.items():
+            add = partial(self._add_section, kind)
+            menu.addAction(self._add(f"add_{kind}", row.words[3].action, add, row.key))
         menu.addSeparator()
         steps = self._menu(menu, "steps", "&Steps")
         player = window.player
@@ -220,9 +213,9 @@ class Actions:
         menu.addAction(self._add("full_screen", "F&ull screen", window.toggle_full_screen, "F11"))
         self.panels = self._menu(menu, "panels", "&Panels")
 
-    def _add_section(self, name: str) -> None:
+    def _add_section(self, kind: str) -> None:
         self.window.docks_.lead_to("sections")
-        getattr(self.window.docks_.panels["sections"], name).click()
+        self.window.docks_.panels["sections"].add[kind].click()
 
     def add_panels(self, docks) -> None:
         """Offer to show and hide the docks, and to put them back."""
@@ -286,9 +279,12 @@ class Actions:
         self.by_name["perspective"].setEnabled(opened and not flat)
         for side in (*SIDE_KEYS, "iso"):
             self.by_name[f"side{side}"].setEnabled(opened and not flat)
-        for name, text in CUTS[2 if flat else 3].items():
-            self.by_name[name].setText(text)
-            self.by_name[name].setEnabled(opened)
+        for kind, row in SECTION_SHAPES.items():
+            act, words = self.by_name[f"add_{kind}"], row.words.get(2 if flat else 3)
+            act.setVisible(words is not None)
+            act.setEnabled(opened and words is not None)
+            if words is not None:
+                act.setText(words.action)
         store = self.window.store
         for name, what in (("undo", store.can_undo), ("redo", store.can_redo)):
             act = self.by_name[name]

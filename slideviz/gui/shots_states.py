@@ -109,7 +109,7 @@ def section(window: MainWindow, place: Path) -> None:
     _open(window, _stator(place))
     _run(window, **SLIDING)
     window.docks_.lead_to("sections")
-    window.docks_.panels["sections"].add_cylinder.click()
+    window.docks_.panels["sections"].add["cylinder"].click()
     window.store.change(changes.set_view, copies=1)
     window.cutting.want_flat(True)
     window.store.change(changes.show, OUTER, False)

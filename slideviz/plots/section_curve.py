@@ -12,10 +12,9 @@ from slideviz.color_scheme import COLOUR_MAP
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, dress, place
 from slideviz.plots.ticks import rounded_out
-from slideviz.sections.line import along
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.unroll import Label, direction_label
+from slideviz.sections.shape import Label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,36 +64,15 @@ def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np
         Of all cells of the mesh.
     """
     corners = lines.points[lines.connectivity, :2].reshape(-1, 2, 2)
-    if section.kind == "cylinder":
-        at = _angles(corners - np.asarray(section.origin[:2]))
-    else:
-        way = along(section)
-        assert way is not None
-        at = corners @ way
-    ends = np.sort(at, axis=1)
+    ends = np.sort(section.in_plane.positions(section, corners), axis=1)
     order = np.lexsort(ends.T)
     cells = lines.cells[order]
     return Curve(ends[order], values[cells], inverted[cells], cells)
 
 
-def _angles(corners: FloatArray) -> FloatArray:
-    """Return in degrees where lines (q, 2, 2) about 0 begin and end, (q, 2).
-
-    The middle of each is in -180 to 180, always: curves of several meshes are above each other.
-    """
-    start, end = np.degrees(np.arctan2(corners[..., 1], corners[..., 0])).T
-    end = start + (end - start + 180.0) % 360.0 - 180.0
-    turn = 360.0 * np.floor(((start + end) / 2.0 + 180.0) / 360.0)
-    return np.column_stack([start - turn, end - turn])
-
-
 def position_label(section: Section) -> Label:
     """Return what the positions along a section are."""
-    if section.kind == "cylinder":
-        return Label("angle [°]", "θ [°]")
-    way = along(section)
-    assert way is not None
-    return direction_label(np.append(way, 0.0))
+    return section.in_plane.position_label(section)
 
 
 @dataclass(frozen=True, eq=False)

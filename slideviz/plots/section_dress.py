@@ -12,7 +12,7 @@ from slideviz.plots.section_layout import Layout
 from slideviz.plots.section_paint import Paint
 from slideviz.plots.section_polygons import colours_of
 from slideviz.plots.section_title import LETTERS
-from slideviz.sections.unroll import Label
+from slideviz.sections.shape import Label
 
 _LETTER_WIDTH = 0.075
 """Inches that a letter of a label takes."""

@@ -32,7 +32,7 @@ from slideviz.plots.style import PRINT
 from slideviz.plots.written import figure_bytes
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
-from slideviz.sections.unroll import Label, flat_labels, flatten, middle_angle
+from slideviz.sections.shape import Label
 from slideviz.terms import QUANTITIES
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -253,23 +253,21 @@ def laid_flat(
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
         # A 2D mesh, or a plane that lies flat already.
         return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
+    shape = section.shape
+    own = shape.middle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
+    middles: dict[int, float | None] = {}
     found: dict[int, Polygons] = {}
     for numbers in (
         sorted(number for number in pieces if number >= 0),
         sorted((number for number in pieces if number < 0), reverse=True),
     ):
         # Each passage beside the one before, from the mesh itself outwards.
-        near = middle_of(found[min(found)], section) if found else beside
+        near = middles[min(found)] if found else own
         for number in numbers:
-            found[number] = flatten(pieces[number], section, near)
-            near = middle_of(found[number], section)
+            found[number] = shape.flatten(section, pieces[number], near, own)
+            near = middles[number] = shape.middle(section, pieces[number], near)
     flat = joined([found[number] for number in sorted(found)])
-    return flat.by_depth(), flat_labels(section)
-
-
-def middle_of(flat: Polygons, section: Section) -> float | None:
-    """Return where the middle of something unrolled is; None of what was flat already."""
-    return middle_angle(flat, section) if section.kind == "cylinder" else None
+    return flat.by_depth(), shape.flat_labels(section)
 
 
 def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:

@@ -21,7 +21,6 @@ from slideviz.plots.section_picture import (
     folded_last,
     ids_of,
     laid_flat,
-    middle_of,
     plot_curves,
     require_picture_name,
     write_figure,
@@ -131,9 +130,7 @@ def _cells(
             continue
         flat, labels = laid_flat(one.drawn, section, style, near)
         if near is None:
-            number = min(one.drawn, key=abs)
-            alone, _ = laid_flat({number: one.drawn[number]}, section, style)
-            near = middle_of(alone, section)
+            near = section.shape.middle(section, one.drawn[min(one.drawn, key=abs)])
         flats.append(folded_last(flat, section, one.paint))
     there = [flat for flat in flats if flat is not None]
     corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in there])

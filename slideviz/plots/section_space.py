@@ -9,7 +9,6 @@ import numpy as np
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
-from slideviz.sections.unroll import plane_axes
 
 _ASIDE, _ABOVE = 0.55, 0.4
 """How far the eye is off the straight view, for every length that it is away."""
@@ -19,19 +18,9 @@ def camera(piece: Polygons, section: Section) -> FloatArray:
     """Return unit vectors to the right, up, and towards the eye, (3, 3).
 
     The eye is somewhat to the side of what it looks at straight: the plane's normal, or the
-    direction from the cylinder's axis to the middle of the piece.
+    direction from the axis to the middle of the piece.
     """
-    if section.kind == "plane":
-        side, up, straight = plane_axes(section).rows
-    else:
-        axis = section.basis[2]
-        middle = piece.points.mean(axis=0) - np.asarray(section.origin)
-        middle = middle - (middle @ axis) * axis
-        size = np.linalg.norm(middle)
-        # Around a whole wheel there is no middle.
-        straight = middle / size if size > 1e-3 * section.radius else section.basis[0]
-        up = np.eye(3)[1 if abs(straight[2]) > 0.9 else 2]
-        side = np.cross(up, straight)
+    side, up, straight = section.shape.aslant(section, piece.points)
     eye = straight + _ASIDE * side + _ABOVE * up
     eye /= np.linalg.norm(eye)
     right = np.cross(up, eye)

@@ -1,4 +1,4 @@
-"""A section laid flat in a plotter: a cylinder unrolled, or a plane seen along its normal."""
+"""A section laid flat in a plotter: unrolled, or a plane seen along its normal."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from slideviz.scene.polygon_actor import PolygonActor, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
+from slideviz.sections.shape import Label
 from slideviz.sections.threshold import Choice
-from slideviz.sections.unroll import Label, flat_labels, flatten, middle_angle, plane_axes
 from slideviz.session.passages import keeps, moved
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
@@ -66,6 +66,7 @@ class FlatScene:
         self._style_mark()
         self._period = Period()
         self._made_of: tuple[object, ...] = ()
+        self._level: tuple[tuple[object, ...], float | None] = (), None
         self.session = Session()
         self.set_look(look)
 
@@ -73,7 +74,7 @@ class FlatScene:
     def labels(self) -> tuple[Label, Label]:
         """Return what both axes are called."""
         assert self.section is not None
-        return flat_labels(self.section)
+        return self.section.shape.flat_labels(self.section)
 
     def update(self, session: Session, section: Section) -> None:
         """Show another state, or another section."""
@@ -96,13 +97,14 @@ class FlatScene:
     ) -> None:
         """Lay the polygons flat and draw them, but for cells that are not chosen."""
         assert session.frame is not None
-        flat = flatten(cut, section) if len(cut) else cut
+        shape, ahead = section.shape, self._ahead(section, session)
+        flat = shape.flatten(section, cut, ahead, ahead) if len(cut) else cut
         # Where the section lies stays, whatever cells of it are shown.
         self._all = flat
         if only is not None and section.whole and len(cut):
             part = self.cuts.of(session.frame.mesh, section, only=only)
-            near = middle_angle(flat, section) if section.kind == "cylinder" else None
-            flat = flatten(part, section, near) if len(part) else part
+            near = shape.middle(section, cut, ahead)
+            flat = shape.flatten(section, part, near, ahead) if len(part) else part
         elif only is not None:
             flat = only.among(flat)
         if not section.whole and len(flat):
@@ -112,6 +114,18 @@ class FlatScene:
             flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
         self.polygons = flat
         self._shown.show(flat)
+
+    def _ahead(self, section: Section, session: Session) -> float | None:
+        """Return the angle that lies level, that of the undeformed mesh: so it does in all views.
+
+        Looked for only where it may be another.
+        """
+        key = (session.mesh, section.kind, section.origin, section.direction)
+        if key != self._level[0]:
+            assert session.mesh is not None
+            points = session.mesh.points[self.cuts.cutter(session.mesh).used]
+            self._level = key, section.shape.ahead(section, points)
+        return self._level[1]
 
     def _style(self, section: Section) -> None:
         prop = self._shown.actor.prop
@@ -267,16 +281,6 @@ def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -
     matrix : (4, 4) float64
         The transformation in space.
     """
-    flat = np.eye(4)
-    if section.kind == "plane":
-        rows = plane_axes(section).rows
-        flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
-        flat[:3, 3] = rows @ matrix[:3, 3]
-        flat[2, 3] = 0.0
-        return flat
-    base, origin = section.basis, np.asarray(section.origin)
-    step = moved(origin[None], matrix)[0] - origin
-    sense = np.sign(base[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
-    flat[0, 3] = step @ base[2]
-    flat[1, 3] = section.radius * sense * np.copysign(pair.period, pair.angle) * number
-    return flat
+    turn = np.sign(section.basis[2] @ np.asarray(pair.axis)) if pair.kind == "rotational" else 0.0
+    angle = turn * np.copysign(pair.period, pair.angle) * number
+    return section.shape.flat_matrix(section, matrix, angle)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.line import Box, line_ends, middle, trace
-from slideviz.sections.model import Section, Triple
+
+if TYPE_CHECKING:
+    from slideviz.sections.line import Box
+    from slideviz.sections.model import Section, Triple
 
 Part = Literal["middle", "end", "line"]
 """What is held: the middle, an end of a line, or the line or circle itself anywhere."""
@@ -39,24 +41,8 @@ class Grips:
 
 def grips(section: Section, box: Box) -> Grips | None:
     """Return where a section can be held within a box that is seen; None where none of it is."""
-    parts = trace(section, box)
-    if not parts:
-        return None
-    if section.kind == "cylinder":
-        longest = max(parts, key=len)
-        ends = longest[None, len(longest) // 2 if len(parts) > 1 else len(longest) // 8]
-        return Grips(_within(middle(section)[None], box), ends, parts)
-    ends = parts[0]
-    return Grips(pivot(section, box)[None], ends, parts)
-
-
-def pivot(section: Section, box: Box) -> FloatArray:
-    """Return the point (2,) that a line turns about: its origin, or the middle of what is seen."""
-    own = _within(middle(section)[None], box)
-    if len(own):
-        return np.asarray(own[0])
-    ends = line_ends(section, box)
-    return middle(section) if ends is None else np.asarray(ends.mean(axis=0))
+    parts = section.in_plane.trace(section, box)
+    return section.in_plane.grips(section, parts, box) if parts else None
 
 
 def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
@@ -94,38 +80,16 @@ def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], bo
     box : (2,), (2,) float64
         What was seen at the start.
     """
-    start, now = way
-    size = float((box[1] - box[0]).max())
-    if section.kind == "cylinder" and part != "middle":
-        radius = float(np.linalg.norm(now - np.asarray(section.origin[:2])))
-        return replace(section, radius=rounded(max(radius, 1e-4 * size), size))
-    if part == "end":
-        centre = pivot(section, box)
-        return _turned(section, centre, now - centre)
-    shift = now - start
-    if part == "line":
-        normal = np.asarray(section.direction[:2]) / np.linalg.norm(section.direction[:2])
-        shift = (shift @ normal) * normal
-    return replace(section, origin=_place(middle(section) + shift, size))
+    return section.in_plane.dragged(section, part, way, box)
 
 
-def _turned(section: Section, centre: FloatArray, way: FloatArray) -> Section:
-    """Return a line along ``way`` (2,) through its centre."""
-    length = float(np.linalg.norm(way))
-    if not length > 0:
-        return section
-    normal = np.array([-way[1], way[0]]) / length
-    if normal @ np.asarray(section.direction[:2]) < 0:
-        normal = -normal
-    x, y = (float(value) for value in normal.round(_DIGITS) + 0.0)
-    return replace(section, origin=(float(centre[0]), float(centre[1]), 0.0), direction=(x, y, 0.0))
-
-
-def _within(points: FloatArray, box: Box) -> FloatArray:
+def within(points: FloatArray, box: Box) -> FloatArray:
+    """Return those of points (n, 2) that are in a box."""
     return points[((points >= box[0]) & (points <= box[1])).all(axis=1)]
 
 
-def _place(point: FloatArray, size: float) -> Triple:
+def rounded_place(point: FloatArray, size: float) -> Triple:
+    """Return a point (2,) without digits that are nothing beside a size, in z = 0."""
     return rounded(float(point[0]), size), rounded(float(point[1]), size), 0.0
 
 

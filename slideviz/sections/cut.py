@@ -210,22 +210,8 @@ def _crossings(
     """Return the points (k, 3) where the section meets the edges from a to b (k,) each."""
     start = padded(points[a])
     way = padded(points[b]) - start
-    before, after = level[a], level[b]
     between = a != b
     share = np.zeros(len(a))
-    if section.kind == "plane":
-        share[between] = before[between] / (before - after)[between]
-        return start + share[:, None] * way
-    # Along an edge the squared radius is a parabola, so the crossing is known exactly.
-    across = section.basis[:2]
-    p, d = (start[between] - np.asarray(section.origin)) @ across.T, way[between] @ across.T
-    square, slope = np.sum(d * d, axis=1), np.sum(p * d, axis=1)
-    rest = np.sum(p * p, axis=1) - section.radius**2
-    root = np.sqrt(np.maximum(slope**2 - square * rest, 0.0))
-    sign = np.where(after[between] > before[between], 1.0, -1.0)
-    # Of the two forms of the root, the one that does not subtract like numbers.
-    stable = sign * slope > 0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(stable, -rest / (slope + sign * root), (sign * root - slope) / square)
-    share[between] = np.clip(np.nan_to_num(found), 0.0, 1.0)
+    levels = level[a[between]], level[b[between]]
+    share[between] = section.shape.crossings(section, (start[between], way[between]), levels)
     return start + share[:, None] * way

@@ -1,16 +1,23 @@
-"""Sections of a 2D mesh as the lines and circles they are: where to draw and to hold them."""
+"""The line that a plane is in a 2D mesh: where to draw and to hold it, and positions along it."""
+
+# ruff: noqa: ARG002  (every shape takes what any of them needs)
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.model import Section
+from slideviz.scene.section_handles import Grips, Part, rounded_place, within
+from slideviz.sections.shape import DIGITS, Label, axis_word, direction_label, triple_words
+
+if TYPE_CHECKING:
+    from slideviz.sections.model import Section
 
 MARGIN = 0.03
 """A line ends this part of the longest extent of a mesh outside of it."""
-_CHORDS = 720
-"""Of a circle."""
 
 Box = tuple[FloatArray, FloatArray]
 """Lowest and highest coordinates, (2,) each."""
@@ -32,16 +39,7 @@ def trace(section: Section, box: Box) -> list[FloatArray]:
         One that cuts 2D meshes.
     box : (2,), (2,) float64
     """
-    if section.kind == "plane":
-        ends = line_ends(section, box)
-        return [] if ends is None else [ends]
-    angle = np.linspace(0.0, 2.0 * np.pi, _CHORDS + 1)
-    ring = section.radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    ring += section.origin[:2]
-    inside = ((ring >= box[0]) & (ring <= box[1])).all(axis=1)
-    starts = np.flatnonzero(np.diff(inside.astype(int))) + 1
-    parts = zip(np.split(ring, starts), np.split(inside, starts), strict=True)
-    return [part for part, kept in parts if kept[0] and len(part) > 1]
+    return section.in_plane.trace(section, box)
 
 
 def line_ends(section: Section, box: Box) -> FloatArray | None:
@@ -49,7 +47,7 @@ def line_ends(section: Section, box: Box) -> FloatArray | None:
     way = along(section)
     if way is None:
         return None
-    start = middle(section)
+    start = LINE.middle(section)
     low, high = -np.inf, np.inf
     for axis in range(2):
         if way[axis] == 0.0:
@@ -71,11 +69,88 @@ def along(section: Section) -> FloatArray | None:
     return -way if way[np.argmax(np.abs(way))] < 0 else way
 
 
-def middle(section: Section) -> FloatArray:
-    """Return the point (2,) of a line in z = 0 that is nearest to its origin; that of a circle."""
-    origin, normal = np.asarray(section.origin), np.asarray(section.direction)
-    flat = normal[:2] @ normal[:2]
-    if section.kind == "cylinder" or not flat > 0:
-        return origin[:2]
-    # A plane that leans in z meets the mesh beside the foot of its origin.
-    return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
+class Line:
+    """A plane in 2D; see `slideviz.sections.shape.InPlane` for what its functions return."""
+
+    def can_cut(self, section: Section) -> bool:
+        """Return yes; one along the mesh cuts nothing, but is a plane."""
+        return True
+
+    def describe(self, section: Section) -> str:
+        """Return it in words: its place on an axis, or slope and point."""
+        where = axis_word(section.direction)
+        if where == "z":
+            return ""
+        if where in "xyz":
+            return f"line {where} = {section.origin['xyz'.index(where)]:.6g}"
+        slope = float(np.degrees(np.arctan2(-section.direction[0], section.direction[1])))
+        at = triple_words(section.origin[:2])
+        return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
+
+    def trace(self, section: Section, box: Box) -> list[FloatArray]:
+        """Return both its ends in a box."""
+        ends = line_ends(section, box)
+        return [] if ends is None else [ends]
+
+    def middle(self, section: Section) -> FloatArray:
+        """Return its point (2,) in z = 0 that is nearest to its origin."""
+        origin, normal = np.asarray(section.origin), np.asarray(section.direction)
+        flat = normal[:2] @ normal[:2]
+        if not flat > 0:
+            return origin[:2]
+        # A plane that leans in z meets the mesh beside the foot of its origin.
+        return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
+
+    def grips(self, section: Section, parts: list[FloatArray], box: Box) -> Grips:
+        """Return where it is held: at its ends, and at the point it turns about."""
+        return Grips(self._pivot(section, box)[None], parts[0], parts)
+
+    def dragged(
+        self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
+    ) -> Section:
+        """Return it turned by an end, or moved by the rest."""
+        start, now = way
+        if part == "end":
+            centre = self._pivot(section, box)
+            return _turned(section, centre, now - centre)
+        shift = now - start
+        if part == "line":
+            normal = np.asarray(section.direction[:2]) / np.linalg.norm(section.direction[:2])
+            shift = (shift @ normal) * normal
+        size = float((box[1] - box[0]).max())
+        return replace(section, origin=rounded_place(self.middle(section) + shift, size))
+
+    def positions(self, section: Section, corners: FloatArray) -> FloatArray:
+        """Return coordinates along it."""
+        way = along(section)
+        assert way is not None
+        return np.asarray(corners @ way)
+
+    def position_label(self, section: Section) -> Label:
+        """Return its direction."""
+        way = along(section)
+        assert way is not None
+        return direction_label(np.append(way, 0.0))
+
+    def _pivot(self, section: Section, box: Box) -> FloatArray:
+        """Return the point (2,) that it turns about: its own, or the middle of what is seen."""
+        own = within(self.middle(section)[None], box)
+        if len(own):
+            return np.asarray(own[0])
+        ends = line_ends(section, box)
+        return self.middle(section) if ends is None else np.asarray(ends.mean(axis=0))
+
+
+LINE = Line()
+
+
+def _turned(section: Section, centre: FloatArray, way: FloatArray) -> Section:
+    """Return a line along ``way`` (2,) through its centre."""
+    length = float(np.linalg.norm(way))
+    if not length > 0:
+        return section
+    normal = np.array([-way[1], way[0]]) / length
+    if normal @ np.asarray(section.direction[:2]) < 0:
+        normal = -normal
+    x, y = (float(value) for value in normal.round(DIGITS) + 0.0)
+    return replace(section, origin=(float(centre[0]), float(centre[1]), 0.0), direction=(x, y, 0.0))

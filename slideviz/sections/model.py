@@ -1,9 +1,9 @@
-"""A section through a mesh: a plane or a cylinder, as a value, and its signed distance."""
+"""A section through a mesh as a value, and the table of the shapes that it can have."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,30 +11,35 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import axis_basis
 from slideviz.mesh.surfaces import padded
-from slideviz.terms import SectionKind
+from slideviz.sections.cylinder import Cylinder
+from slideviz.sections.plane import Plane
+from slideviz.sections.shape import InPlane, Shape
+
+_ALL: tuple[Shape, ...] = (Plane(), Cylinder())
+SHAPES = {shape.terms.value: shape for shape in _ALL}
+"""By name."""
 
 Triple = tuple[float, float, float]
 
 ON_SECTION = 1e-9
 """Nodes nearer than this part of the largest distance are on the section: a layer of nodes that
 lies in it up to rounding gives one layer of cells, not a random mix of both."""
-_DIGITS, _FEW = 4, 2
-"""Digits of each number of a direction or point in words, and where there is little room."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A plane or a cylinder that cuts a mesh.
+    """A plane, cylinder or other surface that cuts a mesh.
 
     Attributes
     ----------
-    kind : "plane" or "cylinder"
+    kind : str
+        Its shape: a key of `SHAPES`.
     origin : (3,) tuple of float
-        A point of the plane, or of the cylinder's axis, in the mesh's length unit.
+        A point of the plane or of the cylinder's axis, in the mesh's length unit.
     direction : (3,) tuple of float
         The plane's normal, or the direction of the axis; any length but zero.
     radius : float
-        Of the cylinder; a plane has none.
+        Of the cylinder.
     whole : bool
         Show the cells it cuts whole, instead of cut.
     name : str
@@ -47,10 +52,10 @@ class Section:
     Raises
     ------
     CaseError
-        A number is not finite, the direction has length zero, or the radius is not positive.
+        A number is not finite, the direction has length zero, or the size cannot be one.
     """
 
-    kind: SectionKind
+    kind: str
     origin: Triple = (0.0, 0.0, 0.0)
     direction: Triple = (0.0, 0.0, 1.0)
     radius: float = 0.0
@@ -60,28 +65,67 @@ class Section:
     flat: bool = False
 
     def __post_init__(self) -> None:
-        numbers = (*self.origin, *self.direction, self.radius)
+        numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms
         if not np.isfinite(numbers).all():
             raise CaseError(f"{self.kind} section: {numbers} has a number that is not finite")
         if not np.linalg.norm(self.direction) > 0:
-            word = "normal" if self.kind == "plane" else "axis"
             raise CaseError(
-                f"{self.kind} section: the {word} 0, 0, 0 has no direction; give 0, 0, 1 or such"
+                f"{self.kind} section: the {terms.direction} 0, 0, 0 has no direction; give 0, 0, "
+                "1 or such"
             )
-        if self.kind == "cylinder" and not self.radius > 0:
+        fault = terms.size.fault(self.size) if terms.size is not None else ""
+        if fault:
+            assert terms.size is not None
             raise CaseError(
-                f"cylinder section: the radius {self.radius:.6g} is not positive; give the "
-                "distance of the section from its axis"
+                f"{self.kind} section: the {terms.size.word} {self.size:.6g} {fault}; "
+                f"{terms.size.remedy}"
             )
+
+    @classmethod
+    def of(cls, kind: str, origin: Triple, direction: Triple, size: float) -> Section:
+        """Return the section of a shape with these numbers; a plane has no size."""
+        own = SHAPES[kind].terms.size
+        sizes: dict[str, Any] = {} if own is None else {own.field: size}
+        return cls(kind, origin, direction, **sizes)
+
+    @property
+    def shape(self) -> Shape:
+        """Return what it is, and can do."""
+        return SHAPES[self.kind]
+
+    @property
+    def in_plane(self) -> InPlane:
+        """Return what it is in the plane of a 2D mesh that it can cut."""
+        seen = self.shape.in_plane
+        assert seen is not None
+        return seen
+
+    @property
+    def size(self) -> float:
+        """Return the number that its shape has beside a point and a direction; 0 where none."""
+        size = self.shape.terms.size
+        return 0.0 if size is None else float(getattr(self, size.field))
+
+    def sized(self, value: float) -> Section:
+        """Return the section with another size.
+
+        Raises
+        ------
+        CaseError
+            The shape cannot have it.
+        """
+        size = self.shape.terms.size
+        assert size is not None
+        return replace(self, **{size.field: float(value)})  # type: ignore[arg-type]
 
     @property
     def basis(self) -> FloatArray:
         """Return rows e1, e2, e3 (3, 3), right-handed, e3 along the normal or the axis.
 
-        An axis has no sign: e3 points to the positive side of its largest component.
+        An axis that has no sign points to the positive side of its largest component.
         """
         base = axis_basis(self.direction)
-        if self.kind == "cylinder" and base[2, np.argmax(np.abs(base[2]))] < 0:
+        if not self.shape.directed and base[2, np.argmax(np.abs(base[2]))] < 0:
             return axis_basis(-base[2])
         return base
 
@@ -90,90 +134,36 @@ class Section:
         return (padded(points) - np.asarray(self.origin)) @ self.basis.T
 
     def distance(self, points: FloatArray) -> FloatArray:
-        """Return signed distances (n,): along the normal, or outwards from the cylinder.
+        """Return signed distances (n,): along the normal, or outwards from the axis.
 
         What is on the section up to rounding is at 0 exactly (see `ON_SECTION`).
         """
         base, origin = self.basis, np.asarray(self.origin)
         dim = points.shape[1]
 
-        def along(row: FloatArray) -> FloatArray:
+        def along(row: int) -> FloatArray:
             # Not by BLAS, whose threads wait for each other when the machine is busy.
-            return np.einsum("nd,d->n", points, row[:dim]) - origin @ row
+            return np.einsum("nd,d->n", points, base[row, :dim]) - origin @ base[row]
 
-        if self.kind == "plane":
-            gap = along(base[2])
-        else:
-            gap = np.hypot(along(base[0]), along(base[1])) - self.radius
+        gap = self.shape.distance(self, along)
         size = np.abs(gap)
         gap[size <= ON_SECTION * size.max(initial=0.0)] = 0.0
         return gap
-
-    def reach(self, points: FloatArray) -> tuple[float, float]:
-        """Return the range over points (n, d) of what a slider moves: offset, or radius.
-
-        The offset of a plane is measured along its normal from its origin.
-        """
-        if self.kind == "plane":
-            along = self.frame(points)[:, 2]
-            return float(along.min()), float(along.max())
-        local = self.frame(points)
-        radii = np.hypot(local[:, 0], local[:, 1])
-        return float(radii.min()), float(radii.max())
 
     def can_cut(self, dim: int) -> bool:
         """Tell whether it can cut meshes of 2 or 3 dimensions at all.
 
         A cylinder meets the plane of a 2D mesh in a circle where its axis is z.
         """
-        return dim == 3 or self.kind == "plane" or _axis_word(self.direction) == "z"
+        seen = self.shape.in_plane
+        return dim == 3 or (seen is not None and seen.can_cut(self))
 
     def describe(self, dim: int = 3) -> str:
         """Return the section in words, for people; in 2D it is a line or a circle."""
-        where = _axis_word(self.direction)
-        if dim == 2 and (self.kind == "cylinder") == (where == "z"):
-            return self._in_plane(where)
-        if self.kind == "cylinder":
-            centre = np.asarray(self.origin)
-            off_axis = np.linalg.norm(np.cross(centre, self.basis[2]))
-            through = f" through {_triple(self.origin)}" if off_axis > 0 else ""
-            return f"cylinder r = {self.radius:.6g} about {where}{through}"
-        if where in "xyz":
-            return f"plane {where} = {self.origin['xyz'.index(where)]:.6g}"
-        return f"plane with normal {where} through {_triple(self.origin)}"
+        seen = self.shape.in_plane
+        words = seen.describe(self) if dim == 2 and seen is not None else ""
+        return words or self.shape.describe(self)
 
     def brief(self, dim: int = 3) -> str:
         """Return the section in few words, for a list that has what `describe` says beside it."""
-        where = _axis_word(self.direction, _FEW)
-        if dim == 2 or (self.kind == "plane" and where in "xyz"):
-            return self.describe(dim)
-        if self.kind == "plane":
-            position = float(np.asarray(self.origin) @ self.basis[2])
-            return f"plane ⊥ {where} at {position:.3g}"
-        centre = np.asarray(self.origin)
-        off_axis = np.linalg.norm(np.cross(centre, self.basis[2]))
-        at = f" at {_triple(self.origin, _FEW)}" if off_axis > 0 else ""
-        return f"cylinder r = {self.radius:.6g} about {where}{at}"
-
-    def _in_plane(self, where: str) -> str:
-        """Return in words what it is in the plane of a 2D mesh."""
-        at = _triple(self.origin[:2])
-        if self.kind == "cylinder":
-            return f"circle r = {self.radius:.6g} about {at}"
-        if where in "xyz":
-            return f"line {where} = {self.origin['xyz'.index(where)]:.6g}"
-        slope = float(np.degrees(np.arctan2(-self.direction[0], self.direction[1])))
-        return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
-
-
-def _axis_word(direction: Triple, digits: int = _DIGITS) -> str:
-    """Return x, y or z where the direction is that axis, either way, else its components."""
-    unit = np.asarray(direction) / np.linalg.norm(direction)
-    for word, axis in zip("xyz", np.eye(3), strict=True):
-        if np.abs(unit @ axis) > 1.0 - 1e-12:
-            return word
-    return _triple(direction, digits)
-
-
-def _triple(values: Sequence[float], digits: int = _DIGITS) -> str:
-    return f"({', '.join(f'{value + 0.0:.{digits}g}' for value in values)})"
+        return self.describe(dim) if dim == 2 else self.shape.brief(self)

@@ -30,6 +30,8 @@ from slideviz.session.changes_runs import (
 from slideviz.session.changes_view import (
     TASTE,
     add_section,
+    choose_section,
+    flat_one,
     fresh_view,
     isolate,
     lay_flat,
@@ -40,6 +42,7 @@ from slideviz.session.changes_view import (
     set_view,
     show,
     show_frame,
+    show_handle,
 )
 from slideviz.session.colors import fit_colours
 from slideviz.session.opening import open_mesh, suggested_reduction
@@ -52,9 +55,11 @@ __all__ = [
     "add_frames",
     "add_motion",
     "add_section",
+    "choose_section",
     "confirm",
     "end_run",
     "fit_colours",
+    "flat_one",
     "fresh_view",
     "is_missing",
     "isolate",
@@ -80,6 +85,7 @@ __all__ = [
     "show",
     "show_beside",
     "show_frame",
+    "show_handle",
     "show_run",
     "start_run",
     "suggested_reduction",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,9 @@ def set_view(session: Session, **values: Any) -> Session:
         # Cells chosen by a quality say nothing of a displacement, and the other way round.
         if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
+    if "sections" in values:
+        chosen = followed(old.chosen, old.sections, values["sections"])
+        values.setdefault("chosen", chosen)
     return replace(session, view=replace(old, **values))
 
 
@@ -87,6 +90,39 @@ def lay_flat(session: Session, index: int | None) -> Session:
     """Return the session with the section at that place laid flat beside the view; None: none."""
     laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
     return set_view(session, sections=tuple(laid))
+
+
+def choose_section(session: Session, index: int | None) -> Session:
+    """Return the session with the section at that place chosen; None: none."""
+    return set_view(session, chosen=index)
+
+
+def show_handle(session: Session, shown: bool) -> Session:
+    """Return the session with the handle of the section that is chosen shown, or not."""
+    return set_view(session, handle=shown)
+
+
+def flat_one(sections: Sequence[Section]) -> int | None:
+    """Return the place of the section that is laid flat and shown, if one is."""
+    return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
+
+
+def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
+    """Return where the chosen section is after one was added, taken away or changed.
+
+    One that was added is chosen; after the chosen one is gone, its neighbour is.
+    """
+    if not new:
+        return None
+    if len(new) == len(old) and index is not None:
+        return index
+    first = next(
+        (i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b),
+        min(len(old), len(new)),
+    )
+    if len(new) > len(old) or index is None:
+        return min(first, len(new) - 1)
+    return min(index - (index > first), len(new) - 1)
 
 
 def mark(session: Session, cell: int | None) -> Session:

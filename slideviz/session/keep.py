@@ -84,8 +84,8 @@ def _plain(view: ViewState) -> dict[str, Any]:
 
 
 def _text(section: Section) -> SectionText:
-    radius = (section.radius,) if section.kind == "cylinder" else ()
-    numbers = (*radius, *section.direction, *section.origin)
+    size = () if section.shape.terms.size is None else (section.size,)
+    numbers = (*size, *section.direction, *section.origin)
     return (
         section.kind,
         tuple(float(n) for n in numbers),
@@ -97,6 +97,6 @@ def _text(section: Section) -> SectionText:
 
 def _section(text: SectionText) -> Section:
     kind, numbers, whole, flat, shown = text
-    radius, rest = (numbers[0], numbers[1:]) if kind == "cylinder" else (0.0, numbers)
-    origin, direction = rest[3:], rest[:3]
-    return Section(kind, origin, direction, radius, whole, shown=shown, flat=flat)  # type: ignore[arg-type]
+    *size, a, b, c, x, y, z = numbers
+    section = Section.of(kind, (x, y, z), (a, b, c), sum(size))
+    return replace(section, whole=whole, shown=shown, flat=flat)

@@ -11,6 +11,7 @@ import numpy as np
 from slideviz.case.model import Case, Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
+from slideviz.session.changes_view import flat_one
 from slideviz.session.guess import guess_case, guess_roles
 from slideviz.session.keep import kept_view
 from slideviz.session.state import Frame, Run, Session, ViewState
@@ -34,6 +35,8 @@ def open_mesh(
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
     view = kept_view(chosen, ViewState(), mesh.marker_names)
+    flat = flat_one(view.sections)
+    view = replace(view, chosen=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
     session = Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)

@@ -116,7 +116,7 @@ def keeps(section: Section, matrix: FloatArray) -> bool:
     axis, origin = section.basis[2], np.asarray(section.origin)
     turned = matrix[:3, :3] @ axis
     step = moved(origin[None], matrix)[0] - origin
-    off = abs(step @ axis) if section.kind == "plane" else np.linalg.norm(np.cross(step, axis))
+    off = section.shape.keeps(section, turned, step)
     size = max(section.radius, float(np.linalg.norm(origin)), float(np.linalg.norm(step)))
     return bool(np.linalg.norm(np.cross(turned, axis)) <= _SAME and off <= _SAME * size)
 

@@ -30,6 +30,8 @@ WORDS: dict[str, str] = {
     "replace_section": "section",
     "remove_section": "removing a section",
     "lay_flat": "flat view",
+    "choose_section": "choice of a section",
+    "show_handle": "handle",
     "show": "hidden boundaries",
     "isolate": "hidden boundaries",
     "remove_run": "removing a run",

@@ -41,7 +41,7 @@ class ViewState:
     perspective : bool
         Perspective instead of parallel projection (3D only).
     sections : tuple of Section
-        Planes and cylinders that cut the mesh.
+        What cuts the mesh.
     copies : int
         Passages drawn on each side of a periodic mesh; -1 draws all there are.
     hidden : frozenset of str
@@ -58,6 +58,10 @@ class ViewState:
         Whether the second view stands to the left of the first.
     ranges : tuple of (str, (float, float))
         The colour ranges of what else the view was coloured by.
+    chosen : int or None
+        The place of the section that is worked on.
+    handle : bool
+        Whether it shows its handle, to be dragged.
     """
 
     colour_by: ColourBy = "role"
@@ -80,8 +84,17 @@ class ViewState:
     beside: int | None = None
     swapped: bool = False
     ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
+    chosen: int | None = None
+    handle: bool = False
 
     @property
     def style(self) -> ViewState:
         """Return it without what passes: the step, what is selected or marked, the second view."""
         return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
+
+    @property
+    def section(self) -> Section | None:
+        """Return the section that is chosen."""
+        if self.chosen is None or self.chosen >= len(self.sections):
+            return None
+        return self.sections[self.chosen]

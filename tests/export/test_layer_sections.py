@@ -131,7 +131,7 @@ def test_nothing_is_cut_again_when_only_the_colours_change(scene, cube):
     scene.update(session)
     assert scene.sections.drawn["section:0"].polygons is before
     assert not scene.plotter.actors["section:0"].prop.show_edges
-    session = changes.replace_section(session, 0, section_start.at_position(MIDDLE, 0.7))
+    session = changes.replace_section(session, 0, MIDDLE.shape.at_position(MIDDLE, 0.7))
     scene.update(session)
     assert cells_of(scene).tolist() == crossing(cube, 2, 0.7).tolist()
 
@@ -387,7 +387,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
     first = cuts.of(cube, MIDDLE)
     assert cuts.of(cube, Section("plane", MIDDLE.origin, MIDDLE.direction, name="mine")) is first
     for z in np.linspace(0.1, 0.2, KEPT):
-        cuts.of(cube, section_start.at_position(MIDDLE, z))
+        cuts.of(cube, MIDDLE.shape.at_position(MIDDLE, z))
     assert cuts.of(cube, MIDDLE) is not first
     shifted = cube.with_points(cube.points + 0.1)
     assert cuts.of(shifted, MIDDLE).cell_ids.tolist() == crossing(shifted, 2, 0.46).tolist()
@@ -401,9 +401,9 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
 def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     mesh = square.with_points(square.points * (3.0, 1.0))
     session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
-    plane = section_start.first_plane(session)
+    plane = section_start.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
-    assert section_start.position(plane) == 6.0
+    assert plane.shape.position(plane) == 6.0
     assert plane.whole
 
 
@@ -411,7 +411,7 @@ def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     mesh = stator.mesh
     session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), stator.case)
     pair = find_period(mesh, stator.case)
-    cylinder = section_start.first_cylinder(session, pair)
+    cylinder = section_start.first_section("cylinder", session, pair)
     assert np.cross(cylinder.direction, (0, 0, 1)) == pytest.approx(0.0)
     radii = np.unique(np.hypot(*mesh.points[:, :2].T).round(9))
     low, high = radii[0], radii[-1]
@@ -420,18 +420,18 @@ def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     # Along it rounding would say which cells are cut: the middle of the next ones is.
     assert np.abs(radii - cylinder.radius).min() > 1e-3 * (high - low)
     assert abs(cylinder.radius - middle) < np.diff(radii).max()
-    assert section_start.first_cylinder(session, None).direction == stator.case.axis
+    assert section_start.first_section("cylinder", session, None).direction == stator.case.axis
 
 
 def test_positions_move_a_plane_along_its_normal():
     plane = Section("plane", (1.0, 2.0, 3.0), (0.0, 3.0, 4.0))
-    assert section_start.position(plane) == pytest.approx(3.6)
-    there = section_start.at_position(plane, 4.6)
+    assert plane.shape.position(plane) == pytest.approx(3.6)
+    there = plane.shape.at_position(plane, 4.6)
     assert there.origin == pytest.approx((1.0, 2.6, 3.8))
     low, high = section_start.span(plane, np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]]))
     assert (low, high) == pytest.approx((0.0, 3.0))
     with pytest.raises(CaseError, match="radius -1 is not positive"):
-        section_start.at_position(Section("cylinder", radius=1.0), -1.0)
+        Section("cylinder", radius=1.0).sized(-1.0)
 
 
 def test_a_turned_plane_still_cuts(cube):

@@ -97,7 +97,7 @@ def opened(desk: Desk, window, place: Path) -> None:
         for name in (left, right, lower):
             window.docks_.lead_to(name)
         if lower == "sections":
-            window.docks_.panels["sections"].add_plane.click()
+            window.docks_.panels["sections"].add["plane"].click()
         photograph(desk, window, f"panels_{right}_{lower}")
     tell_panels(desk, window, "panels")
     tell_contexts(desk, window)

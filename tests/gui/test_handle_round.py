@@ -9,7 +9,6 @@ from qtpy.QtWidgets import QApplication
 from slideviz.gui.viewport.handle import PlaneHandle
 from slideviz.gui.viewport.handle_round import RoundHandle
 from slideviz.samples.table import write_sample
-from slideviz.scene.cylinder_handle import on_cylinder
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 
@@ -27,7 +26,7 @@ def panel(window, driver, wheel):
     window.docks_.lead_to("sections")
     QApplication.processEvents()
     panel = window.docks_.panels["sections"]
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["cylinder"])
     panel.handle.click()
     window.view.snapshot()
     return panel
@@ -40,7 +39,9 @@ def sections(window):
 def ball(window, view=None):
     """Where the ball is, in space."""
     handle = window.cutting.handles.of(view or window.view)
-    (point,) = on_cylinder(handle.section, np.array([handle.place]), handle.section.radius)
+    (point,) = handle.section.shape.surface(
+        handle.section, np.array([handle.place]), handle.section.size
+    )
     return point
 
 
@@ -178,7 +179,7 @@ def test_it_leaves_nothing(window, driver, panel):
 
 
 def test_another_kind_of_section_has_another_handle(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     assert not marks(window.view)
     assert isinstance(window.cutting.handles.of(window.view), PlaneHandle)
     panel.list.setCurrentRow(0)

@@ -9,7 +9,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.cutting import followed, place_for
+from slideviz.gui.viewport.cutting import place_for
 from slideviz.gui.viewport.flats import stack
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
@@ -17,6 +17,7 @@ from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.sections.model import Section
 from slideviz.session import changes
+from slideviz.session.changes_view import followed
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def drag(slider, to):
 
 
 def test_a_plane_is_added_moved_shown_whole_and_removed(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     (plane,) = sections(window)
     assert plane.kind == "plane"
     assert panel.list.item(0).text() == plane.describe()
@@ -79,7 +80,7 @@ def test_a_plane_is_added_moved_shown_whole_and_removed(window, driver, panel):
 
 
 def test_each_drag_of_the_slider_is_undone_as_one(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     first = sections(window)
     drag(panel.editor.slider, 0.2)
     second = sections(window)
@@ -99,7 +100,7 @@ def test_each_drag_of_the_slider_is_undone_as_one(window, driver, panel):
 
 
 def test_numbers_are_typed(window, driver, panel):
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["cylinder"])
     (cylinder,) = sections(window)
     assert cylinder.kind == "cylinder"
     driver.type(panel.editor.number, "0.4")
@@ -132,7 +133,7 @@ def test_in_2d_the_menu_offers_a_line_and_a_circle(window, driver, flat_panel):
 
 
 def test_a_free_normal(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     assert not panel.editor.direction.isVisible()
     driver.choose(panel.editor.axis, "free")
     assert panel.editor.direction.isVisible()
@@ -150,7 +151,7 @@ def test_a_free_normal(window, driver, panel):
 
 def test_an_undone_tilt_is_no_free_normal_any_more(window, driver, panel):
     editor = panel.editor
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     driver.choose(editor.axis, "z")
     panel.handle.click()
     handle = window.cutting.handles.of(window.view)
@@ -169,14 +170,14 @@ def test_an_undone_tilt_is_no_free_normal_any_more(window, driver, panel):
     driver.type(editor.direction.fields[0], "0")
     assert editor.axis.currentData() == "free"
     assert editor.direction.isVisible()
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     assert editor.axis.currentData() != "free"
     panel.list.setCurrentRow(0)
     assert editor.axis.currentData() == "z"
 
 
 def test_a_hidden_section_has_no_flat_view_until_it_is_shown_again(window, driver, panel):
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["cylinder"])
     panel.flat.click()
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
     assert window.cutting.flat is None
@@ -188,12 +189,12 @@ def test_a_hidden_section_has_no_flat_view_until_it_is_shown_again(window, drive
 
 
 def test_several_are_listed_hidden_and_chosen(window, driver, panel):
-    driver.click(panel.add_plane)
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["plane"])
+    driver.click(panel.add["cylinder"])
     assert [panel.list.item(row).text() for row in (0, 1)] == [
         section.describe() for section in sections(window)
     ]
-    assert window.cutting.chosen == 1
+    assert window.store.session.view.chosen == 1
     panel.list.item(1).setCheckState(Qt.CheckState.Unchecked)
     assert [section.shown for section in sections(window)] == [True, False]
     assert set(window.scene.sections.drawn) == {"section:0"}
@@ -204,14 +205,14 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
     assert panel.handle.toolTip() not in (tip, "")
     driver.click(panel.remove)
     assert [section.kind for section in sections(window)] == ["plane"]
-    assert window.cutting.chosen == 0
+    assert window.store.session.view.chosen == 0
 
 
 def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, wheel):
     driver.open(wheel)
     window.docks_.lead_to("sections")
     panel = window.docks_.panels["sections"]
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["cylinder"])
     assert panel.flat.text() == "Unrolled"
     panel.flat.click()
     flat = window.cutting.flat
@@ -240,8 +241,8 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
 
 
 def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_path, answers):
-    driver.click(panel.add_plane)
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["plane"])
+    driver.click(panel.add["cylinder"])
     panel.flat.click()
     assert window.cutting.flat.scene.section.kind == "cylinder"
     answers("ask_save", tmp_path / "again.cfg")
@@ -251,12 +252,12 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     assert window.cutting.flat is None
     driver.open(tmp_path / "again.cfg")
     assert window.cutting.flat.scene.section.kind == "cylinder"
-    assert window.cutting.chosen == 1
+    assert window.store.session.view.chosen == 1
     assert panel.flat.isChecked()
 
 
 def test_the_flat_view_shows_the_step(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     flat = window.cutting.flat
     window.start_run()
@@ -270,7 +271,7 @@ def test_the_flat_view_shows_the_step(window, driver, panel):
 
 
 def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     flat = window.cutting.flat
     driver.qtbot.waitUntil(flat.view.isVisible)
@@ -287,7 +288,7 @@ def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
 
 
 def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     (plane,) = sections(window)
     panel.handle.click()
     handle = window.cutting.handles.of(window.view)
@@ -312,7 +313,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
 
 
 def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.handle.click()
     handle = window.cutting.handles.of(window.view)
     for state, then in (("MovingOrigin", "Pushing"), ("Rotating", "Rotating")):
@@ -323,7 +324,7 @@ def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver,
 
 
 def test_a_hidden_section_of_a_case_has_its_box(window, driver, panel, passage_file, tmp_path):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
     assert not sections(window)[0].shown
     hidden = window.store.session.view.sections
@@ -343,23 +344,23 @@ def test_two_strips_lie_one_above_the_other_where_they_are_larger_so():
 
 
 def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, passage_file):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.handle.click()
     panel.flat.click()
     driver.open(passage_file)
     assert not window.cutting.handles
     assert window.cutting.flat is None
     assert sections(window) == ()
-    assert panel.add_plane.text() == "Line"
-    assert panel.add_cylinder.text() == "Circle"
-    driver.click(panel.add_plane)
+    assert panel.add["plane"].text() == "Line"
+    assert panel.add["cylinder"].text() == "Circle"
+    driver.click(panel.add["plane"])
     assert sections(window)[0].whole
     assert panel.list.item(0).text() == sections(window)[0].describe(2)
     assert window.scene.sections.drawn["section:0"].shown.shape.n_cells > 0
 
 
 def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     window.start_run()
     driver.settle()
@@ -400,7 +401,7 @@ def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
 
 
 def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_panel):
-    driver.click(flat_panel.add_plane)
+    driver.click(flat_panel.add["plane"])
     assert flat_panel.flat.text() == "Curve"
     flat_panel.flat.click()
     view = window.cutting.flat
@@ -429,7 +430,7 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
 
 
 def test_the_curve_is_saved(window, driver, flat_panel, answers, tmp_path):
-    driver.click(flat_panel.add_cylinder)
+    driver.click(flat_panel.add["cylinder"])
     flat_panel.flat.click()
     answers("ask_save", tmp_path / "along.svg")
     driver.click(window.cutting.flat.save_button)
@@ -439,10 +440,10 @@ def test_the_curve_is_saved(window, driver, flat_panel, answers, tmp_path):
 def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
     window, driver, panel, passage_file, tmp_path, answers
 ):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     driver.open(passage_file)
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     answers("ask_save", tmp_path / "again.cfg")
     window.actions_.by_name["save_case"].trigger()
@@ -476,7 +477,7 @@ def drag_in_view(view, start, end):
 
 
 def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, flat_panel):
-    driver.click(flat_panel.add_plane)
+    driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     window.view.snapshot()
     camera = window.scene.eye.place
@@ -500,7 +501,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
 
 
 def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
-    driver.click(flat_panel.add_cylinder)
+    driver.click(flat_panel.add["cylinder"])
     (circle,) = sections(window)
     assert circle.direction == (0.0, 0.0, 1.0)
     assert not flat_panel.editor.axis.isVisible()
@@ -520,7 +521,7 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
 
 
 def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
-    driver.click(flat_panel.add_plane)
+    driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     assert any(name.startswith("handle:") for name in window.view.actors)
     handle = window.cutting.handles.of(window.view)
@@ -539,7 +540,7 @@ def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
 
 
 def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel, monkeypatch):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.handle.click()
     panel.flat.click()
     QApplication.processEvents()
@@ -552,7 +553,7 @@ def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel,
 
 
 def test_a_closed_flat_view_is_freed(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.flat.click()
     QApplication.processEvents()
     view, scene = weakref.ref(window.cutting.flat), weakref.ref(window.cutting.flat.scene)
@@ -565,7 +566,7 @@ def test_a_closed_flat_view_is_freed(window, driver, panel):
 
 
 def test_look_along_the_normal(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     driver.choose(panel.editor.axis, "x")
     driver.click(panel.look)
     assert abs(np.array(window.view.camera.direction)[0]) == pytest.approx(1.0)
@@ -581,7 +582,7 @@ def compare(window, driver):
 
 
 def test_of_two_views_each_has_a_handle(window, driver, panel):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     panel.handle.click()
     handles = window.cutting.handles
     first = handles.of(window.view)
@@ -603,7 +604,7 @@ def test_of_two_views_each_has_a_handle(window, driver, panel):
 
 def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
     second_view = compare(window, driver)
-    driver.click(flat_panel.add_plane)
+    driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     second_view.snapshot()
     (line,) = sections(window)
@@ -616,7 +617,7 @@ def test_a_line_is_dragged_in_the_second_view(window, driver, flat_panel):
 
 
 def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_path):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     asked = answers("ask_save", tmp_path / "cut.svg")
     assert panel.picture.menu() is panel.sizes
     panel.sizes.actions()[0].trigger()
@@ -628,7 +629,7 @@ def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_p
 
 
 def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers, tmp_path):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     answers("ask_save", tmp_path / "cut.bmp")
     panel.sizes.actions()[-1].trigger()
     driver.settle()
@@ -637,7 +638,7 @@ def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers
 
 
 def test_the_panel_fits_its_dock(window, panel, driver):
-    driver.click(panel.add_cylinder)
+    driver.click(panel.add["cylinder"])
     driver.choose(panel.editor.axis, "free")
     QApplication.processEvents()
     assert panel.minimumSizeHint().width() <= 300

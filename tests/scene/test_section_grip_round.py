@@ -5,13 +5,11 @@ import pytest
 
 from slideviz.scene.cylinder_handle import (
     frame_of,
-    on_cylinder,
-    outside,
     patch_in,
-    patch_of,
     pull,
-    radius_at,
+    pulled_size,
 )
+from slideviz.sections.around_axis import patch_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 from tests.builders import grid, ring
@@ -29,7 +27,7 @@ def test_the_middle_of_a_sector_is_in_it_wherever_it_lies(start):
     patch = patch_in(CUT, sector(start), Cuts())
     assert np.ptp(patch.angles) == pytest.approx(np.radians(30.0))
     assert patch.along == pytest.approx((0.0, 1.0))
-    (ball,) = on_cylinder(CUT, np.array([patch.middle]), 0.7)
+    (ball,) = CUT.shape.surface(CUT, np.array([patch.middle]), 0.7)
     middle = np.radians(start + 15.0)
     assert ball == pytest.approx((0.7 * np.cos(middle), 0.7 * np.sin(middle), 0.5))
     lines = frame_of(CUT, patch)
@@ -54,9 +52,9 @@ def test_it_is_not_held_in_a_hole():
     angle, along = np.meshgrid(np.radians(np.linspace(0, 30, 31)), np.linspace(0, 1, 31))
     places = np.column_stack([angle.ravel(), along.ravel()])
     away = np.abs(places - (np.radians(15.0), 0.5)) * (0.7, 1.0)
-    points = on_cylinder(CUT, places[np.linalg.norm(away, axis=1) > 0.15], 0.7)
+    points = CUT.shape.surface(CUT, places[np.linalg.norm(away, axis=1) > 0.15], 0.7)
     patch = patch_of(CUT, points)
-    (ball,) = on_cylinder(CUT, np.array([patch.middle]), 0.7)
+    (ball,) = CUT.shape.surface(CUT, np.array([patch.middle]), 0.7)
     assert np.linalg.norm(points - ball, axis=1).min() < 1e-9
 
 
@@ -68,7 +66,7 @@ def test_where_nothing_is_cut_it_is_beside_the_mesh():
 def test_from_outside_the_axis_is_to_the_right():
     section = Section("cylinder", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0), 0.7)
     points = np.array([[1.7, 2.0, 3.0], [1.69, 2.5, 3.1]])
-    right, up, to_eye = outside(section, patch_of(section, points))
+    right, up, to_eye = section.shape.facing(section, points)
     assert right == pytest.approx((0.0, 1.0, 0.0))
     assert np.cross(right, up) == pytest.approx(to_eye)
     assert to_eye[0] > 0.99
@@ -89,12 +87,12 @@ def test_the_ball_follows_the_mouse(seen):
     leaning = Section("cylinder", (0.1, 0.0, 0.0), (1.0, 0.0, 0.5), 0.7)
     for section in (CUT, leaning):
         place = (0.5, 0.25)
-        ends = (on_cylinder(section, np.array([place]), radius) for radius in (0.7, 1.1))
+        ends = (section.shape.surface(section, np.array([place]), radius) for radius in (0.7, 1.1))
         start, end = (seen(point)[0] for point in ends)
         # Wherever in the ball the mouse has it.
         held = np.array([3.0, -2.0])
-        assert radius_at(seen, section, place, (start + held, end + held)) == pytest.approx(1.1)
-        assert radius_at(seen, section, place, (start, start - 1e6 * (end - start))) > 0.0
+        assert pulled_size(seen, section, place, (start + held, end + held)) == pytest.approx(1.1)
+        assert pulled_size(seen, section, place, (start, start - 1e6 * (end - start))) > 0.0
 
 
 def test_along_the_radius_upwards_is_outwards():
@@ -105,4 +103,4 @@ def test_along_the_radius_upwards_is_outwards():
     assert steep
     assert way == pytest.approx((0.0, 100.0))
     way = at, at + np.array([5.0, 20.0])
-    assert radius_at(parallel, section, place, way) == pytest.approx(0.9)
+    assert pulled_size(parallel, section, place, way) == pytest.approx(0.9)

@@ -13,6 +13,7 @@ from slideviz.sections.cases import cut_cases
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import joined
+from slideviz.session.section_start import span
 from tests.builders import cube, passage, permuted, square
 from tests.oracles.sections import cut_cells, height
 
@@ -272,11 +273,10 @@ def test_cells_of_no_kind_that_a_mesh_has_are_no_trouble():
 def test_the_reach_tells_where_a_section_meets_the_mesh():
     mesh = passage()
     radii = np.hypot(mesh.points[:, 0], mesh.points[:, 1])
-    low, high = Section("cylinder", radius=1.0).reach(mesh.points)
+    low, high = span(Section("cylinder", radius=1.0), mesh.points)
     assert (low, high) == pytest.approx((radii.min(), radii.max()))
-    low, high = Section("plane", (0, 0, 0.25), (0, 0, 2)).reach(mesh.points)
-    span = mesh.points[:, 2].min() - 0.25, mesh.points[:, 2].max() - 0.25
-    assert (low, high) == pytest.approx(span)
+    low, high = span(Section("plane", (0, 0, 0.25), (0, 0, 2)), mesh.points)
+    assert (low, high) == pytest.approx((mesh.points[:, 2].min(), mesh.points[:, 2].max()))
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,13 @@ import pytest
 
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.sections.unroll import flat_labels, flatten, middle_angle, plane_axes, unroll
+from slideviz.sections.plane import plane_axes
 from tests.builders import cube, grid, passage, ring
 from tests.sections.test_section import areas
+
+
+def flatten(polygons, section, near=None):
+    return section.shape.flatten(section, polygons, near, near)
 
 
 def turned(mesh, degrees):
@@ -29,12 +33,13 @@ def test_a_sector_unrolls_to_a_rectangle_wherever_it_lies(start, kind):
     shape = (4, 6, 5)
     mesh = grid(shape, kind=kind, place=ring(shape, 0.5, 1.0, 30.0, start))
     section = Section("cylinder", radius=0.7)
-    flat = unroll(Cutter.of(mesh).cut(mesh.points, section), section)
+    cut = Cutter.of(mesh).cut(mesh.points, section)
+    flat = flatten(cut, section)
     span = np.ptp(flat.points, axis=0)
     assert span == pytest.approx([1.0, 0.7 * np.radians(30), 0.0], abs=1e-12)
     assert areas(flat).sum() == pytest.approx(0.7 * np.radians(30), abs=1e-12)
     wanted = np.radians(start + 15)
-    assert np.cos(middle_angle(flat, section) - wanted) == pytest.approx(1.0)
+    assert np.cos(section.shape.middle(section, cut) - wanted) == pytest.approx(1.0)
 
 
 def test_a_whole_ring_is_opened_once_and_no_polygon_is_torn():
@@ -42,7 +47,7 @@ def test_a_whole_ring_is_opened_once_and_no_polygon_is_torn():
     mesh = grid(shape, wrap=1, place=ring(shape, 0.5, 1.0, 360.0))
     section = Section("cylinder", radius=0.7)
     cut = Cutter.of(mesh).cut(mesh.points, section)
-    flat = unroll(cut, section)
+    flat = flatten(cut, section)
     assert flat.cells.tolist() == cut.cells.tolist()
     assert areas(flat).sum() == pytest.approx(0.7 * 2 * np.pi, abs=1e-12)
     assert widest(flat)[1] == pytest.approx(0.7 * 2 * np.pi / 24)
@@ -54,7 +59,7 @@ def test_the_seam_is_in_the_empty_part():
     shape = (3, 30, 2)
     mesh = grid(shape, place=ring(shape, 0.5, 1.0, 300.0, 100.0))
     section = Section("cylinder", radius=0.8)
-    flat = unroll(Cutter.of(mesh).cut(mesh.points, section), section)
+    flat = flatten(Cutter.of(mesh).cut(mesh.points, section), section)
     assert np.ptp(flat.points[:, 1]) == pytest.approx(0.8 * np.radians(300))
 
 
@@ -65,8 +70,9 @@ def test_copies_are_laid_beside_each_other():
     near, tops = None, []
     for number in range(9):
         points = turned(mesh, 30 * number).points
-        flat = unroll(cutter.cut(points, section), section, near)
-        near = middle_angle(flat, section) + np.radians(30)
+        cut = cutter.cut(points, section)
+        flat = flatten(cut, section, near)
+        near = section.shape.middle(section, cut, near) + np.radians(30)
         tops.append(flat.points[:, 1].max())
     assert np.diff(tops) == pytest.approx(0.7 * np.radians(30))
 
@@ -74,23 +80,23 @@ def test_copies_are_laid_beside_each_other():
 def test_axis_and_centre_do_not_change_the_unrolled_shape():
     mesh = passage()
     section = Section("cylinder", radius=0.7)
-    flat = unroll(Cutter.of(mesh).cut(mesh.points, section), section)
+    flat = flatten(Cutter.of(mesh).cut(mesh.points, section), section)
     # x to y to z to x, and away from the origin.
     shift = np.array([3.0, -1.0, 2.0])
     points = np.roll(mesh.points, 1, axis=1) + shift
     other = Section("cylinder", tuple(shift), (5.0, 0, 0), 0.7)
-    again = unroll(Cutter.of(mesh).cut(points, other), other)
+    again = flatten(Cutter.of(mesh).cut(points, other), other)
     assert areas(again) == pytest.approx(areas(flat))
     assert np.ptp(again.points, axis=0) == pytest.approx(np.ptp(flat.points, axis=0), abs=1e-12)
     # Positions along the axis are coordinates.
     assert again.points[:, 0].min() == pytest.approx(3.0)
-    assert [label.full for label in flat_labels(other)] == ["x", "r θ"]
+    assert [label.full for label in other.shape.flat_labels(other)] == ["x", "r θ"]
 
 
 def test_the_sign_of_an_axis_does_not_matter():
     mesh = passage()
     one, other = (Section("cylinder", (0, 0, 0), (0, 0, s), 0.7) for s in (1, -1))
-    flat = [unroll(Cutter.of(mesh).cut(mesh.points, s), s) for s in (one, other)]
+    flat = [flatten(Cutter.of(mesh).cut(mesh.points, s), s) for s in (one, other)]
     assert flat[0].points == pytest.approx(flat[1].points)
 
 
@@ -98,7 +104,7 @@ def test_whole_cells_keep_their_distance_from_the_cylinder():
     mesh = passage()
     section = Section("cylinder", radius=0.7, whole=True)
     cut = Cutter.of(mesh).show(mesh.points, section)
-    flat = unroll(cut, section)
+    flat = flatten(cut, section)
     radii = np.unique(np.hypot(cut.points[:, 0], cut.points[:, 1]).round(9))
     assert np.unique(flat.points[:, 2].round(9)) == pytest.approx(radii - 0.7)
 
@@ -114,7 +120,7 @@ def test_planes_along_the_axes_show_coordinates(normal, labels, sign):
     section = Section("plane", (10.4, 20.4, 30.4), tuple(sign * v for v in normal))
     cut = Cutter.of(mesh).cut(points, section)
     flat = flatten(cut, section)
-    assert tuple(label.short for label in flat_labels(section)) == labels
+    assert tuple(label.short for label in section.shape.flat_labels(section)) == labels
     wanted = cut.points[:, ["xyz".index(label) for label in labels]]
     assert flat.points[:, :2] == pytest.approx(wanted)
     assert np.abs(flat.points[:, 2]).max() < 1e-12

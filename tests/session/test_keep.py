@@ -112,7 +112,7 @@ def test_sections_are_read_as_written():
         ),
         ("VIEW_SECTIONS", "(plane, 1, 0, 0, cut)", "a plane has 6 numbers, 3 are given"),
         ("VIEW_SECTIONS", "(plane, 0, 0, 0, 1, 1, 1, cut)", "its direction has no length"),
-        ("VIEW_SECTIONS", "(cylinder, 0, 0, 0, 1, 0, 0, 0, cut)", "the radius 0 is not above 0"),
+        ("VIEW_SECTIONS", "(cylinder, 0, 0, 0, 1, 0, 0, 0, cut)", "the radius 0 is not positive"),
         ("VIEW_RANGE", "(1, 0)", "does not rise"),
         ("VIEW_RANGE", "(1, 2, 3)", "has 3 numbers"),
         ("VIEW_SHOW", "( edges, egdes )", "'egdes' is not one of"),

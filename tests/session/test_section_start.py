@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from slideviz.mesh.quality import quality
+from slideviz.sections.round_number import round_middle
 from slideviz.session import changes
-from slideviz.session.section_start import first_cylinder, first_plane, position, round_middle
+from slideviz.session.section_start import first_section
 from slideviz.session.state import Frame
 from tests.builders import grid, ring
 
@@ -50,10 +51,10 @@ def test_sections_start_in_the_middle_of_the_step_that_is_shown():
     session = session_of(mesh)
     longest = int(np.argmax(np.ptp(mesh.points, axis=0)))
     low, high = np.sort(mesh.points[:, longest])[[0, -1]]
-    plane, cylinder = first_plane(session), first_cylinder(session, None)
-    for value in (position(plane), cylinder.radius):
+    plane, cylinder = (first_section(kind, session) for kind in ("plane", "cylinder"))
+    for value in (plane.shape.position(plane), cylinder.radius):
         assert len(f"{value:.6g}") <= 5
-    assert abs(position(plane) - (low + high) / 2.0) < 0.15 * (high - low)
+    assert abs(plane.shape.position(plane) - (low + high) / 2.0) < 0.15 * (high - low)
     radii = np.hypot(*mesh.points[:, :2].T)
     assert np.abs(radii - cylinder.radius).min() > 0.003
     assert cylinder.radius == pytest.approx(0.2875, abs=0.02)
@@ -63,6 +64,7 @@ def test_sections_start_in_the_middle_of_the_step_that_is_shown():
     run = changes.add_frames(run, [Frame(later, quality(later))])
     shown = changes.set_view(run, frame=1)
     assert shown.frame.mesh is later
-    assert first_cylinder(shown, None).radius == pytest.approx(0.575, abs=0.04)
-    assert abs(position(first_plane(shown)) - (low + high)) < 0.3 * (high - low)
-    assert replace(first_plane(shown), origin=plane.origin) == plane
+    assert first_section("cylinder", shown).radius == pytest.approx(0.575, abs=0.04)
+    moved = first_section("plane", shown)
+    assert abs(moved.shape.position(moved) - (low + high)) < 0.3 * (high - low)
+    assert replace(moved, origin=plane.origin) == plane

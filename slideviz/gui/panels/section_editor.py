@@ -1,4 +1,4 @@
-"""The form for one section: direction, place or radius, whole cells or cut."""
+"""The form for one section: direction, point, position or size, whole cells or cut."""
 
 from __future__ import annotations
 
@@ -90,7 +90,8 @@ class SectionEditor(QWidget):
                 line.addWidget(widget, stretch)
         form.addRow(self.axis_name, first)
         form.addRow("", self.direction)
-        form.addRow("Centre", self.centre)
+        self.centre_name = QLabel("Centre")
+        form.addRow(self.centre_name, self.centre)
         form.addRow(self.place_name, second)
         self.form = form
 
@@ -107,33 +108,29 @@ class SectionEditor(QWidget):
             return
         if mesh is not self._mesh:
             self._mesh, self._points = mesh, section_start.cell_points(mesh)
-        cylinder, flat = section.kind == "cylinder", mesh.dim == 2
+        terms, flat = section.shape.terms, mesh.dim == 2
+        # The axis of a circle cannot be another.
+        fixed = flat and bool(terms.point)
         word = _axis_of(section)
         # Undone or turned by the handle, it is shown as what it is now.
         if other and not self._typing:
             self._free = False
         self._free = self._free or word == FREE
-        # The axis of a circle cannot be another.
-        self.axis.setVisible(not (cylinder and flat))
-        self.axis_name.setText("" if cylinder and flat else "Axis" if cylinder else "Normal")
-        self.place_name.setText("Radius" if cylinder else "Position")
-        self.axis.setToolTip("Direction of the axis." if cylinder else "Direction of the normal.")
-        shape = "line" if flat else "plane"
-        self.number.set_tip(
-            "The radius, in the mesh's length unit."
-            if cylinder
-            else f"How far the {shape} is from 0 along its normal, in the mesh's length unit."
-        )
+        self.axis.setVisible(not fixed)
+        self.axis_name.setText("" if fixed else terms.direction.capitalize())
+        self.centre_name.setText(terms.point)
+        self.place_name.setText("Position" if terms.size is None else terms.size.label)
+        self.axis.setToolTip(f"Direction of the {terms.direction}.")
+        self.number.set_tip(terms.tip(mesh.dim))
         self.axis.show_value(FREE if self._free else word)
         self.direction.set_count(mesh.dim)
         self.centre.set_count(mesh.dim)
-        point = "The middle of the circle" if flat else "A point of the axis"
-        self.centre.set_tip(f"{point}, in the mesh's length unit.")
+        self.centre.set_tip(f"{terms.point_tip(mesh.dim)}, in the mesh's length unit.")
         self.direction.show_value(section.direction)
         self.centre.show_value(section.origin)
         for widget, shown in (
-            (self.direction, self._free and not (cylinder and flat)),
-            (self.centre, cylinder),
+            (self.direction, self._free and not fixed),
+            (self.centre, bool(terms.point)),
         ):
             self.form.setRowVisible(widget, shown)
         with QSignalBlocker(self.whole):
@@ -148,13 +145,13 @@ class SectionEditor(QWidget):
         item.setEnabled(not flat)
 
     def _sync_place(self, section: Section) -> None:
-        """Show position or radius; the range is looked for again only where it may differ."""
-        centre = section.origin if section.kind == "cylinder" else ()
+        """Show position or size; the range is looked for again only where it may differ."""
+        centre = section.origin if section.shape.terms.point else ()
         key = (self._mesh, section.kind, section.direction, centre)
         if key != self._span_of:
             assert self._points is not None
             self._span_of, self._span = key, section_start.span(section, self._points)
-        value, (low, high) = section_start.position(section), self._span
+        value, (low, high) = section.shape.position(section), self._span
         self.number.show_value(float(f"{value:.6g}"))
         if self.slider.isSliderDown() or self._soon.isActive():
             return  # the mouse knows better
@@ -197,13 +194,13 @@ class SectionEditor(QWidget):
 
     def _position_typed(self, value: float) -> None:
         if self._section is not None:
-            self._offer(section_start.at_position(self._section, value))
+            self._offer(self._section.shape.at_position(self._section, value))
 
     def _allowed(self, value: float) -> str:
         if self._section is None:
             return ""
         try:
-            section_start.at_position(self._section, value)
+            self._section.shape.at_position(self._section, value)
         except CaseError as problem:
             return str(problem)
         return ""
@@ -220,7 +217,8 @@ class SectionEditor(QWidget):
         low, high = self._span
         # A cylinder has no radius 0, and a plane in the outermost nodes cuts nothing.
         share = np.clip(self.slider.value() / STEPS, 1e-4, 1.0 - 1e-4)
-        self._offer(section_start.at_position(self._section, low + float(share) * (high - low)))
+        value = low + float(share) * (high - low)
+        self._offer(self._section.shape.at_position(self._section, value))
 
 
 def _way(section: Section | None) -> tuple[object, ...]:
@@ -231,6 +229,7 @@ def _axis_of(section: Section) -> str:
     """Return x, y or z where the direction is that axis, else ``FREE``."""
     unit = np.asarray(section.direction) / np.linalg.norm(section.direction)
     for word, axis in AXES.items():
-        if abs(unit @ np.asarray(axis)) > 1.0 - 1e-12:
+        along = float(unit @ np.asarray(axis))
+        if (along if section.shape.terms.one_way else abs(along)) > 1.0 - 1e-12:
             return word
     return FREE

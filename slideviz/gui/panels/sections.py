@@ -1,8 +1,9 @@
-"""The sections panel: planes and cylinders through the mesh, and the form for one of them."""
+"""The sections panel: what cuts the mesh, and the form for one section."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
@@ -21,9 +22,9 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.export.section_job import Paper, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
-from slideviz.gui.panels.section_words import HINTS, NAMES, TIPS, UNSEEN
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
@@ -32,12 +33,17 @@ from slideviz.scene.passages import Period
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.section_cuts import can_cut
-from slideviz.session.section_start import first_cylinder, first_plane
+from slideviz.session.section_start import first_section
 from slideviz.session.state import Session
 
 if TYPE_CHECKING:
     from slideviz.gui.viewport.cutting import Cutting
 
+HINTS = {
+    3: f"Cut the mesh with a {names()} to see its cells inside.",
+    2: f"Lay a {names(2)} through the mesh to see the cells on it, and their quality along it.",
+}
+UNSEEN = "Tick the section in the list to show it."
 PICTURES = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 SIZES = {
     "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
@@ -54,7 +60,7 @@ class SectionsPanel(QWidget):
     Parameters
     ----------
     cutting : Cutting
-        Knows which section is chosen, and shows its handle and its flat view.
+        Shows handle and flat view of the section that is chosen.
     """
 
     picture_wanted = Signal(object)
@@ -69,23 +75,18 @@ class SectionsPanel(QWidget):
         self._make_list()
         self._make_rest()
         self.store.listen(self._session_changed)
-        cutting.changed.connect(lambda: self.sync(self.store.session))
         self.sync(self.store.session)
 
     # Parts -----------------------------------------------------------------------------
 
     def _make_list(self) -> None:
-        self.add_plane, self.add_cylinder = (QPushButton(word) for word in NAMES[3])
-        self.add_plane.clicked.connect(self._add_plane)
-        self.add_cylinder.clicked.connect(self._add_cylinder)
+        self.add = {kind: QPushButton(row.words[3].name) for kind, row in SECTION_SHAPES.items()}
+        for kind, button in self.add.items():
+            button.clicked.connect(partial(self._add, kind))
         self.remove = QToolButton()
         self.remove.setToolTip("Remove the section (Delete)")
         self.remove.clicked.connect(self._remove)
-        self._icons += [
-            (self.add_plane, "add"),
-            (self.add_cylinder, "add"),
-            (self.remove, "remove"),
-        ]
+        self._icons += [*((button, "add") for button in self.add.values()), (self.remove, "remove")]
         self.list = QListWidget()
         self.list.setObjectName("section_list")
         self.list.setMinimumHeight(48)
@@ -106,7 +107,7 @@ class SectionsPanel(QWidget):
         self.editor.changed.connect(self._replace)
         self.editor.held.connect(self.store.hold)
         self.handle, self.flat = QCheckBox("Handle"), QCheckBox("Flat view")
-        self.handle.clicked.connect(self.cutting.want_handle)
+        self.handle.clicked.connect(self._want_handle)
         self.flat.clicked.connect(self.cutting.want_flat)
         self.look, self.picture = QToolButton(), QToolButton()
         self.look.clicked.connect(self.cutting.look_along)
@@ -121,7 +122,7 @@ class SectionsPanel(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(6, 6, 6, 6)
         column.setSpacing(5)
-        column.addLayout(_row(self.add_plane, self.add_cylinder, None, self.remove))
+        column.addLayout(_row(*self.add.values(), None, self.remove))
         column.addWidget(self.hint)
         column.addWidget(self.list, 1)
         column.addWidget(self.editor)
@@ -142,35 +143,33 @@ class SectionsPanel(QWidget):
     # What is shown ---------------------------------------------------------------------
 
     def _session_changed(self, old: Session, new: Session) -> None:
-        same = old.mesh is new.mesh and old.view.sections == new.view.sections
-        if not same:
+        names = ("sections", "chosen", "handle")
+        views = ([getattr(one.view, name) for name in names] for one in (old, new))
+        if old.mesh is not new.mesh or next(views) != next(views):
             self.sync(new)
 
     def sync(self, session: Session) -> None:
         """Show the sections of a session."""
         mesh, sections = session.mesh, session.view.sections
-        flat = mesh is not None and mesh.dim == 2
-        dim = 2 if flat else 3
+        dim = mesh.dim if mesh is not None else 3
         self.hint.setText(HINTS[dim])
-        for button, word in zip((self.add_plane, self.add_cylinder), NAMES[dim], strict=True):
-            button.setText(word)
+        for kind, button in self.add.items():
+            words = SECTION_SHAPES[kind].words.get(dim)
+            button.setVisible(words is not None)
             button.setEnabled(mesh is not None)
-        self.add_plane.setToolTip(f"Add a {NAMES[dim][0].lower()} through the middle of the mesh.")
-        self.add_cylinder.setToolTip(
-            "Add a circle around what moves, or about the axis of the period."
-            if flat
-            else "Add a cylinder about the axis of the machine."
-        )
+            if words is not None:
+                button.setText(words.name)
+                button.setToolTip(words.add)
         self._sync_list(session)
-        chosen = self.cutting.section
+        chosen = session.view.section
         for widget in (self.list, self.tools):
             widget.setVisible(bool(sections))
         for widget in (self.hint, self.rest):
             widget.setVisible(not sections)
         self.remove.setEnabled(chosen is not None)
         fits = chosen is not None and can_cut(mesh, chosen)
-        self.editor.show_section(chosen if fits else None, mesh, self.cutting.chosen)
-        self._sync_tools(chosen, flat)
+        self.editor.show_section(chosen if fits else None, mesh, session.view.chosen)
+        self._sync_tools(session, dim)
 
     def _sync_list(self, session: Session) -> None:
         sections = session.view.sections
@@ -192,43 +191,45 @@ class SectionsPanel(QWidget):
                 # A new row has no box at all, which reads as one without its tick.
                 if item.data(Qt.ItemDataRole.CheckStateRole) is None or item.checkState() != state:
                     item.setCheckState(state)
-            chosen = self.cutting.chosen
+            chosen = session.view.chosen
             self.list.setCurrentRow(-1 if chosen is None else chosen)
 
-    def _sync_tools(self, chosen: Section | None, flat: bool) -> None:
-        plane = chosen is None or chosen.kind == "plane"
-        kind = ("line" if plane else "circle") if flat else ("plane" if plane else "cylinder")
-        tips = TIPS[kind]
+    def _sync_tools(self, session: Session, dim: int) -> None:
+        chosen = session.view.section
+        row = SECTION_SHAPES["plane" if chosen is None else chosen.kind]
+        words = row.words.get(dim, row.words[3])
         shown = chosen is not None and chosen.shown
-        for box, words, tip in (
-            (self.handle, "Handle", tips.handle),
-            (self.flat, "Curve" if flat else "Flat view" if plane else "Unrolled", tips.flat),
+        for box, name, tip in (
+            (self.handle, "Handle", words.handle),
+            (self.flat, words.flat_name, words.flat),
         ):
-            box.setText(words)
+            box.setText(name)
             box.setEnabled(shown)
             box.setToolTip(tip if shown else UNSEEN)
-        self.handle.setChecked(self.cutting.wants_handle)
-        self.flat.setChecked(self.cutting.is_flat)
-        self.look.setToolTip(tips.look)
-        self.look.setVisible(not flat)
+        self.handle.setChecked(session.view.handle)
+        self.flat.setChecked(chosen is not None and chosen.flat)
+        self.look.setToolTip(words.look)
+        self.look.setVisible(bool(words.look))
 
     # What is wanted --------------------------------------------------------------------
 
-    def _add_plane(self) -> None:
-        self.store.change(changes.add_section, first_plane(self.store.session))
-
-    def _add_cylinder(self) -> None:
+    def _add(self, kind: str, _checked: bool = False) -> None:
         session = self.store.session
         pair = self._period.of(session)
-        self.store.change(changes.add_section, first_cylinder(session, pair))
+        self.store.change(changes.add_section, first_section(kind, session, pair))
+
+    def _want_handle(self, shown: bool) -> None:
+        self.store.change(changes.show_handle, shown)
 
     def _remove(self) -> None:
-        if self.cutting.section is not None:
-            self.store.change(changes.remove_section, self.cutting.chosen)
+        view = self.store.session.view
+        if view.section is not None:
+            self.store.change(changes.remove_section, view.chosen)
 
     def _replace(self, section: Section) -> None:
-        if self.cutting.section is not None:
-            self.store.change(changes.replace_section, self.cutting.chosen, section)
+        view = self.store.session.view
+        if view.section is not None:
+            self.store.change(changes.replace_section, view.chosen, section)
 
     def _checked(self, item: QListWidgetItem) -> None:
         row = self.list.row(item)
@@ -239,7 +240,7 @@ class SectionsPanel(QWidget):
 
     def _row_chosen(self, row: int) -> None:
         if row >= 0:
-            self.cutting.choose(row)
+            self.store.change(changes.choose_section, row)
 
 
 def sections_panel(window: Any) -> SectionsPanel:
@@ -251,7 +252,7 @@ def sections_panel(window: Any) -> SectionsPanel:
 
 def save_picture(window: Any, paper: Paper) -> None:
     """Ask for a name and write a picture of the section that is chosen, as it is shown."""
-    session, section = window.store.session, window.cutting.section
+    session, section = window.store.session, window.store.session.view.section
     if section is None or session.frame is None or window.runner.busy:
         return
     stem = session.path.stem if session.path is not None else "mesh"

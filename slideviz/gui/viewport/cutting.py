@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from qtpy.QtCore import Qt, Signal
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QSplitter
 
 from slideviz.gui.viewport.canvas import View3D
@@ -13,10 +11,9 @@ from slideviz.gui.viewport.flats import FRAME_PX, Flats, beside
 from slideviz.gui.viewport.handles import Handles
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.mesh.model import Mesh
-from slideviz.scene.cylinder_handle import outside, patch_in
+from slideviz.scene.cylinder_handle import points_near
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
-from slideviz.sections.unroll import plane_axes
 from slideviz.session import changes
 from slideviz.session.section_cuts import can_cut
 from slideviz.session.state import Session
@@ -34,10 +31,6 @@ class Cutting(QSplitter):
 
     Attributes
     ----------
-    chosen : int or None
-        The place of the section in the list of the view.
-    wants_handle : bool
-        Whether the chosen section gets a handle.
     handles
         Of the section, one in each view while they are wanted.
     flats
@@ -46,18 +39,15 @@ class Cutting(QSplitter):
         Their colours.
     """
 
-    changed = Signal()
-
     def __init__(self, viewing: Viewing, multi_samples: int, parent=None) -> None:
         super().__init__(Qt.Orientation.Vertical, parent)
         self.setChildrenCollapsible(False)
         self.viewing, self.store = viewing, viewing.store
         self.addWidget(viewing)
         self._multi_samples = multi_samples
-        self.chosen: int | None = None
-        self.wants_handle = False
         self.handles = Handles(self._replaced, self.store.hold)
         self.flats: Flats | None = None
+        self._closed = False
         self._kind: tuple[object, ...] = ()
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
@@ -69,10 +59,7 @@ class Cutting(QSplitter):
     @property
     def section(self) -> Section | None:
         """Return the section that is chosen."""
-        sections = self.store.session.view.sections
-        if self.chosen is None or self.chosen >= len(sections):
-            return None
-        return sections[self.chosen]
+        return self.store.session.view.section
 
     @property
     def flat(self):
@@ -84,32 +71,20 @@ class Cutting(QSplitter):
         """Tell whether the section that is chosen is laid flat."""
         return self.section is not None and self.section.flat
 
-    def choose(self, index: int | None) -> None:
-        """Choose a section."""
-        if index != self.chosen:
-            self.chosen = index
-            self._sync()
-
-    def want_handle(self, wanted: bool) -> None:
-        """Show the handle of the section that is chosen, or do not."""
-        self.wants_handle = wanted
-        self._sync()
-
     def want_flat(self, wanted: bool) -> None:
         """Lay the chosen section flat beside the 3D view, or do not."""
         if wanted != self.is_flat or not wanted:
-            self.store.change(changes.lay_flat, self.chosen if wanted else None)
+            at = self.store.session.view.chosen if wanted else None
+            self.store.change(changes.lay_flat, at)
 
     def look_along(self) -> None:
-        """Look at the plane that is chosen along its normal, or at the cylinder from outside."""
+        """Look at the plane that is chosen along its normal, at what has an axis from outside."""
         section, session = self.section, self.store.session
         if section is None or session.frame is None or session.frame.mesh.dim == 2:
             return
         scene = self.viewing.scene
-        if section.kind == "plane":
-            rows = plane_axes(section).rows
-        else:
-            rows = outside(section, patch_in(section, session.frame.mesh, scene.sections.cuts))
+        points = points_near(section, session.frame.mesh, scene.sections.cuts)
+        rows = section.shape.facing(section, points)
         camera = scene.plotter.camera
         camera.position = np.asarray(camera.focal_point) + rows[2] * camera.distance
         camera.up = rows[1]
@@ -121,25 +96,19 @@ class Cutting(QSplitter):
         if old.mesh is not new.mesh:
             # What a 3D mesh needs is of another kind than what a 2D one does.
             self._drop_flats()
-            flat = flat_one(new.view.sections)
-            self.chosen = flat if flat is not None else 0 if new.view.sections else None
-            self.wants_handle = False
-        elif old.view.sections != new.view.sections:
-            self.chosen = followed(self.chosen, old.view.sections, new.view.sections)
-        elif self.flats is None and not self.handles:
-            return
-        self._sync()
+        idle = self.flats is None and not self.handles and not new.view.handle
+        if not idle or old.mesh is not new.mesh or old.view.sections != new.view.sections:
+            self._sync()
 
     def _sync(self) -> None:
         session = self.store.session
         self._sync_handles(session)
         self._sync_flat(session)
-        self.changed.emit()
 
     def _sync_handles(self, session: Session) -> None:
         mesh, section = session.mesh, self.section
         usable = section is not None and section.shown and can_cut(mesh, section)
-        if self.wants_handle and usable and session.frame is not None:
+        if session.view.handle and usable and session.frame is not None and not self._closed:
             self.handles.show(self._shown(session), section, mesh, self.look)
         else:
             self.handles.clear()
@@ -152,10 +121,11 @@ class Cutting(QSplitter):
 
     def _replaced(self, section: Section) -> None:
         if self.section is not None and section != self.section:
-            self.store.change(changes.replace_section, self.chosen, section)
+            chosen = self.store.session.view.chosen
+            self.store.change(changes.replace_section, chosen, section)
 
     def _sync_flat(self, session: Session) -> None:
-        at = flat_one(session.view.sections)
+        at = changes.flat_one(session.view.sections)
         section = session.view.sections[at] if at is not None else None
         if section is None or session.frame is None or not can_cut(session.mesh, section):
             self._drop_flats()
@@ -211,7 +181,7 @@ class Cutting(QSplitter):
         if self.flats is not None:
             self.flats.close_views()
             self.flats = None
-        self.wants_handle = False
+        self._closed = True
 
 
 def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool, float]:
@@ -232,26 +202,3 @@ def place_for(extent: tuple[float, float], room: tuple[int, int]) -> tuple[bool,
     # What a strip cannot fill is left to the view.
     needed = (high / wide * width + FRAME_PX) / height
     return False, float(np.clip(needed, 0.6 * _SHARE, _SHARE))
-
-
-def flat_one(sections: Sequence[Section]) -> int | None:
-    """Return the place of the section that is laid flat and shown, if one is."""
-    return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
-
-
-def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
-    """Return where the chosen section is after one was added, taken away or changed.
-
-    One that was added is chosen; after the chosen one is gone, its neighbour is.
-    """
-    if not new:
-        return None
-    if len(new) == len(old) and index is not None:
-        return index
-    first = next(
-        (i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b),
-        min(len(old), len(new)),
-    )
-    if len(new) > len(old) or index is None:
-        return min(first, len(new) - 1)
-    return min(index - (index > first), len(new) - 1)

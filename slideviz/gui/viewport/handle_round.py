@@ -1,9 +1,8 @@
-"""The handle of a cylinder through a 3D mesh: a frame around the cut, and a ball to pull it by."""
+"""The handle of what has an axis in a 3D mesh: a frame around the cut, and a ball to pull it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,21 +13,15 @@ from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.pull_mark import PullMark
 from slideviz.gui.viewport.pulled import EDGE_PX, REACH_PX, Pulled
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.cylinder_handle import (
-    Patch,
-    Place,
-    frame_of,
-    on_cylinder,
-    pull,
-    radius_at,
-)
+from slideviz.scene.cylinder_handle import frame_of, pull, pulled_size
 from slideviz.scene.pick import to_display
 from slideviz.scene.section_handles import rounded
+from slideviz.sections.around_axis import Patch, Place, shape_of
 from slideviz.sections.model import Section
 
 
 class RoundHandle(Pulled[tuple[Section, Place]]):
-    """A ball on a cylinder that the mouse changes its radius by.
+    """A ball on a section about an axis that the mouse changes its size by, as its radius.
 
     It lies on what is cut of the mesh, where that is seen, and in front of everything.
 
@@ -69,7 +62,7 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
         if self.section is None or self._patch is None:
             return
         self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
-        at, way, _ = pull(self.seen, self.section, self.place, self.section.radius)
+        at, way, _ = pull(self.seen, self.section, self.place, self.section.size)
         self._mark.draw_ball(at, way / np.linalg.norm(way))
         self._mark.highlight(self._part is not None)
         if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
@@ -80,7 +73,7 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
         """Return where the ball lies: in the middle, or beside it in a detail of the view."""
         assert self.section is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
-        pixels = self.seen(on_cylinder(self.section, places, self.section.radius))
+        pixels = self.seen(shape_of(self.section).surface(self.section, places, self.section.size))
         wide, high = self.view.window_size
         end = np.array([wide - self._strip() - EDGE_PX, high - EDGE_PX])
         within = ((pixels >= EDGE_PX) & (pixels <= end)).all(axis=1)
@@ -100,11 +93,9 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
         """Return whether the mouse would take the ball at a position of the widget."""
         if self.section is None or self.place is None:
             return None
-        ball = on_cylinder(self.section, np.array([self.place]), self.section.radius)
+        at, *_ = pull(self.seen, self.section, self.place, self.section.size)
         reach = REACH_PX * self.view.devicePixelRatioF()
-        return (
-            "ball" if np.linalg.norm(self.seen(ball)[0] - self.place_of(where)) <= reach else None
-        )
+        return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
     def grasp(self) -> tuple[Section, Place]:
         """Return the section, and where the ball lies."""
@@ -113,7 +104,7 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
         return self.section, self.place
 
     def pulled(self, grasp: tuple[Section, Place], start: FloatArray, end: FloatArray) -> Section:
-        """Return the cylinder with another radius."""
+        """Return the section with another size."""
         section, place = grasp
-        radius = radius_at(self.seen, section, place, (start, end))
-        return replace(section, radius=rounded(radius, section.radius))
+        size = pulled_size(self.seen, section, place, (start, end))
+        return section.sized(rounded(size, section.size))

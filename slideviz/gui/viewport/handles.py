@@ -97,7 +97,7 @@ class Handles:
 
     def _dragged(self, origin: Triple, normal: Triple) -> None:
         section = self._section
-        if section is None or section.kind != "plane":
+        if section is None:
             return
         moved = replace(section, origin=origin, direction=normal)
         if not np.allclose(moved.origin, section.origin) or not np.allclose(
@@ -110,7 +110,7 @@ def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
     """Return what moves a section of a mesh."""
     if mesh.dim == 2:
         return FlatHandle
-    return PlaneHandle if section.kind == "plane" else RoundHandle
+    return {"push": PlaneHandle, "pull": RoundHandle}[section.shape.handle]
 
 
 def _around(mesh: Mesh) -> Bounds:

@@ -1,4 +1,4 @@
-"""A ball between two arrows, and a frame: what shows where a cylinder can be pulled."""
+"""A ball between two arrows, and a frame: what shows where a section can be pulled."""
 
 from __future__ import annotations
 

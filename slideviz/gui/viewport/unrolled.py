@@ -1,4 +1,4 @@
-"""The flat view of a section beside the 3D view: a cylinder unrolled to (z, r theta)."""
+"""The flat view of a section beside the 3D view: unrolled, or seen along its normal."""
 
 from __future__ import annotations
 

@@ -8,6 +8,8 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QFontMetrics
 from qtpy.QtWidgets import QLabel, QToolTip, QWidget
 
+from slideviz.case.section_shapes import SECTION_SHAPES
+
 TIPS: dict[str, str] = {
     "open": "Open a mesh, or a case with its mesh.",
     "open_recent": "Open one of the files used last.",
@@ -37,9 +39,7 @@ TIPS: dict[str, str] = {
     "sideiso": "Look at the mesh from a corner.",
     "compare": "Show the undeformed mesh or another run beside the run that is shown.",
     "show_all": "Show the boundaries that were hidden.",
-    "add_plane": "Show the cells that a plane, in 2D a line, cuts, and put it where you want.",
-    "add_cylinder": "Show the cells that a cylinder about the axis cuts, and unroll it; in 2D a "
-    "circle.",
+    **{f"add_{kind}": row.tip_to_add for kind, row in SECTION_SHAPES.items()},
     "steps": "Show another step of the deformation.",
     "step_first": "Show the mesh before it is deformed.",
     "step_previous": "Show the step before this one.",

@@ -1,0 +1,184 @@
+"""The cylinder, a shape of sections: the distance from its axis; in 2D it is a circle."""
+
+# ruff: noqa: ARG002  (every shape takes what any of them needs)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.case.section_shapes import SECTION_SHAPES
+from slideviz.mesh.model import FloatArray
+from slideviz.scene.section_handles import Grips, Part, rounded, rounded_place, within
+from slideviz.sections.around_axis import AboutAxis, Unrolled
+from slideviz.sections.shape import (
+    DIGITS,
+    FEW,
+    InPlane,
+    Label,
+    axis_word,
+    direction_label,
+    triple_words,
+)
+
+if TYPE_CHECKING:
+    from slideviz.sections.line import Box
+    from slideviz.sections.model import Section
+
+_CHORDS = 720
+"""Of a circle."""
+
+
+class Circle:
+    """A cylinder in 2D; see `slideviz.sections.shape.InPlane`."""
+
+    def can_cut(self, section: Section) -> bool:
+        """Tell whether the axis is z."""
+        return axis_word(section.direction) == "z"
+
+    def describe(self, section: Section) -> str:
+        """Return radius and centre in words."""
+        at = triple_words(section.origin[:2])
+        return f"circle r = {section.radius:.6g} about {at}" if self.can_cut(section) else ""
+
+    def trace(self, section: Section, box: Box) -> list[FloatArray]:
+        """Return its arcs in a box."""
+        angle = np.linspace(0.0, 2.0 * np.pi, _CHORDS + 1)
+        ring = section.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        ring += section.origin[:2]
+        inside = ((ring >= box[0]) & (ring <= box[1])).all(axis=1)
+        starts = np.flatnonzero(np.diff(inside.astype(int))) + 1
+        parts = zip(np.split(ring, starts), np.split(inside, starts), strict=True)
+        return [part for part, kept in parts if kept[0] and len(part) > 1]
+
+    def middle(self, section: Section) -> FloatArray:
+        """Return its centre (2,)."""
+        return np.asarray(section.origin)[:2]
+
+    def grips(self, section: Section, parts: list[FloatArray], box: Box) -> Grips:
+        """Return where it is held: in its centre, and at a point of it."""
+        longest = max(parts, key=len)
+        ends = longest[None, len(longest) // 2 if len(parts) > 1 else len(longest) // 8]
+        return Grips(within(self.middle(section)[None], box), ends, parts)
+
+    def dragged(
+        self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
+    ) -> Section:
+        """Return it moved by its centre, or with another radius by the rest."""
+        start, now = way
+        size = float((box[1] - box[0]).max())
+        if part == "middle":
+            return replace(section, origin=rounded_place(self.middle(section) + now - start, size))
+        radius = float(np.linalg.norm(now - np.asarray(section.origin[:2])))
+        return replace(section, radius=rounded(max(radius, 1e-4 * size), size))
+
+    def positions(self, section: Section, corners: FloatArray) -> FloatArray:
+        """Return angles in degrees.
+
+        The middle of each line is in -180 to 180, always: curves of several meshes are above
+        each other.
+        """
+        corners = corners - np.asarray(section.origin[:2])
+        start, end = np.degrees(np.arctan2(corners[..., 1], corners[..., 0])).T
+        end = start + (end - start + 180.0) % 360.0 - 180.0
+        turn = 360.0 * np.floor(((start + end) / 2.0 + 180.0) / 360.0)
+        return np.column_stack([start - turn, end - turn])
+
+    def position_label(self, section: Section) -> Label:
+        """Return that they are angles."""
+        return Label("angle [°]", "θ [°]")
+
+
+class Cylinder(AboutAxis):
+    """The cylinder; see `slideviz.sections.shape.Shape` for what its functions return."""
+
+    terms = SECTION_SHAPES["cylinder"]
+    in_plane: InPlane | None = Circle()
+    directed = False
+
+    def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
+        """Return how far points are outside of it, (n,)."""
+        return np.asarray(np.hypot(along(0), along(1)) - section.radius)
+
+    def quadric(self, section: Section) -> tuple[FloatArray, float]:
+        """Return that the squared radius is the same on it."""
+        return np.array([1.0, 1.0, 0.0]), section.radius**2
+
+    def positions(self, section: Section, points: FloatArray) -> FloatArray:
+        """Return the radii (n,) of points."""
+        local = section.frame(points)
+        return np.asarray(np.hypot(local[:, 0], local[:, 1]))
+
+    def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
+        """Return how far it goes across its axis."""
+        return float(np.linalg.norm(np.cross(step, section.basis[2])))
+
+    def describe(self, section: Section) -> str:
+        """Return radius and axis in words."""
+        return self._words(section, axis_word(section.direction), " through", DIGITS)
+
+    def brief(self, section: Section) -> str:
+        """Return the same in few words."""
+        return self._words(section, axis_word(section.direction, FEW), " at", FEW)
+
+    def _words(self, section: Section, where: str, point: str, digits: int) -> str:
+        off_axis = np.linalg.norm(np.cross(np.asarray(section.origin), section.basis[2]))
+        at = f"{point} {triple_words(section.origin, digits)}" if off_axis > 0 else ""
+        return f"cylinder r = {section.radius:.6g} about {where}{at}"
+
+    def miss(self, section: Section, points: FloatArray) -> str:
+        """Return between which radii it would cut."""
+        radii = self.positions(section, points)
+        return (
+            f"misses the mesh, which has radii {radii.min():.6g} to {radii.max():.6g} about this "
+            "axis"
+        )
+
+    def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
+        """Return position along the axis; radius times the angle; and distance outwards."""
+        local = opened.local
+        along = local[:, 2] + np.asarray(section.origin) @ section.basis[2]
+        outwards = np.hypot(local[:, 0], local[:, 1]) - section.radius
+        return np.stack([along, section.radius * opened.angle, outwards], axis=1)
+
+    def ahead(self, section: Section, points: FloatArray) -> float | None:
+        """Return None: its axis is to the right at every angle."""
+        return None
+
+    def flat_labels(self, section: Section) -> tuple[Label, Label]:
+        """Return the axis, and r theta."""
+        return direction_label(section.basis[2]), Label("r θ", "r θ")
+
+    def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
+        """Return a shift along the axis and around it."""
+        origin, flat = np.asarray(section.origin), np.eye(4)
+        step = matrix[:3, :3] @ origin + matrix[:3, 3] - origin
+        flat[0, 3] = step @ section.basis[2]
+        flat[1, 3] = section.radius * angle
+        return flat
+
+    def places(self, section: Section, points: FloatArray) -> FloatArray:
+        """Return angles, and positions along the axis from the centre."""
+        local = section.frame(points)
+        return np.column_stack([np.arctan2(local[:, 1], local[:, 0]), local[:, 2]])
+
+    def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
+        """Return places at a radius."""
+        angle, along = places[:, 0], places[:, 1]
+        local = np.column_stack([size * np.cos(angle), size * np.sin(angle), along])
+        return np.asarray(np.asarray(section.origin) + local @ section.basis)
+
+    def lean(self, section: Section) -> float:
+        """Return 0: its lines are parallel to its axis."""
+        return 0.0
+
+    def lever(self, section: Section, along: float) -> float:
+        """Return 1: it goes as far as the radius grows."""
+        return 1.0
+
+    def girth(self, section: Section, along: float) -> float:
+        """Return the radius."""
+        return section.radius

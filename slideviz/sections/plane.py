@@ -1,0 +1,175 @@
+"""The plane, a shape of sections: the coordinate along its normal; in 2D it is a line."""
+
+# ruff: noqa: ARG002  (every shape takes what any of them needs)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from slideviz.case.section_shapes import SECTION_SHAPES
+from slideviz.mesh.model import FloatArray
+from slideviz.sections.line import LINE
+from slideviz.sections.polygons import Polygons
+from slideviz.sections.round_number import round_middle
+from slideviz.sections.shape import (
+    FEW,
+    InPlane,
+    Label,
+    axis_word,
+    direction_label,
+    triple,
+    triple_words,
+)
+
+if TYPE_CHECKING:
+    from slideviz.sections.model import Section
+
+_STEEP = 0.8
+"""Planes whose normal has this component along z are seen from above."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """How a plane is looked at.
+
+    Attributes
+    ----------
+    rows : (3, 3) float64
+        Unit vectors to the right, up, and towards the eye.
+    labels : (Label, Label)
+        Of the first two.
+    """
+
+    rows: FloatArray
+    labels: tuple[Label, Label]
+
+
+def plane_axes(section: Section) -> Axes:
+    """Return how a plane section is looked at: z up, or y where z points to the eye; x right."""
+    normal = section.basis[2]
+    up = np.eye(3)[1 if abs(normal[2]) > _STEEP else 2]
+    up = up - (up @ normal) * normal
+    up /= np.linalg.norm(up)
+    right = np.cross(up, normal)
+    if right[np.argmax(np.abs(right))] < 0:
+        right = -right
+    rows = np.stack([right, up, np.cross(right, up)])
+    return Axes(rows, (direction_label(right), direction_label(up)))
+
+
+class Plane:
+    """The plane; see `slideviz.sections.shape.Shape` for what its functions return."""
+
+    terms = SECTION_SHAPES["plane"]
+    in_plane: InPlane | None = LINE
+    directed = True
+    handle: Literal["push", "pull"] = "push"
+
+    def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
+        """Return the coordinates (n,) along the normal."""
+        return along(2)
+
+    def crossings(
+        self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
+    ) -> FloatArray:
+        """Return where edges cross it, (k,): the distance is linear along them."""
+        before, after = level
+        return np.asarray(before / (before - after))
+
+    def position(self, section: Section) -> float:
+        """Return its distance from 0 along its normal."""
+        return float(np.asarray(section.origin) @ section.basis[2])
+
+    def at_position(self, section: Section, value: float) -> Section:
+        """Return it moved along its normal."""
+        shift = (value - self.position(section)) * section.basis[2]
+        return replace(section, origin=triple(np.asarray(section.origin) + shift))
+
+    def positions(self, section: Section, points: FloatArray) -> FloatArray:
+        """Return how far points are from 0 along its normal, (n,)."""
+        # Measured along the basis, whose normal has no other sign than the section's.
+        return np.asarray(section.frame(points)[:, 2] + self.position(section))
+
+    def first(self, section: Section, points: FloatArray) -> Section:
+        """Return it at a round number across the longest extent of points (n, 3)."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        axis = int(np.argmax(high - low))
+        origin = (low + high) / 2.0
+        origin[axis] = round_middle(points[:, axis])
+        return replace(section, origin=triple(origin), direction=triple(np.eye(3)[axis]))
+
+    def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
+        """Return how far it goes along its normal."""
+        return float(abs(step @ section.basis[2]))
+
+    def describe(self, section: Section) -> str:
+        """Return it in words: its place on an axis, or normal and point."""
+        where = axis_word(section.direction)
+        if where in "xyz":
+            return f"plane {where} = {section.origin['xyz'.index(where)]:.6g}"
+        return f"plane with normal {where} through {triple_words(section.origin)}"
+
+    def brief(self, section: Section) -> str:
+        """Return it in few words."""
+        where = axis_word(section.direction, FEW)
+        if where in "xyz":
+            return self.describe(section)
+        return f"plane ⊥ {where} at {self.position(section):.3g}"
+
+    def miss(self, section: Section, points: FloatArray) -> str:
+        """Return between which coordinates or shifts it would cut."""
+        normal = np.abs(section.basis[2])
+        if not normal[: points.shape[1]].any():
+            return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
+        axis = int(np.argmax(normal))
+        if normal[axis] > 1.0 - 1e-12:
+            ends = points[:, axis].min(), points[:, axis].max()
+            return f"misses the mesh, which has {'xyz'[axis]} from {ends[0]:.6g} to {ends[1]:.6g}"
+        along = section.frame(points)[:, 2]
+        return (
+            f"misses the mesh; moved along its normal by {along.min():.6g} to {along.max():.6g} "
+            "it would cut it"
+        )
+
+    def flatten(
+        self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
+    ) -> Polygons:
+        """Return polygons seen along the normal."""
+        axes = plane_axes(section)
+        points = polygons.points @ axes.rows.T
+        points[:, 2] -= np.asarray(section.origin) @ axes.rows[2]
+        return polygons.with_points(points)
+
+    def middle(
+        self, section: Section, polygons: Polygons, near: float | None = None
+    ) -> float | None:
+        """Return None: a plane has no seam."""
+        return None
+
+    def ahead(self, section: Section, points: FloatArray) -> float | None:
+        """Return None: it lies as it is seen."""
+        return None
+
+    def flat_labels(self, section: Section) -> tuple[Label, Label]:
+        """Return what is to the right and up."""
+        return plane_axes(section).labels
+
+    def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
+        """Return the transformation as it is seen along the normal."""
+        rows, flat = plane_axes(section).rows, np.eye(4)
+        flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
+        flat[:3, 3] = rows @ matrix[:3, 3]
+        flat[2, 3] = 0.0
+        return flat
+
+    def facing(self, section: Section, points: FloatArray) -> FloatArray:
+        """Return how it is looked at along its normal."""
+        return plane_axes(section).rows
+
+    def aslant(self, section: Section, points: FloatArray) -> FloatArray:
+        """Return the same."""
+        return plane_axes(section).rows
