@@ -260,7 +260,7 @@ def test_copies_need_boundaries_that_match(folder, capsys):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ([], "one of the arguments --plane --cylinder is required"),
+        ([], "one of the arguments --plane --cylinder --cone is required"),
         (["--plane", "z=0.4", "--cylinder", "1"], "not allowed with"),
         (["--plane", "0,0,1,2,3"], "has 5 numbers; write nx,ny,nz,x,y,z"),
         (["--plane", "0,0,one,0,0,0"], "is not nx,ny,nz,x,y,z"),

@@ -224,6 +224,41 @@ SECTION_SHAPES = {
                 ),
             },
         ),
+        ShapeTerms(
+            "cone",
+            direction="axis",
+            point="Apex",
+            about="the apex",
+            size=Size(
+                "half_angle_deg",
+                "Half angle",
+                "half angle",
+                unit="degrees",
+                remedy="give the angle in degrees between its axis and its lines",
+                example="a half angle in degrees, as in 15 or 15,0,0,1,0,0,-2",
+                high=90.0,
+                usual=20.0,
+            ),
+            flat="unrolled",
+            numbers="a, ax, ay, az, x, y, z",
+            meaning="half angle in degrees, axis along which it opens and apex",
+            option="half angle in degrees, " + _AXIS.format(point="apex") + "; it opens along it",
+            one_way=True,
+            tip_to_add="Show the cells that a cone about the axis cuts, and unroll it.",
+            key="Alt+C",
+            metavar="DEGREES[,AXIS]",
+            words={
+                3: Words(
+                    "Cone",
+                    "Cut by a co&ne",
+                    add="Add a cone about the axis of the machine.",
+                    handle="Drag the ball in the view to change the half angle.",
+                    flat="Show the cone unrolled, its apex at 0, beside the 3D view.",
+                    flat_name="Unrolled",
+                    look="Look at the cone from outside, at the middle of what it cuts.",
+                ),
+            },
+        ),
     )
 }
 """By name; see `ShapeTerms`."""

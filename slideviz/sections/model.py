@@ -11,11 +11,12 @@ from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import axis_basis
 from slideviz.mesh.surfaces import padded
+from slideviz.sections.cone import Cone
 from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
 from slideviz.sections.shape import InPlane, Shape
 
-_ALL: tuple[Shape, ...] = (Plane(), Cylinder())
+_ALL: tuple[Shape, ...] = (Plane(), Cylinder(), Cone())
 SHAPES = {shape.terms.value: shape for shape in _ALL}
 """By name."""
 
@@ -48,6 +49,8 @@ class Section:
         Whether a view draws it.
     flat : bool
         Whether it is laid flat beside the view: a cylinder unrolled, a plane along its normal.
+    half_angle_deg : float
+        Of the cone.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Section:
     name: str = ""
     shown: bool = True
     flat: bool = False
+    half_angle_deg: float = 0.0
 
     def __post_init__(self) -> None:
         numbers, terms = (*self.origin, *self.direction, self.size), self.shape.terms

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.model import Case
+from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
@@ -19,27 +20,18 @@ from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)
 direction = triple.filter(lambda v: np.linalg.norm(v) > 0)
-sections = st.one_of(
-    st.builds(
-        Section,
-        st.just("plane"),
-        triple,
-        direction,
-        whole=st.booleans(),
-        flat=st.booleans(),
-        shown=st.booleans(),
-    ),
-    st.builds(
-        Section,
-        st.just("cylinder"),
-        triple,
-        direction,
-        st.floats(1e-3, 1e3),
-        st.booleans(),
-        flat=st.booleans(),
-        shown=st.booleans(),
-    ),
-)
+
+
+def section_of(row):
+    """Sections of one shape, with any numbers."""
+    high = min(row.size.high, 1e3) if row.size is not None else 1e3
+    size = st.floats(1e-3, high, exclude_max=True)
+    made = st.builds(Section.of, st.just(row.value), triple, direction, size)
+    flags = st.fixed_dictionaries({name: st.booleans() for name in ("whole", "flat", "shown")})
+    return st.builds(lambda section, how: replace(section, **how), made, flags)
+
+
+sections = st.one_of(*(section_of(row) for row in SECTION_SHAPES.values()))
 rising = st.none() | st.tuples(st.floats(-5, 0.4), st.floats(0.5, 5))
 views = st.builds(
     ViewState,
@@ -104,7 +96,7 @@ def test_sections_are_read_as_written():
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("VIEW_SECTIONS", "(sphere, 1, cut)", "does not begin with plane or cylinder"),
+        ("VIEW_SECTIONS", "(sphere, 1, cut)", "does not begin with plane, cylinder or cone"),
         (
             "VIEW_SECTIONS",
             "(plane, 1, 0, 0, 0, 0, 0, cut, unrolled)",
@@ -113,6 +105,7 @@ def test_sections_are_read_as_written():
         ("VIEW_SECTIONS", "(plane, 1, 0, 0, cut)", "a plane has 6 numbers, 3 are given"),
         ("VIEW_SECTIONS", "(plane, 0, 0, 0, 1, 1, 1, cut)", "its direction has no length"),
         ("VIEW_SECTIONS", "(cylinder, 0, 0, 0, 1, 0, 0, 0, cut)", "the radius 0 is not positive"),
+        ("VIEW_SECTIONS", "(cone, 90, 0, 0, 1, 0, 0, 0, cut)", "the half angle 90 is not below 90"),
         ("VIEW_RANGE", "(1, 0)", "does not rise"),
         ("VIEW_RANGE", "(1, 2, 3)", "has 3 numbers"),
         ("VIEW_SHOW", "( edges, egdes )", "'egdes' is not one of"),
