@@ -116,6 +116,33 @@ def test_it_is_pulled_to_another_radius_and_undone_as_one(window, panel, perspec
     assert sections(window) == (first,)
 
 
+def test_that_of_a_cone_is_pulled_to_another_half_angle(window, driver, panel):
+    driver.click(panel.add["cone"])
+    window.viewing.look_from("iso")
+    window.view.snapshot()
+    first, point = sections(window)[1], ball(window)
+    assert np.abs(first.distance(point[None])).max() < 1e-12
+    assert len(blue(window.view)) > 30
+    low, high = panel.editor._span
+    handle = window.cutting.handles.of(window.view)
+    for wanted in (high - 0.2 * (high - low), low + 0.2 * (high - low)):
+        section, point = sections(window)[1], ball(window)
+        (there,) = section.shape.surface(section, np.array([handle.place]), wanted)
+        drag(window.view, pixel(window.view, point), pixel(window.view, there))
+        pulled = sections(window)[1]
+        assert pulled.half_angle_deg == pytest.approx(wanted, abs=0.03 * (high - low))
+        assert (pulled.origin, pulled.direction) == (first.origin, first.direction)
+        assert panel.editor.number.value == pytest.approx(pulled.half_angle_deg)
+    window.store.undo()
+    window.store.undo()
+    assert sections(window)[1] == first
+    driver.click(panel.look)
+    window.view.snapshot()
+    start = pixel(window.view, ball(window))
+    drag(window.view, start, start - np.array([0.0, 30.0]))
+    assert sections(window)[1].half_angle_deg > first.half_angle_deg
+
+
 def test_who_looks_along_the_radius_pulls_upwards(window, driver, panel):
     driver.click(panel.look)
     window.view.snapshot()

@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.viewport.cutting import place_for
 from slideviz.gui.viewport.flats import stack
+from slideviz.gui.viewport.handle import PlaneHandle
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.samples.table import write_sample
@@ -254,6 +255,96 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     assert window.cutting.flat.scene.section.kind == "cylinder"
     assert window.store.session.view.chosen == 1
     assert panel.flat.isChecked()
+
+
+def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp_path, answers):
+    driver.open(wheel)
+    window.docks_.lead_to("sections")
+    panel = window.docks_.panels["sections"]
+    window.actions_.by_name["add_cone"].trigger()
+    (cone,) = sections(window)
+    assert panel.list.item(0).toolTip() == cone.describe()
+    editor = panel.editor
+    assert (editor.axis_name.text(), editor.place_name.text()) == ("Axis", "Half angle")
+    assert editor.centre_name.text() == "Apex"
+    assert editor.axis.currentData() == "z"
+    drawn = window.scene.sections.drawn["section:0"]
+    before = drawn.polygons
+    drag(editor.slider, 0.8)
+    assert sections(window)[0].half_angle_deg != cone.half_angle_deg
+    assert sections(window)[0].origin == cone.origin
+    assert drawn.polygons is not before
+    slid = sections(window)[0].half_angle_deg
+    assert "not below 90" in editor._allowed(90.0)
+    driver.type(editor.number, "90")
+    assert sections(window)[0].half_angle_deg == pytest.approx(slid), "no cone is so flat"
+    driver.type(editor.number, "9.5")
+    driver.type(editor.centre.fields[2], "-1.6")
+    assert sections(window)[0].describe() == "cone 9.5° about z from apex (0, 0, -1.6)"
+    window.store.change(changes.set_view, copies=1)
+    panel.flat.click()
+    flat = window.cutting.flat
+    driver.qtbot.waitUntil(lambda: flat.view.isVisible() and flat.across.high > 0.01)
+    assert flat.title.text == sections(window)[0].describe()
+    assert flat.across.name == "s cos(θ sin α)"
+    low, high = flat.scene.bounds()
+    assert low[1] == pytest.approx(-high[1], rel=0.1), "level, with a passage on each side"
+    assert len(flat.scene._twins.drawn) == 2
+    answers("ask_save", tmp_path / "again.cfg")
+    window.actions_.by_name["save_case"].trigger()
+    text = (tmp_path / "again.cfg").read_text()
+    assert "(cone, 9.5, 0.0, 0.0, 1.0, 0.0, 0.0, -1.6, cut, unrolled)" in text
+    kept = sections(window)
+    driver.open(tmp_path / "again.cfg")
+    assert sections(window) == kept
+    assert window.cutting.flat.scene.section == kept[0]
+
+
+def test_a_cone_that_opens_backwards_has_no_axis_of_the_list(window, driver, panel):
+    driver.click(panel.add["cone"])
+    editor = panel.editor
+    editor.axis.setCurrentIndex(editor.axis.findData("free"))
+    editor.axis.activated.emit(editor.axis.currentIndex())
+    driver.type(editor.direction.fields[2], "-1")
+    panel.list.setCurrentRow(-1)
+    driver.click(panel.add["plane"])
+    panel.list.setCurrentRow(0)
+    assert editor.axis.currentData() == "free"
+    assert "about -z" in panel.list.item(0).toolTip()
+
+
+def test_a_2d_mesh_offers_no_cone(window, driver, panel, passage_file):
+    assert panel.add["cone"].isVisible()
+    driver.open(passage_file)
+    assert not panel.add["cone"].isVisible()
+    action = window.actions_.by_name["add_cone"]
+    assert not action.isVisible()
+    assert not action.isEnabled()
+
+
+def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
+    driver.click(panel.add["plane"])
+    driver.click(panel.add["cylinder"])
+    panel.list.setCurrentRow(0)
+    panel.handle.click()
+    view = window.view
+    assert isinstance(window.cutting.handles.of(view), PlaneHandle)
+    undo, redo = window.store.undo, window.store.redo
+    assert window.store.can_undo == "handle"
+    undo()
+    assert not window.cutting.handles
+    assert not panel.handle.isChecked()
+    undo()
+    assert panel.list.currentRow() == 1
+    assert window.cutting.section.kind == "cylinder"
+    undo()
+    assert window.store.session.view.chosen is None
+    assert sections(window) == ()
+    for _ in range(3):
+        redo()
+    assert panel.list.currentRow() == 0
+    assert panel.handle.isChecked()
+    assert isinstance(window.cutting.handles.of(view), PlaneHandle)
 
 
 def test_the_flat_view_shows_the_step(window, driver, panel):

@@ -289,6 +289,44 @@ def test_one_section_is_laid_flat(session):
         assert [section.flat for section in session.view.sections] == wanted
 
 
+def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(session):
+    at_s = iter(range(0, 1000, 10))
+    store = Store(session, lambda: next(at_s))
+    store.change(changes.add_section, Section("plane"))
+    store.change(changes.add_section, Section("cylinder", radius=0.5))
+    assert store.session.view.section.kind == "cylinder"
+    store.change(changes.choose_section, 0)
+    store.change(changes.show_handle, True)
+    store.change(changes.remove_section, 0)
+    assert (store.session.view.chosen, store.session.view.handle) == (0, True)
+    assert store.session.view.section.kind == "cylinder"
+    told = []
+    while store.can_undo:
+        told.append(store.can_undo)
+        store.undo()
+        view = store.session.view
+        told.append((view.section and view.section.kind, view.handle))
+    assert told == [
+        *("removing a section", ("plane", True)),
+        *("handle", ("plane", False)),
+        *("choice of a section", ("cylinder", False)),
+        *("new section", ("plane", False)),
+        *("new section", (None, False)),
+    ]
+    for _ in range(4):
+        store.redo()
+    assert (store.session.view.chosen, store.session.view.handle) == (0, True)
+
+
+def test_a_mesh_opens_with_the_section_chosen_that_lies_flat(square):
+    sections = (("plane", (1.0, 0, 0, 0.5, 0, 0), False, flat, True) for flat in (False, True))
+    case = Case(view={"VIEW_SECTIONS": tuple(sections)})
+    session = changes.open_mesh(Frame(square, quality(square)), None, (), case)
+    assert (session.view.chosen, session.view.handle) == (1, False)
+    case = Case(view={"VIEW_SECTIONS": (("plane", (1.0, 0, 0, 0.5, 0, 0), False, False, True),)})
+    assert changes.open_mesh(Frame(square, quality(square)), None, (), case).view.chosen == 0
+
+
 @pytest.fixture
 def ran(session):
     """Two steps, the second worse."""

@@ -196,7 +196,7 @@ class SectionsPanel(QWidget):
 
     def _sync_tools(self, session: Session, dim: int) -> None:
         chosen = session.view.section
-        row = SECTION_SHAPES["plane" if chosen is None else chosen.kind]
+        row = next(iter(SECTION_SHAPES.values())) if chosen is None else chosen.shape.terms
         words = row.words.get(dim, row.words[3])
         shown = chosen is not None and chosen.shown
         for box, name, tip in (
