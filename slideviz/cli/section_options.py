@@ -47,8 +47,9 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add = section.add_argument
     where = section.add_mutually_exclusive_group(required=True)
     for name, row in SECTION_SHAPES.items():
+        metavar = row.metavar or name.upper()
         where.add_argument(
-            f"--{name}", type=reader(row), dest="asked", metavar=row.metavar, help=row.option
+            f"--{name}", type=reader(row), dest="asked", metavar=metavar, help=row.option
         )
     add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
     add_reference(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.model import Case
-from slideviz.case.section_shapes import SECTION_SHAPES
+from slideviz.case.section_shapes import SECTION_SHAPES, names
 from slideviz.case.view_keys import read_sections, write_sections
 from slideviz.errors import CaseError
 from slideviz.sections.model import Section
@@ -96,7 +96,7 @@ def test_sections_are_read_as_written():
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("VIEW_SECTIONS", "(sphere, 1, cut)", "does not begin with plane, cylinder or cone"),
+        ("VIEW_SECTIONS", "(potato, 1, cut)", f"does not begin with {names()}"),
         (
             "VIEW_SECTIONS",
             "(plane, 1, 0, 0, 0, 0, 0, cut, unrolled)",
