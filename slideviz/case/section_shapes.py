@@ -242,7 +242,9 @@ SECTION_SHAPES = {
             flat="unrolled",
             numbers="a, ax, ay, az, x, y, z",
             meaning="half angle in degrees, axis along which it opens and apex",
-            option="half angle in degrees, " + _AXIS.format(point="apex") + "; it opens along it",
+            option="half angle in degrees, "
+            + _AXIS.format(point="the apex")
+            + "; it opens along the axis",
             one_way=True,
             tip_to_add="Show the cells that a cone about the axis cuts, and unroll it.",
             key="Alt+C",

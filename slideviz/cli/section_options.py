@@ -27,7 +27,7 @@ EXAMPLES = """\
 examples:
   slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
   slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
-  slideviz section stator.su2 --cone 10,z,0,0,-2 --copies 2 -o cone.png
+  slideviz section stator.su2 --cone 10,z,0,0,-1.5 --copies 2 -o cone.png
   slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
 """
 
