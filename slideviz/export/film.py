@@ -16,8 +16,8 @@ from slideviz.errors import SlidevizError
 from slideviz.export.encode import Pixels
 from slideviz.export.exposure import Drawn, exposing, told
 from slideviz.export.offscreen import LETTERS
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure, letters_across, panes
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions, letters_across, panes
 from slideviz.export.reel import USUAL, Reel, check_film
 from slideviz.export.titles import (
     DETAIL,
@@ -86,36 +86,36 @@ def film(
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     path = Path(file)
-    figure = film_figure(reel.pixels(path), both=session.view.beside is not None)
+    figure = film_options(reel.pixels(path), both=session.view.beside is not None)
     if figure.both:
         require_pair(figure.size)
-    with Studio.of_runs(session, zoom) as studio:
-        runs = studio.shown(session, figure)
-        titles = _titles_of_runs(runs, figure, studio.shows_detail, reel.between > 0)
-        yield from told(filming(studio, figure, path, reel, titles=titles, overwrite=overwrite))
+    with OffscreenRenderer.of_runs(session, zoom) as renderer:
+        runs = renderer.shown(session, figure)
+        titles = _titles_of_runs(runs, figure, renderer.shows_detail, reel.between > 0)
+        yield from told(filming(renderer, figure, path, reel, titles=titles, overwrite=overwrite))
 
 
-def film_figure(size: tuple[int, int], both: bool = False) -> Figure:
+def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
     """Return what the images of a film have unless something else is asked for."""
-    return Figure(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
+    return PictureOptions(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
 
 
 def filming(
-    studio: Studio,
-    figure: Figure,
+    renderer: OffscreenRenderer,
+    figure: PictureOptions,
     file: Path,
     reel: Reel,
     *,
     titles: Titles | None = None,
     overwrite: bool = False,
 ) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image of a film of what a studio shows, and between its pieces.
+    """Yield `Drawn` after each image of a film of what a renderer shows, and between its pieces.
 
     Parameters
     ----------
-    studio : Studio
+    renderer : OffscreenRenderer
         Knows the session, whose steps are shown, and the camera.
-    figure : Figure
+    figure : PictureOptions
         What an image has.
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
@@ -131,12 +131,12 @@ def filming(
     SlidevizError
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
-    runs = studio.shown(studio.session, figure)
+    runs = renderer.shown(renderer.session, figure)
     for one in runs:
         require_steps(one.frames, file, reel, overwrite)
     write = titles or _titles(runs[0], figure)
     count = max(len(one.frames) for one in runs)
-    yield from posing(studio, figure)
+    yield from posing(renderer, figure)
 
     def draw(position: float) -> Generator[object, Any, Pixels]:
         shots = []
@@ -147,23 +147,23 @@ def filming(
                 at = round(position * part, 9 if reel.between else 0)
             shots.append((yield Beside(partial(shot_at, one.frames, at))))
         shown = [_showing(one, shot.frame) for one, shot in zip(runs, shots, strict=True)]
-        return (yield from studio.drawing(shown, figure, write(shots)))
+        return (yield from renderer.drawing(shown, figure, write(shots)))
 
     yield from exposing(count, file, reel, draw)
 
 
-def posing(studio: Studio, figure: Figure) -> Generator[object, Any, None]:
-    """Let a studio look as for a film: the step that needs most room is seen whole."""
-    yield from studio.arranging()
-    frames = studio.session.frames
+def posing(renderer: OffscreenRenderer, figure: PictureOptions) -> Generator[object, Any, None]:
+    """Let a renderer look as for a film: the step that needs most room is seen whole."""
+    yield from renderer.arranging()
+    frames = renderer.session.frames
     widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
-    studio.pose(figure, widest)
+    renderer.pose(figure, widest)
     yield None
 
 
 def require_pair(size: tuple[int, int]) -> None:
     """Raise SlidevizError where a film is too narrow for two runs beside each other."""
-    figure = film_figure(size, both=True)
+    figure = film_options(size, both=True)
     room = panes(figure, figure.gap)[0].size[0]
     if room < _NARROWEST:
         least = size[0] + 2 * (_NARROWEST - room)
@@ -208,7 +208,7 @@ def _showing(session: Session, frame: Frame) -> Session:
     return replace(session, runs=runs, view=view)
 
 
-def _titles(session: Session, figure: Figure) -> Titles:
+def _titles(session: Session, figure: PictureOptions) -> Titles:
     """Return what writes run, step and quality above the images."""
     letters = figure.size[0] / (LETTER_WIDTH * figure.scale)
     longest = LONGEST.format(len(session.frames) - 1)
@@ -220,7 +220,9 @@ def _titles(session: Session, figure: Figure) -> Titles:
     return write
 
 
-def _titles_of_runs(runs: Sequence[Session], figure: Figure, detail: bool, between: bool) -> Titles:
+def _titles_of_runs(
+    runs: Sequence[Session], figure: PictureOptions, detail: bool, between: bool
+) -> Titles:
     """Return what writes step and quality above the images, and what two runs are called."""
     pair, what = len(runs) == 2, runs[0].view.colour_by
 

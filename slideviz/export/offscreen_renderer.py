@@ -1,4 +1,4 @@
-"""Draws pictures for papers and slides of what a view shows, off-screen."""
+"""The offscreen renderer: pictures, and images of films, of what a session shows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from slideviz.export.offscreen import (
     resize,
     write_title,
 )
-from slideviz.export.picture_options import Figure, headings, panes
+from slideviz.export.picture_options import PictureOptions, headings, panes
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from slideviz.scene.scene import Scene
 
 
-class Studio:
-    """Draws pictures of a session off-screen, one after the other, into memory or a file.
+class OffscreenRenderer:
+    """Draws pictures of a session through a scene of its own, into memory or a file.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Studio:
         self._making = self._make()
 
     @classmethod
-    def of_runs(cls, session: Session, zoom: Zoom = "auto") -> Studio:
+    def of_runs(cls, session: Session, zoom: Zoom = "auto") -> OffscreenRenderer:
         """Return one that shows what the runs of a session did to its mesh.
 
         Raises
@@ -101,7 +101,7 @@ class Studio:
         self._plotter.render_window.Render()  # begins with the graphics
         yield
         self._scene = Scene(self._plotter, PAPER)
-        shown, overview = Figure().showing(self.session), self.overview
+        shown, overview = PictureOptions().showing(self.session), self.overview
         part = None if overview is None else overview.cells
         yield from self._scene.opening(shown, self.surfaces, part)
         if self.like is not None:
@@ -109,7 +109,7 @@ class Studio:
         if overview is None:  # else nobody waits for it
             yield from appearing(self._plotter)
 
-    def __enter__(self) -> Studio:
+    def __enter__(self) -> OffscreenRenderer:
         return self
 
     def __exit__(
@@ -142,7 +142,7 @@ class Studio:
             return None
         return seen_beside(self.session)
 
-    def image(self, figure: Figure) -> Pixels:
+    def image(self, figure: PictureOptions) -> Pixels:
         """Return the picture, (height, width, 3), or 4 when it is transparent.
 
         Raises
@@ -153,7 +153,7 @@ class Studio:
         return whole(self.picturing(figure))
 
     def picturing(
-        self, figure: Figure, aim: bool = True, frame: int | None = None
+        self, figure: PictureOptions, aim: bool = True, frame: int | None = None
     ) -> Generator[None, None, Pixels]:
         """Return what `image` does, and yield between the pieces of that.
 
@@ -161,7 +161,7 @@ class Studio:
 
         Parameters
         ----------
-        figure : Figure
+        figure : PictureOptions
         aim : bool
             Whether to aim the camera; else it stays where it was for the last picture.
         frame : int, optional
@@ -175,13 +175,16 @@ class Studio:
             self._aim(sessions[0], figure)
         return (yield from self.drawing(sessions, figure, headings(sessions, figure)))
 
-    def shown(self, session: Session, figure: Figure) -> tuple[Session, ...]:
+    def shown(self, session: Session, figure: PictureOptions) -> tuple[Session, ...]:
         """Return what stands in a picture of a session, from left to right: it, or two runs."""
         other = self.beside if figure.both else None
         return (session,) if other is None else ordered(session, other)
 
     def drawing(
-        self, sessions: Sequence[Session], figure: Figure, titles: tuple[Sequence[str], float]
+        self,
+        sessions: Sequence[Session],
+        figure: PictureOptions,
+        titles: tuple[Sequence[str], float],
     ) -> Generator[None, None, Pixels]:
         """Return the picture of one session or two with titles, and yield between the pieces.
 
@@ -197,7 +200,7 @@ class Studio:
         between = np.repeat(left[:, -1:], figure.gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
-    def pose(self, figure: Figure, frame: int | None = None) -> Scene:
+    def pose(self, figure: PictureOptions, frame: int | None = None) -> Scene:
         """Return the scene, its camera and colours as for a picture; for a film like it."""
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.arranging():
@@ -206,7 +209,7 @@ class Studio:
         scene: Scene = self._scene
         return scene
 
-    def window(self, figure: Figure) -> tuple[tuple[float, float], tuple[float, float]]:
+    def window(self, figure: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return from where to where a picture of a 2D mesh reaches in x and in y."""
         self.pose(figure)
         camera, (width, height) = self._plotter.camera, figure.size
@@ -219,7 +222,7 @@ class Studio:
             found.append((float(low), float(low + length * unit)))
         return found[0], found[1]
 
-    def write(self, figure: Figure, file: Path) -> None:
+    def write(self, figure: PictureOptions, file: Path) -> None:
         """Write the picture as a PNG file, whole or not at all.
 
         Raises
@@ -240,7 +243,7 @@ class Studio:
     def _pane(
         self,
         session: Session,
-        figure: Figure,
+        figure: PictureOptions,
         title: tuple[str, float],
     ) -> Generator[None, None, Pixels]:
         self._prepare(session, figure)
@@ -255,7 +258,7 @@ class Studio:
         name_mark(plotter, self._scene, figure.scale)
         return image_of(plotter, figure.background == "transparent")
 
-    def _prepare(self, session: Session, figure: Figure) -> None:
+    def _prepare(self, session: Session, figure: PictureOptions) -> None:
         """Show a session in the size of a picture; the camera stays."""
         plotter, scene = self._plotter, self._scene
         resize(plotter, figure.size)
@@ -267,13 +270,13 @@ class Studio:
             plotter.set_background("white")  # a gradient would stay opaque
         self._keep_room(figure)
 
-    def _keep_room(self, figure: Figure) -> None:
+    def _keep_room(self, figure: PictureOptions) -> None:
         """Keep the rooms of legend and title free of the mesh."""
         right = self._scene.stage.strip() / figure.size[0]
         self._plotter.camera.SetWindowCenter(right, figure.top)
         self._plotter.renderer.ResetCameraClippingRange()
 
-    def _aim(self, session: Session, figure: Figure) -> None:
+    def _aim(self, session: Session, figure: PictureOptions) -> None:
         """Look from where the view looks, in its colours, at what a picture shows."""
         scene, camera, like = self._scene, self._plotter.camera, self.like
         if figure.both and self.beside is not None:
@@ -293,7 +296,7 @@ class Studio:
             camera.parallel_scale = camera.parallel_scale / (1.0 - figure.top)
         self._keep_room(figure)
 
-    def _seen(self, figure: Figure) -> Iterator[Mesh]:
+    def _seen(self, figure: PictureOptions) -> Iterator[Mesh]:
         """Yield the states of the mesh that an overview must show whole."""
         for run in self.session.runs:
             yield from (frame.mesh for frame in run.frames)

@@ -9,8 +9,8 @@ from pathlib import Path
 from slideviz.case.model import Case
 from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import check_png
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.titles import DETAIL, caption
 from slideviz.mesh.model import Mesh
 from slideviz.scene.moved import Zoom
@@ -18,7 +18,7 @@ from slideviz.session.opening import of_runs
 from slideviz.session.pieces import whole
 from slideviz.session.state import Frame, Run, Session
 
-SIZE = Figure.size
+SIZE = PictureOptions.size
 WHITE = 250
 """Above this in red, green and blue, a pixel is background."""
 _SMALL = 10
@@ -51,10 +51,10 @@ def picture(
     """
     check_png(Path(file))
     assert session.frame is not None
-    with Studio.of_runs(session, zoom) as studio:
+    with OffscreenRenderer.of_runs(session, zoom) as renderer:
         words = caption(Path(session.frame.mesh.name).name, session.frame.quality)
-        words += DETAIL if studio.shows_detail else ""
-        studio.write(Figure(size, title=True, heading=words), Path(file))
+        words += DETAIL if renderer.shows_detail else ""
+        renderer.write(PictureOptions(size, title=True, heading=words), Path(file))
 
 
 def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixels]:
@@ -71,13 +71,13 @@ def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixel
     """
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
     session = of_runs(Frame(base, frames[0].quality), runs)
-    with Studio.of_runs(session) as studio:
-        figure = Figure((side, side), legend=False, edges=False, both=False, film=True)
-        scene = studio.pose(figure)
+    with OffscreenRenderer.of_runs(session) as renderer:
+        figure = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
+        scene = renderer.pose(figure)
 
-        def draw(run: Run, figure: Figure) -> Pixels:
+        def draw(run: Run, figure: PictureOptions) -> Pixels:
             shown = replace(session, shown=run.number)
-            return whole(studio.drawing([shown], figure, ([""], 1.0)))
+            return whole(renderer.drawing([shown], figure, ([""], 1.0)))
 
         inked = int((draw(runs[0], figure) < WHITE).any(axis=2).sum())
         # Edges of small cells would hide their colours.

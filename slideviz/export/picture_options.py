@@ -1,4 +1,4 @@
-"""What a picture of a view has: size, background, legend, title; for papers and slides."""
+"""Picture options: size, background, legend and title of a picture; and its words."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ GAP = 12.0
 
 
 @dataclass(frozen=True)
-class Figure:
+class PictureOptions:
     """What a picture of a view has.
 
     Attributes
@@ -105,7 +105,7 @@ class Figure:
         """Return how much larger than 13 pixels the letters are."""
         return font_scale(self.size) * self.letters
 
-    def within(self, box: tuple[int, int]) -> Figure:
+    def within(self, box: tuple[int, int]) -> PictureOptions:
         """Return the same picture as large as it can be in a box of pixels."""
         width, height = self.size
         part = min(box[0] / width, box[1] / height, 1.0)
@@ -128,7 +128,7 @@ class Figure:
         return replace(session, view=view)
 
 
-def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
+def panes(figure: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:
     """Return the two pictures beside each other that a picture of two runs is made of.
 
     The legend is at the right of the second; both have the same room for the mesh.
@@ -145,7 +145,7 @@ def panes(figure: Figure, gap: int) -> tuple[Figure, Figure]:
     return replace(left, legend=False), right
 
 
-def title_of(session: Session, figure: Figure) -> str:
+def title_of(session: Session, figure: PictureOptions) -> str:
     """Return the words above a picture: run, step and quality; less where it is narrow."""
     frame: Frame | None = session.frame
     assert frame is not None
@@ -155,7 +155,7 @@ def title_of(session: Session, figure: Figure) -> str:
     return title_words(session, frame, place_words(at, steps), letters, longest)
 
 
-def titles_of(pair: Sequence[Session], figure: Figure) -> tuple[list[str], float]:
+def titles_of(pair: Sequence[Session], figure: PictureOptions) -> tuple[list[str], float]:
     """Return the words above two pictures beside each other, and how large their letters are.
 
     ``figure`` is the narrower of both; 1 is the size of other titles.
@@ -163,7 +163,7 @@ def titles_of(pair: Sequence[Session], figure: Figure) -> tuple[list[str], float
     return fitting(pair_titles(pair, figure.title), letters_across(figure))
 
 
-def headings(shown: Sequence[Session], figure: Figure) -> tuple[list[str], float]:
+def headings(shown: Sequence[Session], figure: PictureOptions) -> tuple[list[str], float]:
     """Return the words above a picture of one session or two, and how large their letters are."""
     if len(shown) == 2:
         return titles_of(shown, panes(figure, figure.gap)[0])
@@ -174,13 +174,13 @@ def headings(shown: Sequence[Session], figure: Figure) -> tuple[list[str], float
     return [title_of(shown[0], figure)], 1.0
 
 
-def letters_across(figure: Figure) -> float:
+def letters_across(figure: PictureOptions) -> float:
     """Return how many letters a line of the title has room for."""
     letters = LETTER_WIDTH * figure.scale / (LETTERS if figure.film else 1.0)
     return (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / letters
 
 
-def words_of_size(figure: Figure) -> str:
+def words_of_size(figure: PictureOptions) -> str:
     """Return how large a picture is on paper, or in pixels, in words."""
     width, height = figure.size
     if figure.dpi is None:

@@ -11,8 +11,8 @@ from slideviz.color_scheme import INVERTED_COLOUR, PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export.mark_words import draw_mark
 from slideviz.export.offscreen import CAPTION_AT, TITLE
-from slideviz.export.offscreen_renderer import Studio, ordered
-from slideviz.export.picture_options import GAP, Figure, panes, title_of, titles_of
+from slideviz.export.offscreen_renderer import OffscreenRenderer, ordered
+from slideviz.export.picture_options import GAP, PictureOptions, panes, title_of, titles_of
 from slideviz.export.vector_sections import draw_sections
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, Mesh
@@ -35,14 +35,14 @@ _LETTERS, _LINE, _EDGE = 13.0, 1.4, 0.3
 """Pixels of letters, boundaries and edges, at normal size."""
 
 
-def write_vector(studio: Studio, figure: Figure, file: Path) -> None:
+def write_vector(renderer: OffscreenRenderer, figure: PictureOptions, file: Path) -> None:
     """Write the picture of a 2D mesh as SVG or PDF, whole or not at all.
 
     Parameters
     ----------
-    studio : Studio
+    renderer : OffscreenRenderer
         Knows the session and from where to where the view reaches.
-    figure : Figure
+    figure : PictureOptions
         What the picture has; its background is white or transparent.
     file : Path
         Ends with .svg or .pdf.
@@ -52,8 +52,8 @@ def write_vector(studio: Studio, figure: Figure, file: Path) -> None:
     SlidevizError
         The mesh is 3D or has too many cells, or the file cannot be written.
     """
-    require_vector(studio.session, file)
-    drawn = draw_vector(studio, figure)
+    require_vector(renderer.session, file)
+    drawn = draw_vector(renderer, figure)
     clear = figure.background == "transparent"
     data = figure_bytes(drawn, file.suffix.lower()[1:], drawn.dpi, clear)
     with atomic_write(file) as out:
@@ -74,22 +74,22 @@ def require_vector(session: Session, file: Path) -> None:
         )
 
 
-def draw_vector(studio: Studio, figure: Figure) -> Any:
-    """Return the matplotlib figure of a 2D mesh as the studio sees it."""
+def draw_vector(renderer: OffscreenRenderer, figure: PictureOptions) -> Any:
+    """Return the matplotlib figure of a 2D mesh as the renderer sees it."""
     from matplotlib.figure import Figure as Sheet
 
     dpi = figure.dpi or _SCREEN_DPI
     width, height = figure.size
     sheet = Sheet(figsize=(width / dpi, height / dpi), dpi=dpi, facecolor="white")
-    other = studio.beside if figure.both else None
-    parts = [(studio.session, figure, 0)]
+    other = renderer.beside if figure.both else None
+    parts = [(renderer.session, figure, 0)]
     titles: tuple[list[str], float] = [""], 1.0
     if figure.headed:
-        titles = [title_of(studio.session, figure)], 1.0
+        titles = [title_of(renderer.session, figure)], 1.0
     if other is not None:
         gap = round(GAP * figure.scale)
         left, right = panes(figure, gap)
-        pair = ordered(studio.session, other)
+        pair = ordered(renderer.session, other)
         parts = [(pair[0], left, 0), (pair[1], right, left.size[0] + gap)]
         titles = titles_of(pair, left)
     reach: tuple[tuple[float, float], tuple[float, float]] | None = None
@@ -97,7 +97,7 @@ def draw_vector(studio: Studio, figure: Figure) -> Any:
         axes = sheet.add_axes((start / width, 0.0, part.size[0] / width, 1.0))
         axes.set_axis_off()
         if reach is None:
-            reach = studio.window(part)
+            reach = renderer.window(part)
         (x, _), y = reach
         # The same length of the mesh for each pixel in both.
         unit = (y[1] - y[0]) / height
@@ -108,11 +108,11 @@ def draw_vector(studio: Studio, figure: Figure) -> Any:
             at = (start + CAPTION_AT * part.size[0]) / width
             _title(sheet, part, (title, titles[1]), at)
     if figure.legend:
-        _legend(sheet, studio.session, figure)
+        _legend(sheet, renderer.session, figure)
     return sheet
 
 
-def _mesh(axes: Any, session: Session, figure: Figure, point: float) -> None:
+def _mesh(axes: Any, session: Session, figure: PictureOptions, point: float) -> None:
     """Draw cells and boundaries; ``point`` is the size of a pixel at normal size."""
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection, PolyCollection
@@ -167,7 +167,7 @@ def _lines(mesh: Mesh, name: str) -> FloatArray:
     return np.concatenate([part for part in parts if part.shape[1] == 2] or [np.empty((0, 2, 2))])
 
 
-def _title(sheet: Any, figure: Figure, title: tuple[str, float], left: float) -> None:
+def _title(sheet: Any, figure: PictureOptions, title: tuple[str, float], left: float) -> None:
     dpi, height = sheet.dpi, figure.size[1]
     words, part = title
     sheet.text(
@@ -181,7 +181,7 @@ def _title(sheet: Any, figure: Figure, title: tuple[str, float], left: float) ->
     )
 
 
-def _plate(sheet: Any, session: Session, figure: Figure) -> None:
+def _plate(sheet: Any, session: Session, figure: PictureOptions) -> None:
     """Set the legend off from a mesh that reaches below it."""
     from matplotlib.patches import Rectangle
 
@@ -199,7 +199,7 @@ def _plate(sheet: Any, session: Session, figure: Figure) -> None:
     sheet.add_artist(plate)
 
 
-def _legend(sheet: Any, session: Session, figure: Figure) -> None:
+def _legend(sheet: Any, session: Session, figure: PictureOptions) -> None:
     """Draw the roles in use, or the colour bar, in the strip at the right."""
     width, height = figure.size
     scale, letters = figure.scale, _LETTERS * figure.scale * 72.0 / sheet.dpi

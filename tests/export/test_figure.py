@@ -9,13 +9,19 @@ from matplotlib.colors import to_rgb
 
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
-from slideviz.export import offscreen_renderer as studio_module
+from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
 from slideviz.export.exposure import told
 from slideviz.export.film import filming
 from slideviz.export.mark_words import mark_words
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import TITLE_ROOM, Figure, panes, title_of, words_of_size
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import (
+    TITLE_ROOM,
+    PictureOptions,
+    panes,
+    title_of,
+    words_of_size,
+)
 from slideviz.export.reel import Reel
 from slideviz.export.titles import fitting, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
@@ -30,7 +36,7 @@ from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, l
 from slideviz.session.state import Frame
 from slideviz.terms import ROLES
 
-PLAIN = Figure((400, 300), legend=False)
+PLAIN = PictureOptions((400, 300), legend=False)
 
 
 def session_of(mesh):
@@ -47,8 +53,8 @@ def session(square):
 
 
 @pytest.fixture
-def studio(session, square):
-    with Studio(session, find_surfaces(square)) as made:
+def renderer(session, square):
+    with OffscreenRenderer(session, find_surfaces(square)) as made:
         yield made
 
 
@@ -59,80 +65,80 @@ def drawn(image):
     return rows[0], rows[-1], columns[0], columns[-1]
 
 
-def test_the_mesh_stands_in_the_middle_of_a_white_picture(studio):
-    top, bottom, left, right = drawn(studio.image(PLAIN))
+def test_the_mesh_stands_in_the_middle_of_a_white_picture(renderer):
+    top, bottom, left, right = drawn(renderer.image(PLAIN))
     assert abs((top + bottom) / 2 - 150) < 4
     assert abs((left + right) / 2 - 200) < 4
     assert bottom - top > 0.85 * 300
 
 
-def test_the_legend_has_its_strip_and_the_title_its_line(studio):
-    _, _, _, right = drawn(studio.image(replace(PLAIN, legend=True)))
+def test_the_legend_has_its_strip_and_the_title_its_line(renderer):
+    _, _, _, right = drawn(renderer.image(replace(PLAIN, legend=True)))
     assert right > 350
-    bare, titled = studio.image(PLAIN), studio.image(replace(PLAIN, title=True))
+    bare, titled = renderer.image(PLAIN), renderer.image(replace(PLAIN, title=True))
     assert drawn(titled)[0] < drawn(bare)[0]
     mesh_top = drawn(titled[60:])[0] + 60
     assert mesh_top > 20, "the title does not lie on the mesh"
-    assert drawn(studio.image(PLAIN)) == drawn(bare), "the title is gone again"
+    assert drawn(renderer.image(PLAIN)) == drawn(bare), "the title is gone again"
 
 
-def test_edges_and_axes_are_drawn_when_wanted(studio):
+def test_edges_and_axes_are_drawn_when_wanted(renderer):
     def colours(figure):
-        return len(np.unique(studio.image(figure).reshape(-1, 3), axis=0))
+        return len(np.unique(renderer.image(figure).reshape(-1, 3), axis=0))
 
     assert colours(PLAIN) > 1.5 * colours(replace(PLAIN, edges=False))
-    with_axes = studio.image(replace(PLAIN, triad=True))
-    assert (with_axes != studio.image(PLAIN)).any()
+    with_axes = renderer.image(replace(PLAIN, triad=True))
+    assert (with_axes != renderer.image(PLAIN)).any()
 
 
-def test_backgrounds(studio):
-    clear = studio.image(replace(PLAIN, background="transparent"))
+def test_backgrounds(renderer):
+    clear = renderer.image(replace(PLAIN, background="transparent"))
     assert clear.shape == (300, 400, 4)
     assert clear[2, 2, 3] == 0
     assert clear[150, 200, 3] == 255
-    assert (studio.image(PLAIN)[2, 2] == 255).all()
+    assert (renderer.image(PLAIN)[2, 2] == 255).all()
 
 
-def test_a_preview_is_the_picture_made_small(studio):
+def test_a_preview_is_the_picture_made_small(renderer):
     # With a short title: letters have whole sizes, so that a long one is not quite as small.
-    studio.session = changes.show_frame(studio.session, 0)
-    figure = Figure((1200, 900), letters=1.5, legend=False, title=True)
+    renderer.session = changes.show_frame(renderer.session, 0)
+    figure = PictureOptions((1200, 900), letters=1.5, legend=False, title=True)
     small = figure.within((400, 400))
     assert small.size == (400, 300)
     assert small.scale == pytest.approx(figure.scale / 3)
-    places = np.array(drawn(studio.image(figure))) / 3
-    assert np.abs(places - drawn(studio.image(small))).max() < 6
+    places = np.array(drawn(renderer.image(figure))) / 3
+    assert np.abs(places - drawn(renderer.image(small))).max() < 6
     assert figure.within((5000, 5000)).size == figure.size
 
 
-def test_two_runs_have_the_same_room_and_the_same_scale(studio, session, square):
+def test_two_runs_have_the_same_room_and_the_same_scale(renderer, session, square):
     more = changes.start_run(session)
     moved = square.with_points(square.points * [1.0, 0.5])
     more = changes.add_frames(more, [Frame(moved, quality(moved, square))])
-    studio.session = changes.show_beside(changes.show_run(more, 1), 2)
-    left, right = panes(Figure((801, 300)), 9)
+    renderer.session = changes.show_beside(changes.show_run(more, 1), 2)
+    left, right = panes(PictureOptions((801, 300)), 9)
     assert left.size[0] + 9 + right.size[0] == 801
     assert not left.legend
-    both = studio.image(replace(PLAIN, size=(800, 300)))
+    both = renderer.image(replace(PLAIN, size=(800, 300)))
     low = round(TITLE_ROOM * PLAIN.scale)  # below the names of the runs
     first, second = drawn(both[low:, :395]), drawn(both[low:, 405:])
     assert first[3] - first[2] == pytest.approx(1.05 * (second[3] - second[2]), rel=0.03)
     assert first[1] - first[0] == pytest.approx(2 * (second[1] - second[0]), rel=0.05)
-    studio.session = changes.set_view(studio.session, swapped=True)
-    other = studio.image(replace(PLAIN, size=(800, 300)))
+    renderer.session = changes.set_view(renderer.session, swapped=True)
+    other = renderer.image(replace(PLAIN, size=(800, 300)))
     assert np.ptp(drawn(other[low:, 405:])[2:]) > second[3] - second[2]
-    studio.session = changes.show_beside(studio.session, changes.UNDEFORMED)
-    assert studio.beside.frame is session.first
+    renderer.session = changes.show_beside(renderer.session, changes.UNDEFORMED)
+    assert renderer.beside.frame is session.first
 
 
-def test_what_is_selected_is_not_marked_in_a_picture(studio, square):
-    plain = studio.image(PLAIN)
-    studio.session = changes.select(studio.session, square.marker_names[:1])
-    assert (studio.image(PLAIN) == plain).all()
+def test_what_is_selected_is_not_marked_in_a_picture(renderer, square):
+    plain = renderer.image(PLAIN)
+    renderer.session = changes.select(renderer.session, square.marker_names[:1])
+    assert (renderer.image(PLAIN) == plain).all()
 
 
 def test_titles_say_run_method_step_and_quality(session):
-    wide, narrow = Figure((3000, 300), title=True), Figure((200, 300), title=True)
+    wide, narrow = PictureOptions((3000, 300), title=True), PictureOptions((200, 300), title=True)
     assert title_of(session, wide).startswith("Run 1, no sliding, step 2 of 2: min ")
     assert "mean" in title_of(session, wide)
     assert "mean" not in title_of(session, narrow)
@@ -145,27 +151,27 @@ def test_titles_say_run_method_step_and_quality(session):
 def test_titles_of_runs_of_one_method_say_what_sets_them_apart(session):
     session = changes.start_run(changes.set_case(session, kernel="wendland-c4"))
     session = changes.end_run(changes.add_frames(session, session.runs[0].frames[:1]), "done")
-    wide = Figure((3000, 300), title=True)
+    wide = PictureOptions((3000, 300), title=True)
     assert title_of(session, wide).startswith("Run 2, no sliding, wendland-c4: min")
     other = changes.start_run(changes.set_case(session, sliding="ps"))
     other = changes.add_frames(other, session.runs[0].frames[:1])
     assert title_of(other, wide).startswith("Run 3, pseudo sliding: min")
 
 
-def test_pictures_of_two_runs_name_both_also_without_titles(session, studio, monkeypatch):
+def test_pictures_of_two_runs_name_both_also_without_titles(session, renderer, monkeypatch):
     second = changes.start_run(changes.set_case(session, sliding="ps"))
     second = changes.end_run(changes.add_frames(second, session.runs[0].frames), "done")
-    studio.session = changes.show_beside(changes.show_run(second, 1), 2)
+    renderer.session = changes.show_beside(changes.show_run(second, 1), 2)
     written = []
-    write = studio_module.write_title
+    write = renderer_module.write_title
     monkeypatch.setattr(
-        studio_module,
+        renderer_module,
         "write_title",
         lambda p, text, *rest: (written.append(text), write(p, text, *rest)),
     )
-    studio.image(replace(PLAIN, size=(1600, 400)))
+    renderer.image(replace(PLAIN, size=(1600, 400)))
     assert written == ["Run 1, no sliding", "Run 2, pseudo sliding"]
-    studio.image(replace(PLAIN, both=False))
+    renderer.image(replace(PLAIN, both=False))
     assert len(written) == 2, "alone it has none"
 
 
@@ -176,18 +182,18 @@ def two_runs(session, **settings):
     return changes.show_beside(changes.show_run(second, 1), 2)
 
 
-def test_titles_of_two_runs_have_one_form_and_all_that_sets_them_apart(session, studio):
+def test_titles_of_two_runs_have_one_form_and_all_that_sets_them_apart(session, renderer):
     pair = two_runs(session, sliding="ds", periodic="fixed")
-    studio.session = pair
-    first, second = pair, studio.beside
+    renderer.session = pair
+    first, second = pair, renderer.beside
     lines = pair_titles((first, second), quality=True)
     assert lines[0].startswith("Run 1, no sliding, not periodic\nstep 2 of 2: min 0.")
     assert lines[1].startswith("Run 2, direct sliding, fixed vertices\nstep 2 of 2: min 0.")
-    studio.session = changes.show_beside(pair, changes.UNDEFORMED)
-    lines = pair_titles((studio.session, studio.beside), quality=True)
+    renderer.session = changes.show_beside(pair, changes.UNDEFORMED)
+    lines = pair_titles((renderer.session, renderer.beside), quality=True)
     assert lines[0].startswith("Run 1, no sliding\nstep 2 of 2: min 0.")
     assert lines[1] == "Undeformed\nmin 1.0000, mean 1.0000"
-    again = studio.image(replace(PLAIN, size=(900, 400), title=True))
+    again = renderer.image(replace(PLAIN, size=(900, 400), title=True))
     assert drawn(again)[0] > 0, "both lines are in the picture"
 
 
@@ -200,127 +206,127 @@ def test_titles_that_are_too_long_get_smaller_then_shorter():
     assert titles == ["a" * 19 + "…", "b"]
 
 
-def test_a_marked_cell_is_named_in_both_views_or_left_out(session, studio):
-    studio.session = changes.mark(two_runs(session, sliding="ds"), 5)
+def test_a_marked_cell_is_named_in_both_views_or_left_out(session, renderer):
+    renderer.session = changes.mark(two_runs(session, sliding="ds"), 5)
     colour = np.array(to_rgb(SELECTED_COLOUR)) * 255
 
     def orange(figure):
-        image = studio.image(figure)
+        image = renderer.image(figure)
         found = (np.abs(image.astype(float) - colour).max(axis=2) < 8).any(axis=0)
         return found[: found.size // 2].any(), found[found.size // 2 :].any()
 
     wide = replace(PLAIN, size=(900, 300))
     assert orange(wide) == (True, True)
-    words = studio._plotter.actors["mark:words"].input
-    value = studio.session.frame.quality.values[5]
+    words = renderer._plotter.actors["mark:words"].input
+    value = renderer.session.frame.quality.values[5]
     assert words == f"cell 5: {value:.4f}"
     assert orange(replace(wide, marked=False)) == (False, False)
-    assert "mark:words" not in studio._plotter.actors
-    assert mark_words(changes.set_view(studio.session, colour_by="role")) == "cell 5"
-    assert "cell 5" in texts_of(draw_vector(studio, wide))
-    assert "cell 5" not in texts_of(draw_vector(studio, replace(wide, marked=False)))
+    assert "mark:words" not in renderer._plotter.actors
+    assert mark_words(changes.set_view(renderer.session, colour_by="role")) == "cell 5"
+    assert "cell 5" in texts_of(draw_vector(renderer, wide))
+    assert "cell 5" not in texts_of(draw_vector(renderer, replace(wide, marked=False)))
 
 
 def texts_of(sheet):
     return "; ".join(text.get_text() for axes in sheet.axes for text in axes.texts)
 
 
-def test_drawings_of_two_runs_stand_as_the_views_do(session, studio):
-    studio.session = changes.set_view(two_runs(session, sliding="ds"), swapped=True)
-    sheet = draw_vector(studio, replace(PLAIN, size=(900, 300), title=True))
+def test_drawings_of_two_runs_stand_as_the_views_do(session, renderer):
+    renderer.session = changes.set_view(two_runs(session, sliding="ds"), swapped=True)
+    sheet = draw_vector(renderer, replace(PLAIN, size=(900, 300), title=True))
     left, right = sorted(sheet.texts, key=lambda text: text.get_position()[0])
     assert left.get_text().startswith("Run 2, direct sliding")
     assert right.get_text().startswith("Run 1, no sliding")
 
 
-def test_a_film_has_the_titles_of_its_preview(session, studio, tmp_path, monkeypatch):
+def test_a_film_has_the_titles_of_its_preview(session, renderer, tmp_path, monkeypatch):
     said = []
-    write = studio_module.write_title
+    write = renderer_module.write_title
 
     def keep(plotter, text, *rest):
         said.append(text)
         write(plotter, text, *rest)
 
-    monkeypatch.setattr(studio_module, "write_title", keep)
-    figure = Figure((640, 400), title=True, both=False, film=True)
-    for _ in told(filming(studio, figure, tmp_path / "a%d.png", Reel())):
+    monkeypatch.setattr(renderer_module, "write_title", keep)
+    figure = PictureOptions((640, 400), title=True, both=False, film=True)
+    for _ in told(filming(renderer, figure, tmp_path / "a%d.png", Reel())):
         pass
     for frame in range(3):
-        studio.session = changes.show_frame(session, frame)
-        studio.image(figure.within((320, 300)))
+        renderer.session = changes.show_frame(session, frame)
+        renderer.image(figure.within((320, 300)))
     assert said[:3] == said[3:]
     assert said[2].startswith("Run 1, no sliding, step 2 of 2: min")
 
 
 def test_sizes_in_words():
-    assert words_of_size(Figure((600, 300))) == "600 × 300 pixels"
-    assert words_of_size(Figure((600, 300), dpi=300.0)).startswith("5.1 × 2.5 cm on paper")
+    assert words_of_size(PictureOptions((600, 300))) == "600 × 300 pixels"
+    assert words_of_size(PictureOptions((600, 300), dpi=300.0)).startswith("5.1 × 2.5 cm on paper")
 
 
-def test_what_cannot_be_drawn_or_written_is_told(studio, tmp_path, cube, monkeypatch):
+def test_what_cannot_be_drawn_or_written_is_told(renderer, tmp_path, cube, monkeypatch):
     with pytest.raises(SlidevizError, match="cannot be drawn"):
-        studio.image(Figure((10, 300)))
+        renderer.image(PictureOptions((10, 300)))
     with pytest.raises(SlidevizError, match=r"end the name with \.png"):
-        studio.write(PLAIN, tmp_path / "a.jpg")
+        renderer.write(PLAIN, tmp_path / "a.jpg")
     with pytest.raises(SlidevizError, match="folder does not exist"):
-        studio.write(PLAIN, tmp_path / "no" / "a.png")
+        renderer.write(PLAIN, tmp_path / "no" / "a.png")
     with pytest.raises(SlidevizError, match="end the name so"):
-        require_vector(studio.session, Path("a.png"))
+        require_vector(renderer.session, Path("a.png"))
     with pytest.raises(SlidevizError, match="only pictures of 2D meshes"):
         require_vector(session_of(cube), Path("a.svg"))
     monkeypatch.setattr(vector, "MOST_CELLS", 3)
     with pytest.raises(SlidevizError, match="too many to be drawn one by one"):
-        require_vector(studio.session, Path("a.pdf"))
+        require_vector(renderer.session, Path("a.pdf"))
     assert not list(tmp_path.iterdir())
 
 
-def test_the_same_camera_for_pixels_and_lines(studio):
-    (x0, x1), (y0, y1) = studio.window(PLAIN)
-    points = studio.session.frame.mesh.points
-    _, bottom, left, right = drawn(studio.image(PLAIN))
+def test_the_same_camera_for_pixels_and_lines(renderer):
+    (x0, x1), (y0, y1) = renderer.window(PLAIN)
+    points = renderer.session.frame.mesh.points
+    _, bottom, left, right = drawn(renderer.image(PLAIN))
     unit = (x1 - x0) / 400
     assert unit == pytest.approx((y1 - y0) / 300)
     assert points[:, 0].min() == pytest.approx(x0 + left * unit, abs=3 * unit)
     assert points[:, 0].max() == pytest.approx(x0 + right * unit, abs=3 * unit)
     assert points[:, 1].min() == pytest.approx(y1 - bottom * unit, abs=3 * unit)
-    sheet = draw_vector(studio, PLAIN)
+    sheet = draw_vector(renderer, PLAIN)
     assert sheet.axes[0].get_xlim() == pytest.approx((x0, x1))
     assert sheet.axes[0].get_ylim() == pytest.approx((y0, y1))
 
 
-def test_drawings_are_whole_and_always_the_same(studio, tmp_path):
+def test_drawings_are_whole_and_always_the_same(renderer, tmp_path):
     figure = replace(PLAIN, title=True, legend=True)
     for name in ("a.svg", "b.svg"):
-        write_vector(studio, figure, tmp_path / name)
+        write_vector(renderer, figure, tmp_path / name)
     first = (tmp_path / "a.svg").read_bytes()
     assert first == (tmp_path / "b.svg").read_bytes()
-    cells = len(studio.session.mesh.cells)
+    cells = len(renderer.session.mesh.cells)
     assert first.count(b"<path") >= cells
-    studio.session = changes.set_view(studio.session, colour_by="role", undeformed=True)
-    write_vector(studio, figure, tmp_path / "c.svg")
-    roles = {studio.session.role(name) for name in studio.session.mesh.marker_names}
+    renderer.session = changes.set_view(renderer.session, colour_by="role", undeformed=True)
+    write_vector(renderer, figure, tmp_path / "c.svg")
+    roles = {renderer.session.role(name) for name in renderer.session.mesh.marker_names}
     text = (tmp_path / "c.svg").read_text()
     assert all(ROLES[role].colour in text for role in roles)
-    write_vector(studio, replace(figure, background="transparent"), tmp_path / "d.pdf")
+    write_vector(renderer, replace(figure, background="transparent"), tmp_path / "d.pdf")
     assert (tmp_path / "d.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_only_chosen_cells_are_drawn(studio):
-    studio.session = changes.set_view(studio.session, threshold=(2.0, 3.0))
-    sheet = draw_vector(studio, PLAIN)
+def test_only_chosen_cells_are_drawn(renderer):
+    renderer.session = changes.set_view(renderer.session, threshold=(2.0, 3.0))
+    sheet = draw_vector(renderer, PLAIN)
     assert sum(len(one.get_paths()) for one in sheet.axes[0].collections[:1]) == 0
 
 
-def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(studio):
+def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(renderer):
     line = Section("plane", (0.0, 1.5, 0.0), (0.0, 1.0, 0.0))
     circle = Section("cylinder", (2.0, 2.0, 0.0), radius=1.0, whole=True)
-    plain = draw_vector(studio, PLAIN).axes[0]
+    plain = draw_vector(renderer, PLAIN).axes[0]
     assert plain.collections[0].get_alpha() is None
-    studio.session = changes.set_view(studio.session, sections=(line, circle))
-    axes = draw_vector(studio, PLAIN).axes[0]
+    renderer.session = changes.set_view(renderer.session, sections=(line, circle))
+    axes = draw_vector(renderer, PLAIN).axes[0]
     assert axes.collections[0].get_alpha() == FADED
     assert axes.get_xlim() == plain.get_xlim()
-    mesh, values = studio.session.frame.mesh, studio.session.frame.quality.values
+    mesh, values = renderer.session.frame.mesh, renderer.session.frame.quality.values
     cutter, extra = Cutter.of(mesh), [c for c in axes.collections if 1.0 < c.get_zorder() < 2.0]
     cut = cutter.cut(mesh.points, line)
     whole = cutter.crinkle(mesh.points, circle)
@@ -330,26 +336,26 @@ def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(stud
     heights = [c.get_paths()[0].vertices for c in extra if len(c.get_paths()) == 1]
     assert any(ends[:, 1] == pytest.approx(1.5) for ends in heights), "the line itself"
     hidden = tuple(replace(one, shown=False) for one in (line, circle))
-    studio.session = changes.set_view(studio.session, sections=hidden)
-    assert len(draw_vector(studio, PLAIN).axes[0].collections) == len(plain.collections)
+    renderer.session = changes.set_view(renderer.session, sections=hidden)
+    assert len(draw_vector(renderer, PLAIN).axes[0].collections) == len(plain.collections)
 
 
-def test_the_legend_of_a_drawing_lies_on_a_plate(studio):
+def test_the_legend_of_a_drawing_lies_on_a_plate(renderer):
     figure = replace(PLAIN, legend=True)
-    sheet = draw_vector(studio, figure)
+    sheet = draw_vector(renderer, figure)
     (plate,) = [one for one in sheet.artists if one.get_gid() == "plate"]
     mesh, bar = sheet.axes
     assert mesh.get_zorder() < plate.get_zorder() < bar.get_zorder()
     box = plate.get_window_extent()
     assert box.x0 < bar.get_window_extent().x0
     assert box.y0 < bar.get_window_extent().y0 < bar.get_window_extent().y1 < box.y1
-    clear = draw_vector(studio, replace(figure, background="transparent"))
+    clear = draw_vector(renderer, replace(figure, background="transparent"))
     assert not clear.artists
 
 
-def test_whether_a_view_sees_all(studio):
-    scene = studio.pose(PLAIN)
-    view = Studio(scene.session, (), scene)
+def test_whether_a_view_sees_all(renderer):
+    scene = renderer.pose(PLAIN)
+    view = OffscreenRenderer(scene.session, (), scene)
     assert view.fills
     scene.plotter.camera.parallel_scale *= 0.3
     assert not view.fills

@@ -14,11 +14,11 @@ from PIL import Image
 from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
-from slideviz.export import offscreen_renderer as studio_module
+from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export.exposure import told
-from slideviz.export.film import film, film_figure, filming
+from slideviz.export.film import film, film_options, filming
 from slideviz.export.offscreen import font_scale, offscreen
-from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.reel import Reel, check_film
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
@@ -52,9 +52,9 @@ def shown(frames):
 
 def film_of(session, file, reel, like=None):
     """Film what a view shows."""
-    figure = replace(film_figure(reel.size), fill=like is None)
-    with Studio(session, find_surfaces(session.mesh), like) as studio:
-        yield from told(filming(studio, figure, file, reel))
+    figure = replace(film_options(reel.size), fill=like is None)
+    with OffscreenRenderer(session, find_surfaces(session.mesh), like) as renderer:
+        yield from told(filming(renderer, figure, file, reel))
 
 
 def mp4_images(file):
@@ -174,14 +174,14 @@ def test_few_images_are_shown_longer_and_many_ten_a_second():
 
 def test_images_in_between_have_their_own_mesh_and_quality(tmp_path, frames, monkeypatch):
     seen, words = [], []
-    draw, write = Studio.drawing, studio_module.write_title
+    draw, write = OffscreenRenderer.drawing, renderer_module.write_title
     monkeypatch.setattr(
-        Studio,
+        OffscreenRenderer,
         "drawing",
         lambda self, shown, *rest: (seen.append(shown[0].frame), draw(self, shown, *rest))[1],
     )
     monkeypatch.setattr(
-        studio_module,
+        renderer_module,
         "write_title",
         lambda p, text, *rest: (words.append(text), write(p, text, *rest)),
     )
@@ -330,13 +330,13 @@ def test_the_view_is_filmed_with_its_camera_and_one_colour_range(tmp_path, ran):
 def test_displacement_of_the_view_keeps_the_range_of_the_last_step(tmp_path, ran, monkeypatch):
     ran = replace(ran, view=replace(ran.view, colour_by="displacement"))
     seen = []
-    draw = Studio.drawing
+    draw = OffscreenRenderer.drawing
 
     def watch(self, shown, *rest):
         seen.extend((one.colour_range, one.frame) for one in shown)
         return draw(self, shown, *rest)
 
-    monkeypatch.setattr(Studio, "drawing", watch)
+    monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
     for _ in film_of(ran, tmp_path / "v%d.png", Reel(SMALL)):
         pass
     assert {span for span, _ in seen} == {ran.colour_range}
@@ -354,7 +354,7 @@ def test_cancelling_the_film_of_a_view_leaves_nothing(tmp_path, ran):
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeypatch, count):
     added, scenes = [], []
-    add, draw = Stage.add, Studio.drawing
+    add, draw = Stage.add, OffscreenRenderer.drawing
     monkeypatch.setattr(
         Stage, "add", lambda self, *rest, **more: (added.append(1), add(self, *rest, **more))[1]
     )
@@ -365,7 +365,7 @@ def test_a_film_draws_its_mesh_once_and_leaves_nothing(tmp_path, square, monkeyp
         return draw(self, *rest)
 
     added_before = []
-    monkeypatch.setattr(Studio, "drawing", watch)
+    monkeypatch.setattr(OffscreenRenderer, "drawing", watch)
     frames = leaning(square)
     runs = [Run(k, Case(), frames[1:], "done", name=str(k)) for k in range(1, count + 1)]
     for _ in film(of_runs(frames[0], runs), tmp_path / "a%d.png", Reel((640, 300))):

@@ -9,8 +9,8 @@ from PIL import Image
 from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as module
-from slideviz.export.film import film, film_figure, require_pair
-from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.film import film, film_options, require_pair
+from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import panes
 from slideviz.export.reel import Reel
 from slideviz.mesh.quality import quality
@@ -85,7 +85,7 @@ def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, 
     shoot(twice, tmp_path / "p_%d.png", colour_by="displacement")
     with Image.open(tmp_path / "p_4.png") as image:
         whole = np.asarray(image).astype(int)
-    figure = film_figure(SIZE, both=True)
+    figure = film_options(SIZE, both=True)
     first, second = panes(figure, figure.gap)
     left, right = whole[:, : first.size[0]], whole[:, -second.size[0] :][:, : first.size[0]]
     # The same but for a part of a pixel by which one of them may be wider.
@@ -101,13 +101,13 @@ def test_both_halves_are_one_picture_when_the_runs_are_the_same(runs, tmp_path, 
 
 def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkeypatch, shoot):
     ranges = []
-    draw = Studio.drawing
+    draw = OffscreenRenderer.drawing
 
     def spy(self, shown, *rest):
         ranges.extend(one.colour_range for one in shown)
         return draw(self, shown, *rest)
 
-    monkeypatch.setattr(Studio, "drawing", spy)
+    monkeypatch.setattr(OffscreenRenderer, "drawing", spy)
     first = made.mesh
     far = first.with_points(first.points + np.array([3.0, 0.0]))
     frames = (Frame(far, quality(far, reference=first)),)

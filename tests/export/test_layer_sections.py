@@ -10,8 +10,8 @@ from PIL import Image
 
 from slideviz.color_scheme import INVERTED_COLOUR, LIGHT
 from slideviz.errors import Cancelled, CaseError
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.section_job import Paper, save_section, state_words
 from slideviz.export.vector import draw_vector
 from slideviz.mesh.model import Cells, Mesh
@@ -661,13 +661,13 @@ def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
     )
 
     def coloured():
-        axes = draw_vector(studio, Figure((400, 300), legend=False)).axes[0]
+        axes = draw_vector(renderer, PictureOptions((400, 300), legend=False)).axes[0]
         above = [each for each in axes.collections if 1.0 < each.get_zorder() < 2.0]
         return [each for each in above if each.get_array() is not None]
 
-    with Studio(session, find_surfaces(square)) as studio:
+    with OffscreenRenderer(session, find_surfaces(square)) as renderer:
         assert coloured()
-        studio.session = changes.set_view(session, threshold=(2.0, 3.0))
+        renderer.session = changes.set_view(session, threshold=(2.0, 3.0))
         assert not coloured()
 
 

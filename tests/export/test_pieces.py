@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
 from slideviz.session.pieces import Beside, appearing, here, portions, whole
 from slideviz.session.state import Frame
 
-PLAIN = Figure((300, 200))
+PLAIN = PictureOptions((300, 200))
 
 
 def work(log, value=2):
@@ -116,36 +116,36 @@ def session(square):
 
 def test_a_picture_in_pieces_is_the_one_that_is_drawn_at_once(session, square, monkeypatch):
     surfaces = find_surfaces(square)
-    with Studio(session, surfaces) as studio:
-        at_once = studio.image(PLAIN)
+    with OffscreenRenderer(session, surfaces) as renderer:
+        at_once = renderer.image(PLAIN)
     monkeypatch.setattr(pieces.portions, "__defaults__", (3,))
-    with Studio(session, surfaces) as studio:
-        assert sum(1 for _ in studio.arranging()) > 10
-        assert not list(studio.arranging()), "once"
-        assert np.array_equal(whole(studio.picturing(PLAIN)), at_once)
-    with Studio(session, surfaces) as studio:
-        stopped = studio.picturing(PLAIN)
+    with OffscreenRenderer(session, surfaces) as renderer:
+        assert sum(1 for _ in renderer.arranging()) > 10
+        assert not list(renderer.arranging()), "once"
+        assert np.array_equal(whole(renderer.picturing(PLAIN)), at_once)
+    with OffscreenRenderer(session, surfaces) as renderer:
+        stopped = renderer.picturing(PLAIN)
         for _ in range(5):
             next(stopped)
         stopped.close()
-        assert np.array_equal(studio.image(PLAIN), at_once), "the rest is done then"
+        assert np.array_equal(renderer.image(PLAIN), at_once), "the rest is done then"
 
 
 def test_a_picture_is_drawn_once(session, square):
-    with Studio(session, find_surfaces(square)) as studio:
-        studio.image(PLAIN)
+    with OffscreenRenderer(session, find_surfaces(square)) as renderer:
+        renderer.image(PLAIN)
         drawn = []
-        studio._plotter.renderer.AddObserver("EndEvent", lambda *_: drawn.append(1))
-        assert studio.image(replace(PLAIN, size=(320, 240))).shape == (240, 320, 3)
+        renderer._plotter.renderer.AddObserver("EndEvent", lambda *_: drawn.append(1))
+        assert renderer.image(replace(PLAIN, size=(320, 240))).shape == (240, 320, 3)
         assert len(drawn) == 1
 
 
 def test_another_step_is_pictured_and_the_session_stays(session, square):
-    with Studio(session, find_surfaces(square)) as studio:
-        last = studio.image(PLAIN)
-        first = whole(studio.picturing(PLAIN, frame=0))
-        assert studio.session is session
+    with OffscreenRenderer(session, find_surfaces(square)) as renderer:
+        last = renderer.image(PLAIN)
+        first = whole(renderer.picturing(PLAIN, frame=0))
+        assert renderer.session is session
         assert not np.array_equal(first, last)
-        assert np.array_equal(studio.image(PLAIN), last)
-    with Studio(changes.show_frame(session, 0), find_surfaces(square)) as studio:
-        assert np.array_equal(studio.image(PLAIN), first)
+        assert np.array_equal(renderer.image(PLAIN), last)
+    with OffscreenRenderer(changes.show_frame(session, 0), find_surfaces(square)) as renderer:
+        assert np.array_equal(renderer.image(PLAIN), first)

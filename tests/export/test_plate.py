@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from slideviz.color_scheme import DARK, LIGHT
-from slideviz.export.offscreen_renderer import Figure, Studio
+from slideviz.export.offscreen_renderer import OffscreenRenderer, PictureOptions
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.color_legend import STRIP
@@ -82,9 +82,9 @@ def test_a_plate_follows_the_size_of_the_view(plotter, square):
 def test_a_transparent_picture_has_no_plate(square):
     session = changes.open_mesh(Frame(square, quality(square)), None)
     session = changes.set_view(session, colour_by="size-skew")
-    with Studio(session, find_surfaces(square)) as studio:
-        clear = studio.image(Figure(SIZE, background="transparent"))
-        strip = round(STRIP * Figure(SIZE).scale)
+    with OffscreenRenderer(session, find_surfaces(square)) as renderer:
+        clear = renderer.image(PictureOptions(SIZE, background="transparent"))
+        strip = round(STRIP * PictureOptions(SIZE).scale)
         opacity = clear[:, -strip:, 3]
         assert (opacity == 0).mean() > 0.5
         # But for single pixels at the edges of letters.

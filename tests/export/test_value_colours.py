@@ -5,8 +5,8 @@ import pytest
 import pyvista as pv
 
 from slideviz.color_scheme import INVERTED_COLOUR
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import draw_vector
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
@@ -89,8 +89,8 @@ def test_the_labels_of_the_bar_differ(plotter, session):
 def test_so_it_is_in_vector_figures(session):
     for state, red in ((session, 0), (folded(session), 1)):
         state = above_all(changes.set_view(state, colour_by="size-skew"))
-        with Studio(state, find_surfaces(state.mesh)) as studio:
-            sheet = draw_vector(studio, Figure((300, 300), legend=False))
+        with OffscreenRenderer(state, find_surfaces(state.mesh)) as renderer:
+            sheet = draw_vector(renderer, PictureOptions((300, 300), legend=False))
         cells = sheet.axes[0].collections[0]
         cells.update_scalarmappable()
         found = cells.get_facecolor()[:, :3]

@@ -17,8 +17,8 @@ from slideviz import read
 from slideviz.errors import SlidevizError
 from slideviz.export import exposure
 from slideviz.export import film as film_module
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import Reel
 from slideviz.gui.dialogs import exporter as export
 from slideviz.gui.dialogs.film import FilmDialog
@@ -46,9 +46,9 @@ def ran(driver, sample_folder):
 
 
 @pytest.fixture
-def studio(opened):
+def renderer(opened):
     viewing = opened.window.viewing
-    with Studio(opened.session, viewing.surfaces, viewing.scene) as made:
+    with OffscreenRenderer(opened.session, viewing.surfaces, viewing.scene) as made:
         yield made
 
 
@@ -98,8 +98,8 @@ def test_a_picture_that_cannot_be_written_is_told(opened, answers, tmp_path):
     assert "folder does not exist" in opened.window.banner.text.text()
 
 
-def test_the_preview_follows_the_options(studio, qtbot):
-    dialog = PictureDialog(None, studio)
+def test_the_preview_follows_the_options(renderer, qtbot):
+    dialog = PictureDialog(None, renderer)
     qtbot.addWidget(dialog)
     dialog.show()
     qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
@@ -112,8 +112,8 @@ def test_the_preview_follows_the_options(studio, qtbot):
     dialog.reject()
 
 
-def test_sizes_in_pixels_and_on_paper(studio, qtbot):
-    dialog = PictureDialog(None, studio, (900, 700))
+def test_sizes_in_pixels_and_on_paper(renderer, qtbot):
+    dialog = PictureDialog(None, renderer, (900, 700))
     qtbot.addWidget(dialog)
     for name, size in (("1920x1080", (1920, 1080)), ("view", (900, 700))):
         dialog.size_choice.show_value(name)
@@ -150,18 +150,18 @@ def test_a_picture_for_paper_knows_its_size(opened, answers, tmp_path):
     assert known["dpi"] == pytest.approx((300, 300), abs=0.1)
 
 
-def test_choices_are_offered_again_and_broken_ones_are_not(studio, qtbot):
-    dialog = PictureDialog(None, studio)
+def test_choices_are_offered_again_and_broken_ones_are_not(renderer, qtbot):
+    dialog = PictureDialog(None, renderer)
     qtbot.addWidget(dialog)
     dialog.options["title"].setChecked(True)
     dialog.width_px.setValue(700)
-    again = PictureDialog(None, studio, kept=dialog.choices)
+    again = PictureDialog(None, renderer, kept=dialog.choices)
     qtbot.addWidget(again)
     assert again.figure.title
     assert again.figure.size == dialog.figure.size
     assert again.size_choice.currentData() == "other"
     for broken in ("{", "[1]", json.dumps({"size": "x"}), json.dumps({"paper": [1]})):
-        usual = PictureDialog(None, studio, kept=broken)
+        usual = PictureDialog(None, renderer, kept=broken)
         qtbot.addWidget(usual)
         assert usual.figure.background == "white"
 
@@ -204,8 +204,8 @@ def test_3d_meshes_have_no_drawings(driver, sample_folder, qtbot):
     driver.open(sample_folder / "hexahedron" / "hexahedron.cfg")
     assert export.picture_filters(driver.session) == questions.PICTURE_FILTERS
     viewing = driver.window.viewing
-    with Studio(driver.session, viewing.surfaces, viewing.scene) as studio:
-        dialog = PictureDialog(None, studio)
+    with OffscreenRenderer(driver.session, viewing.surfaces, viewing.scene) as renderer:
+        dialog = PictureDialog(None, renderer)
         qtbot.addWidget(dialog)
         assert "3D" in dialog.kinds.text()
         dialog.reject()
@@ -216,10 +216,10 @@ def test_two_runs_beside_each_other_are_one_picture(ran):
     ran.settle()
     ran.window.store.change(changes.show_beside, 1)
     viewing = ran.window.viewing
-    with Studio(ran.session, viewing.surfaces, viewing.scene) as studio:
-        both = studio.image(Figure((800, 400), legend=False))
-        one = studio.image(Figure((800, 400), legend=False, both=False))
-        dialog = PictureDialog(None, studio)
+    with OffscreenRenderer(ran.session, viewing.surfaces, viewing.scene) as renderer:
+        both = renderer.image(PictureOptions((800, 400), legend=False))
+        one = renderer.image(PictureOptions((800, 400), legend=False, both=False))
+        dialog = PictureDialog(None, renderer)
         assert not dialog.options["both"].isHidden()
         dialog.reject()
     drawn = (both < 250).any(axis=2).any(axis=0)
@@ -546,11 +546,11 @@ def test_saved_quality_is_in_the_vtu(ran, tmp_path):
     assert np.allclose(found[: len(values)], values)
 
 
-def test_a_drawing_of_another_ending_is_refused(studio):
+def test_a_drawing_of_another_ending_is_refused(renderer):
     from slideviz.export.vector import require_vector
 
     with pytest.raises(SlidevizError, match="end the name so"):
-        require_vector(studio.session, Path("a.png"))
+        require_vector(renderer.session, Path("a.png"))
 
 
 # Help --------------------------------------------------------------------------------------
@@ -623,22 +623,22 @@ def test_about_and_details_for_a_report(opened):
 
 def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_wanted(ran):
     ran.window.store.change(changes.mark, 3)
-    with ran.window.exports._studio() as studio:
-        dialog = PictureDialog(ran.window, studio)
-        assert dialog.figure.showing(studio.session).view.marked == 3
+    with ran.window.exports._renderer() as renderer:
+        dialog = PictureDialog(ran.window, renderer)
+        assert dialog.figure.showing(renderer.session).view.marked == 3
         dialog.options["marked"].setChecked(False)
-        assert dialog.figure.showing(studio.session).view.marked is None
+        assert dialog.figure.showing(renderer.session).view.marked is None
         assert dialog._form.isRowVisible(dialog.options["marked"])
-        form = FilmForm(studio)
+        form = FilmForm(renderer)
         assert form.layout().isRowVisible(form.mark)
-        assert form.figure.showing(studio.session).view.marked is None
+        assert form.figure.showing(renderer.session).view.marked is None
         form.mark.setChecked(True)
-        assert form.figure.showing(studio.session).view.marked == 3
+        assert form.figure.showing(renderer.session).view.marked == 3
 
 
 def test_without_a_marked_cell_nothing_is_asked_about_it(ran):
-    with ran.window.exports._studio() as studio:
-        dialog = PictureDialog(ran.window, studio)
+    with ran.window.exports._renderer() as renderer:
+        dialog = PictureDialog(ran.window, renderer)
         assert not dialog._form.isRowVisible(dialog.options["marked"])
-        form = FilmForm(studio)
+        form = FilmForm(renderer)
         assert not form.layout().isRowVisible(form.mark)

@@ -8,8 +8,8 @@ from pathlib import Path
 from qtpy.QtCore import QObject
 
 from slideviz.errors import SlidevizError
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
 from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
@@ -34,9 +34,9 @@ class Exports(QObject):
     def _session(self):
         return self.window.store.session
 
-    def _studio(self) -> Studio:
+    def _renderer(self) -> OffscreenRenderer:
         viewing = self.window.viewing
-        return Studio(self._session, viewing.surfaces, viewing.scene)
+        return OffscreenRenderer(self._session, viewing.surfaces, viewing.scene)
 
     # Pictures --------------------------------------------------------------------------
 
@@ -45,9 +45,9 @@ class Exports(QObject):
         if self._session.mesh is None:
             return
         view, settings = self.window.viewing, self.window.settings
-        with self._studio() as studio:
+        with self._renderer() as renderer:
             kept = str(settings.value("picture", ""))
-            dialog = PictureDialog(self.window, studio, (view.width(), view.height()), kept)
+            dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), kept)
             accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
             figure, kept = dialog.figure, dialog.choices
             dialog.deleteLater()
@@ -58,15 +58,17 @@ class Exports(QObject):
             filters = picture_filters(self._session)
             path = questions.ask_save(self.window, "Export picture", default, filters)
             if path is not None:
-                self._write_picture(studio, figure, path)
+                self._write_picture(renderer, figure, path)
 
-    def _write_picture(self, studio: Studio, figure: Figure, path: Path) -> None:
+    def _write_picture(
+        self, renderer: OffscreenRenderer, figure: PictureOptions, path: Path
+    ) -> None:
         try:
             with wait_cursor():
                 if path.suffix.lower() in SUFFIXES:
-                    write_vector(studio, figure, path)
+                    write_vector(renderer, figure, path)
                 else:
-                    studio.write(figure, path)
+                    renderer.write(figure, path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return
@@ -81,15 +83,15 @@ class Exports(QObject):
         larger = max(COPIED_WIDTH / width, 1.0)
         size = round(larger * width), round(larger * height)
         shown = self._session.view
-        with self._studio() as studio, wait_cursor():
-            figure = Figure(
+        with self._renderer() as renderer, wait_cursor():
+            figure = PictureOptions(
                 size,
                 legend=shown.legend,
                 edges=shown.edges,
-                fill=studio.fills,
+                fill=renderer.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
             )
-            copy_image(to_image(studio.image(figure)))
+            copy_image(to_image(renderer.image(figure)))
         self.window.say(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
     # Films -----------------------------------------------------------------------------
@@ -102,7 +104,7 @@ class Exports(QObject):
             return
         if len(self._session.frames) < 2:
             return
-        dialog = FilmDialog(self.window, self._studio(), self._ask_film)
+        dialog = FilmDialog(self.window, self._renderer(), self._ask_film)
         self.film = dialog
         dialog.made.connect(self._written)
         dialog.failed.connect(self.window.banner.tell_error)

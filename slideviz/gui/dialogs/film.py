@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 
 from slideviz.export.exposure import Drawn
 from slideviz.export.film import filming, posing
-from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.bar import QuietBar
@@ -33,7 +33,7 @@ class FilmDialog(QDialog):
     Parameters
     ----------
     parent : QWidget
-    studio : Studio
+    renderer : OffscreenRenderer
         Knows the session, whose steps are filmed whatever the window shows meanwhile.
     ask : callable
         Returns the file for a kind of `slideviz.gui.dialogs.film_form.KINDS`, or None.
@@ -48,10 +48,12 @@ class FilmDialog(QDialog):
     failed = Signal(object)
     stopped = Signal()
 
-    def __init__(self, parent: QWidget, studio: Studio, ask: Callable[[str], Path | None]) -> None:
+    def __init__(
+        self, parent: QWidget, renderer: OffscreenRenderer, ask: Callable[[str], Path | None]
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export film")
-        self.studio = studio
+        self.renderer = renderer
         self._ask = ask
         self._file: Path | None = None
         self._turns, self._previewing = Turns(self), Turns(self)
@@ -59,7 +61,7 @@ class FilmDialog(QDialog):
         self._turns.done.connect(self._done)
         self._turns.failed.connect(self._failed)
         self._previewing.failed.connect(raise_again)
-        self.form = FilmForm(studio)
+        self.form = FilmForm(renderer)
         self.form.changed.connect(self._changed)
         outer = QVBoxLayout(self)
         outer.addLayout(self._make_previews())
@@ -120,10 +122,10 @@ class FilmDialog(QDialog):
 
     def _drawing(self) -> Generator[object, Any, None]:
         """Draw the first and the last image, from one place, in pieces."""
-        figure = self.form.figure.within(drawn_for(self.studio, PREVIEW))
-        yield from posing(self.studio, figure)
+        figure = self.form.figure.within(drawn_for(self.renderer, PREVIEW))
+        yield from posing(self.renderer, figure)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
-            pixels = yield from self.studio.picturing(figure, aim=False, frame=frame)
+            pixels = yield from self.renderer.picturing(figure, aim=False, frame=frame)
             label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     # Filming ---------------------------------------------------------------------------
@@ -140,7 +142,7 @@ class FilmDialog(QDialog):
         self._previewing.stop()
         self._file = file
         figure, reel = self.form.figure, self.form.reel
-        self._turns.start(filming(self.studio, figure, file, reel, overwrite=True))
+        self._turns.start(filming(self.renderer, figure, file, reel, overwrite=True))
         self._show_filming(True)
 
     def _came(self, drawn: Drawn) -> None:
@@ -181,4 +183,4 @@ class FilmDialog(QDialog):
         self._soon.stop()
         self._previewing.stop()
         super().done(result)
-        self.studio.close()
+        self.renderer.close()

@@ -16,8 +16,8 @@ from qtpy.QtWidgets import (
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import LARGEST, SMALLEST
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import Figure
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import FPS, SIZES, Reel, check_film
 from slideviz.gui.widgets.choice import Choice
 
@@ -39,7 +39,7 @@ class FilmForm(QWidget):
 
     Parameters
     ----------
-    studio : Studio
+    renderer : OffscreenRenderer
         Knows the session whose steps are filmed.
 
     Signals
@@ -50,10 +50,10 @@ class FilmForm(QWidget):
 
     changed = Signal()
 
-    def __init__(self, studio: Studio) -> None:
+    def __init__(self, renderer: OffscreenRenderer) -> None:
         super().__init__()
-        self.studio = studio
-        self.frames = len(studio.session.frames)
+        self.renderer = renderer
+        self.frames = len(renderer.session.frames)
         self._make_size()
         self._make_pace()
         self.white = QCheckBox("White background")
@@ -61,7 +61,7 @@ class FilmForm(QWidget):
         self.white.setChecked(True)
         self.fill = QCheckBox("Fill the images with the mesh")
         self.fill.setToolTip("Else they show what the view shows of the mesh.")
-        self.fill.setChecked(studio.fills)
+        self.fill.setChecked(renderer.fills)
         self.mark = QCheckBox("Marked cell")
         self.mark.setToolTip("Its outline, with its number and its value.")
         form = QFormLayout(self)
@@ -75,7 +75,7 @@ class FilmForm(QWidget):
         for option in (self.white, self.fill, self.mark):
             option.toggled.connect(self._changed)
             form.addRow("", option)
-        form.setRowVisible(self.mark, studio.session.view.marked is not None)
+        form.setRowVisible(self.mark, renderer.session.view.marked is not None)
         self._kind_chosen(self.kind.currentData())
 
     def _make_size(self) -> None:
@@ -121,11 +121,11 @@ class FilmForm(QWidget):
         return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
 
     @property
-    def figure(self) -> Figure:
+    def figure(self) -> PictureOptions:
         """Return what its images have."""
         size = self.width_px.value(), self.height_px.value()
-        view = self.studio.session.view
-        return Figure(
+        view = self.renderer.session.view
+        return PictureOptions(
             size,
             "white" if self.white.isChecked() else "shown",
             legend=view.legend,

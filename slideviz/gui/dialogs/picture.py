@@ -24,8 +24,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
-from slideviz.export.offscreen_renderer import Studio
-from slideviz.export.picture_options import BACKGROUNDS, Figure, words_of_size
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
 from slideviz.export.vector import MOST_CELLS
 from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.choice import Choice
@@ -73,7 +73,7 @@ class PictureDialog(QDialog):
     Parameters
     ----------
     parent : QWidget
-    studio : Studio
+    renderer : OffscreenRenderer
         Draws it.
     view_size : (int, int)
         Pixels of the view.
@@ -81,10 +81,12 @@ class PictureDialog(QDialog):
         What `choices` returned the last time.
     """
 
-    def __init__(self, parent: QWidget, studio: Studio, view_size=(1280, 800), kept="") -> None:
+    def __init__(
+        self, parent: QWidget, renderer: OffscreenRenderer, view_size=(1280, 800), kept=""
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export picture")
-        self.studio = studio
+        self.renderer = renderer
         self._view_size = tuple(min(max(length, SMALLEST), LARGEST) for length in view_size)
         self._make_preview()
         self._make_size()
@@ -122,7 +124,7 @@ class PictureDialog(QDialog):
         self.preview.setAccessibleName("Preview of the picture")
         self.words = QLabel()
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
-        self.kinds = QLabel(_kinds(self.studio))
+        self.kinds = QLabel(_kinds(self.renderer))
         self.kinds.setProperty("hint", True)
         self.kinds.setWordWrap(True)
         self.kinds.setFixedWidth(PREVIEW[0])
@@ -171,8 +173,8 @@ class PictureDialog(QDialog):
             box.toggled.connect(self._changed)
             self.options[name] = box
             self._form.addRow("", box)
-        self._form.setRowVisible(self.options["both"], self.studio.beside is not None)
-        marked = self.studio.session.view.marked is not None
+        self._form.setRowVisible(self.options["both"], self.renderer.beside is not None)
+        marked = self.renderer.session.view.marked is not None
         self._form.setRowVisible(self.options["marked"], marked)
 
     def _make_buttons(self) -> QDialogButtonBox:
@@ -191,18 +193,18 @@ class PictureDialog(QDialog):
     # What was chosen -------------------------------------------------------------------
 
     @property
-    def figure(self) -> Figure:
+    def figure(self) -> PictureOptions:
         """Return what was chosen."""
         picked = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
             size = self.width_px.value(), self.height_px.value()
-            return Figure(size, background, **picked, letters=text * LETTERS)
+            return PictureOptions(size, background, **picked, letters=text * LETTERS)
         dpi = float(self.dpi.value())
         size = tuple(round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
         pixels = text * PAPER_POINTS / 72.0 * dpi
         letters = pixels / 13.0 / font_scale(size)
-        return Figure(size, background, **picked, letters=letters, dpi=dpi)
+        return PictureOptions(size, background, **picked, letters=letters, dpi=dpi)
 
     @property
     def choices(self) -> str:
@@ -218,7 +220,7 @@ class PictureDialog(QDialog):
 
     def _take(self, kept: str) -> None:
         """Show what was chosen the last time, or what makes a good figure."""
-        usual = replace(Figure(), fill=self.studio.fills)
+        usual = replace(PictureOptions(), fill=self.renderer.fills)
         known = asdict(usual)
         try:
             known.update(json.loads(kept) if kept else {})
@@ -277,8 +279,8 @@ class PictureDialog(QDialog):
 
     def _drawing(self) -> Generator[object, Any, None]:
         """Draw the preview in pieces: of a large mesh, all at once would take a second."""
-        figure = self.figure.within(drawn_for(self.studio, PREVIEW))
-        pixels = yield from self.studio.picturing(figure)
+        figure = self.figure.within(drawn_for(self.renderer, PREVIEW))
+        pixels = yield from self.renderer.picturing(figure)
         self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     def _copy(self) -> None:
@@ -286,7 +288,7 @@ class PictureDialog(QDialog):
             self._turns.stop()
             self._timer.start()
         with wait_cursor():
-            copy_image(to_image(self.studio.image(self.figure)))
+            copy_image(to_image(self.renderer.image(self.figure)))
         self.words.setText("Copied to the clipboard.")
 
     def showEvent(self, event) -> None:
@@ -312,9 +314,9 @@ def _row(*widgets: QWidget) -> QWidget:
     return whole
 
 
-def _kinds(studio: Studio) -> str:
+def _kinds(renderer: OffscreenRenderer) -> str:
     """Return which kinds of files there can be, and why not others."""
-    mesh = studio.session.mesh
+    mesh = renderer.session.mesh
     if mesh is None or mesh.dim != 2:
         return "Saved as PNG; the view of a 3D mesh consists of pixels."
     if len(mesh.cells) > MOST_CELLS:

@@ -10,7 +10,7 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
 from qtpy.QtWidgets import QApplication
 
-from slideviz.export.offscreen_renderer import Studio
+from slideviz.export.offscreen_renderer import OffscreenRenderer
 
 LARGE = 50_000
 """Cells of a mesh whose preview is drawn as large as it is shown."""
@@ -23,12 +23,12 @@ def to_image(pixels: np.ndarray) -> QImage:
     return QImage(pixels.tobytes(), width, height, depth * width, kind).copy()
 
 
-def drawn_for(studio: Studio, box: tuple[int, int]) -> tuple[int, int]:
+def drawn_for(renderer: OffscreenRenderer, box: tuple[int, int]) -> tuple[int, int]:
     """Return the size that a preview is drawn at: twice the box, for lines are a pixel wide.
 
     Not of a large mesh, which takes its time.
     """
-    mesh = studio.session.mesh
+    mesh = renderer.session.mesh
     times = 1 if mesh is not None and len(mesh.cells) > LARGE else 2
     return times * box[0], times * box[1]
 
