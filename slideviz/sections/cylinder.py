@@ -12,8 +12,8 @@ import numpy as np
 
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.section_handles import Grips, Part, rounded, rounded_place, within
 from slideviz.sections.around_axis import AboutAxis, Unrolled
+from slideviz.sections.handles import Grips, Part, rounded, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
     FEW,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.section_handles import Grips, Part, rounded_place, within
+from slideviz.sections.handles import Grips, Part, rounded_place, within
 from slideviz.sections.shape import DIGITS, Label, axis_word, direction_label, triple_words
 
 if TYPE_CHECKING:

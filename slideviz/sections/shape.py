@@ -12,7 +12,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
 
 if TYPE_CHECKING:
-    from slideviz.scene.section_handles import Grips, Part
+    from slideviz.sections.handles import Grips, Part
     from slideviz.sections.line import Box
     from slideviz.sections.model import Section, Triple
 
@@ -155,7 +155,7 @@ class InPlane(Protocol):
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return the section after its part was dragged (see `slideviz.scene.section_handles`)."""
+        """Return the section after its part was dragged (see `slideviz.sections.handles`)."""
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
         """Return where lines (q, 2, 2) of the section begin and end along it, (q, 2)."""

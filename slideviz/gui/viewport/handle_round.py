@@ -15,8 +15,8 @@ from slideviz.gui.viewport.pulled import EDGE_PX, REACH_PX, Pulled
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.cylinder_handle import frame_of, pull, pulled_size
 from slideviz.scene.pick import to_display
-from slideviz.scene.section_handles import rounded
 from slideviz.sections.around_axis import Patch, Place, shape_of
+from slideviz.sections.handles import rounded
 from slideviz.sections.model import Section
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.view.test_section import KINDS, areas, shaken
 
 import slideviz as sv
 from slideviz.cli import run
@@ -24,7 +25,6 @@ from slideviz.session.passages import keeps, passages
 from slideviz.session.section_start import first_section, span, turned
 from slideviz.session.state import Frame
 from tests.builders import cube, grid, ring
-from tests.view.test_section import KINDS, areas, shaken
 
 SHAPE = (4, 6, 5)
 APEX, ANGLE = (0.0, 0.0, -1.0), 30.0

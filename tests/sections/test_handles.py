@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.scene.section_handles import dragged, grips, nearest
+from slideviz.sections.handles import dragged, grips, nearest
 from slideviz.sections.line import along, box_around, line_ends, trace
 from slideviz.sections.model import Section
 
