@@ -220,7 +220,7 @@ def test_the_warm_up_stands_back(window, qtbot, monkeypatch):
 
     order = []
     monkeypatch.setattr(jit_warmup, "stand_back", lambda: order.append("back"))
-    monkeypatch.setattr(jit_warmup.warmup, "warm_up", lambda *_: order.append("warm"))
+    monkeypatch.setattr(jit_warmup.jit_warmup, "warm_up", lambda *_: order.append("warm"))
     window.warm_up.start()
     qtbot.waitUntil(lambda: len(order) == 2)
     assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"

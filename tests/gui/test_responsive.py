@@ -200,10 +200,11 @@ CLOSED = """
 import sys
 from pathlib import Path
 from qtpy.QtCore import QTimer
-from slideviz.gui import app, dialogs
+from slideviz.gui import app
+from slideviz.gui.widgets import questions
 from slideviz.gui.window import MainWindow
 
-dialogs.ask_unsaved = lambda *_: "discard"
+questions.ask_unsaved = lambda *_: "discard"
 opened = MainWindow.show_opened
 
 def then_run(window, *values):
