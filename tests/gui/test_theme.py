@@ -1,5 +1,8 @@
 """Both themes can be read: words about inverted cells, and the boxes in lists."""
 
+import re
+from pathlib import Path
+
 import pytest
 from qtpy.QtGui import QColor, QPalette
 from qtpy.QtWidgets import QApplication
@@ -58,3 +61,11 @@ def test_boxes_stand_out_from_what_is_around_them(themed, name, kind):
     # Fusion draws the frame of a box so much darker than the colour of windows.
     frame = palette.color(QPalette.ColorRole.Window).darker(140)
     assert contrast(frame, palette.color(QPalette.ColorRole.Base)) > 2.9
+
+
+@pytest.mark.parametrize("name", ["light", "dark"])
+def test_the_signs_of_docks_are_there(themed, name):
+    themed(name)
+    signs = re.findall(r'url\("(.*?)"\)', QApplication.instance().styleSheet())
+    assert len(signs) == 2
+    assert all(Path(sign).is_file() for sign in signs), signs
