@@ -6,18 +6,17 @@ around the axis is unrolled, and torn where there is most room.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from slideviz.case.section_shapes import ShapeTerms, Size
+from slideviz.case.section_shapes import Size
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.round_number import round_middle
-from slideviz.sections.shape import InPlane, Label
+from slideviz.sections.shape import Shape
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -120,59 +119,20 @@ class Patch:
         return self.angles[1] - self.angles[0] > _WHOLE
 
 
-class AboutAxis(ABC):
+class AboutAxis(Shape):
     """A shape about an axis, whose size a ball pulls; see `slideviz.sections.shape.Shape`."""
 
-    terms: ShapeTerms
-    in_plane: InPlane | None
-    directed: bool
-    handle: Literal["push", "pull"] = "pull"
+    handle = "pull"
 
-    # What differs ----------------------------------------------------------------------
-
-    @abstractmethod
-    def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return signed distances (n,), outwards positive."""
+    # What differs, beside what `Shape` leaves open ------------------------------------
 
     @abstractmethod
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
         """Return weights (3,) and a number: weighted squares in its frame have that sum on it."""
 
     @abstractmethod
-    def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the sizes (n,) with which the section would go through points (n, 3)."""
-
-    @abstractmethod
-    def describe(self, section: Section) -> str:
-        """Return the section in words."""
-
-    @abstractmethod
-    def brief(self, section: Section) -> str:
-        """Return the section in few words."""
-
-    @abstractmethod
-    def miss(self, section: Section, points: FloatArray) -> str:
-        """Return why a section cuts no cell of these points (n, d), and where it would."""
-
-    @abstractmethod
     def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
         """Return points (p, 3) laid flat (see `slideviz.sections.shape.Shape.flatten`)."""
-
-    @abstractmethod
-    def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return the angle at which what has these points (n, 3) lies level; None: any."""
-
-    @abstractmethod
-    def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return what the first two flat coordinates are."""
-
-    @abstractmethod
-    def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the transformation (4, 4) of the flat section that one in space is, (4, 4)."""
-
-    @abstractmethod
-    def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far a transformation takes the section away from itself, in lengths."""
 
     @abstractmethod
     def places(self, section: Section, points: FloatArray) -> FloatArray:

@@ -17,7 +17,6 @@ from slideviz.sections.round_number import round_middle, roundest
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
-    InPlane,
     Label,
     axis_word,
     triple,
@@ -43,7 +42,7 @@ class Cone(AboutAxis):
     """The half of a cone along its axis; see `slideviz.sections.shape.Shape`."""
 
     terms = SECTION_SHAPES["cone"]
-    in_plane: InPlane | None = None
+    in_plane = None
     directed = True
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:

@@ -210,8 +210,9 @@ def _crossings(
     """Return the points (k, 3) where the section meets the edges from a to b (k,) each."""
     start = padded(points[a])
     way = padded(points[b]) - start
-    between = a != b
-    share = np.zeros(len(a))
-    levels = level[a[between]], level[b[between]]
-    share[between] = section.shape.crossings(section, (start[between], way[between]), levels)
+    share, levels = np.zeros(len(a)), (level[a], level[b])
+    # Mostly no corner is at a node, and nothing has to be copied.
+    between = slice(None) if (a != b).all() else np.flatnonzero(a != b)
+    edges = start[between], way[between]
+    share[between] = section.shape.crossings(section, edges, tuple(one[between] for one in levels))
     return start + share[:, None] * way

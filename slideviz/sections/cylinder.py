@@ -32,7 +32,7 @@ _CHORDS = 720
 """Of a circle."""
 
 
-class Circle:
+class Circle(InPlane):
     """A cylinder in 2D; see `slideviz.sections.shape.InPlane`."""
 
     def can_cut(self, section: Section) -> bool:
@@ -96,7 +96,7 @@ class Cylinder(AboutAxis):
     """The cylinder; see `slideviz.sections.shape.Shape` for what its functions return."""
 
     terms = SECTION_SHAPES["cylinder"]
-    in_plane: InPlane | None = Circle()
+    in_plane = Circle()
     directed = False
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:

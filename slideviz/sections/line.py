@@ -11,7 +11,14 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.handles import Grips, Part, rounded_place, within
-from slideviz.sections.shape import DIGITS, Label, axis_word, direction_label, triple_words
+from slideviz.sections.shape import (
+    DIGITS,
+    InPlane,
+    Label,
+    axis_word,
+    direction_label,
+    triple_words,
+)
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -69,7 +76,7 @@ def along(section: Section) -> FloatArray | None:
     return -way if way[np.argmax(np.abs(way))] < 0 else way
 
 
-class Line:
+class Line(InPlane):
     """A plane in 2D; see `slideviz.sections.shape.InPlane` for what its functions return."""
 
     def can_cut(self, section: Section) -> bool:

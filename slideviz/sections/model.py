@@ -16,8 +16,7 @@ from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
 from slideviz.sections.shape import InPlane, Shape
 
-_ALL: tuple[Shape, ...] = (Plane(), Cylinder(), Cone())
-SHAPES = {shape.terms.value: shape for shape in _ALL}
+SHAPES: dict[str, Shape] = {shape.terms.value: shape for shape in (Plane(), Cylinder(), Cone())}
 """By name."""
 
 Triple = tuple[float, float, float]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from slideviz.sections.polygons import Polygons
 from slideviz.sections.round_number import round_middle
 from slideviz.sections.shape import (
     FEW,
-    InPlane,
     Label,
+    Shape,
     axis_word,
     direction_label,
     triple,
@@ -61,13 +61,13 @@ def plane_axes(section: Section) -> Axes:
     return Axes(rows, (direction_label(right), direction_label(up)))
 
 
-class Plane:
+class Plane(Shape):
     """The plane; see `slideviz.sections.shape.Shape` for what its functions return."""
 
     terms = SECTION_SHAPES["plane"]
-    in_plane: InPlane | None = LINE
+    in_plane = LINE
     directed = True
-    handle: Literal["push", "pull"] = "push"
+    handle = "push"
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
         """Return the coordinates (n,) along the normal."""

@@ -101,7 +101,8 @@ class FlatView(QWidget):
         self.title.set_text(f"{called}: {words}" if called else words)
         self.facts.setText(self.scene.summary)
         self.facts.setToolTip(self.scene.summary)
-        kind = (session.mesh, section.kind, section.direction, session.view.copies)
+        about = section.origin if section.shape.terms.point else ()
+        kind = (session.mesh, section.kind, section.direction, about, session.view.copies)
         if kind != self._fitted:
             self._fitted = kind
             self._refit.start()
