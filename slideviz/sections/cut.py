@@ -74,7 +74,7 @@ class Cutter:
         Raises
         ------
         CaseError
-            A cylinder is to cut a 2D mesh, and its axis is not z.
+            A cylinder is to cut a 2D mesh, and its axis is not z; or it is another shape in 2D.
         """
         level = self._level(points, section)
         owners, low, high = self._corners(level)
@@ -138,9 +138,10 @@ class Cutter:
 
     def _level(self, points: FloatArray, section: Section) -> FloatArray:
         if not section.can_cut(self.dim):
+            why = "it" if section.shape.in_plane is None else "its axis is not z, so it"
             raise CaseError(
-                f"{section.describe()}: its axis is not z, so it needs a 3D mesh; a 2D mesh is cut "
-                "by a plane, or in a circle by a cylinder about z"
+                f"{section.describe()}: {why} needs a 3D mesh; a 2D mesh is cut by a plane, or in "
+                "a circle by a cylinder about z"
             )
         return section.distance(points)
 

@@ -24,7 +24,8 @@ from slideviz.session import changes
 from slideviz.session.passages import keeps, passages
 from slideviz.session.section_start import first_section, span, turned
 from slideviz.session.state import Frame
-from tests.builders import cube, grid, ring
+from tests.builders import cube, grid, ring, square
+from tests.sections.test_section import KINDS, areas, shaken
 
 SHAPE = (4, 6, 5)
 APEX, ANGLE = (0.0, 0.0, -1.0), 30.0
@@ -298,6 +299,14 @@ def test_the_ball_follows_the_mouse_around_the_apex():
     far = 1e6 * (end - start)
     assert 0.0 < pulled_size(parallel, CUT, place, (start, start - far)) < 1.0
     assert 80.0 < pulled_size(parallel, CUT, place, (start, start + far)) < 90.0
+
+
+def test_in_2d_it_says_what_it_needs():
+    mesh = square(3)
+    assert not CUT.can_cut(2)
+    with pytest.raises(CaseError, match=r"apex \(0, 0, -1\): it needs a 3D mesh; a 2D mesh is cut"):
+        Cutter.of(mesh).cut(mesh.points, CUT)
+    assert CUT.describe(2) == CUT.brief(2) == CUT.describe()
 
 
 @pytest.mark.parametrize("whole", [False, True])
