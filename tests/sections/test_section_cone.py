@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.view.test_section import KINDS, areas, shaken
 
 import slideviz as sv
 from slideviz.cli import run
