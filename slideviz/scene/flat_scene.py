@@ -11,11 +11,10 @@ from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.section_paint import Paint
-from slideviz.scene import pick_cell
-from slideviz.scene.instances import Twins
+from slideviz.scene import pick
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import PolygonActor, plain_colour
+from slideviz.scene.polygon_actor import PolygonActor, Twins, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -188,7 +187,7 @@ class FlatScene:
             return None
         shown = [self._shown.actor, *self._twins.drawn.values()]
         cells = self.polygons.cells
-        return pick_cell.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
+        return pick.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
 
     # Camera ----------------------------------------------------------------------------
 

@@ -15,11 +15,11 @@ import numpy as np
 from slideviz.color_scheme import LIGHT, Look
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
-from slideviz.scene import pick, pick_cell
+from slideviz.scene import pick
 from slideviz.scene.actors import CELL, Drawn
 from slideviz.scene.camera import SLACK, Eye
 from slideviz.scene.ghosts import GhostLayer
-from slideviz.scene.legend import LegendLayer
+from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cell import MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
 from slideviz.scene.moved import Overview
@@ -28,7 +28,6 @@ from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.scene.threshold import ChosenLayer
-from slideviz.scene.triad import TriadLayer
 from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session
 from slideviz.session.store import tell_all
@@ -244,11 +243,11 @@ class Scene:
             only = self.stage.chosen(session)
             if only is not None:
                 rank = np.where(only.mask, rank, np.nan)
-            at = pick_cell.on_plane(self.plotter, x, y)
+            at = pick.on_plane(self.plotter, x, y)
             return cell_at(session.frame.mesh, *at, rank)
         # Boundaries in front of a section are glass.
-        cut = pick_cell.front_cell(self.plotter, x, y, self.sections.pickable())
-        return pick_cell.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
+        cut = pick.front_cell(self.plotter, x, y, self.sections.pickable())
+        return pick.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
 
     def _pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""

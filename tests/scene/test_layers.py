@@ -8,6 +8,7 @@ from slideviz.color_scheme import DARK, LIGHT
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
+from slideviz.scene.legend import COLOURS, SIZE
 from slideviz.scene.passages import (
     CHOSEN,
     PALER,
@@ -18,7 +19,6 @@ from slideviz.scene.passages import (
 )
 from slideviz.scene.pick import to_display
 from slideviz.scene.threshold import ChosenLayer
-from slideviz.scene.triad import COLOURS, SIZE
 from slideviz.session import changes
 from slideviz.session.inspect import middles
 from slideviz.session.state import Frame

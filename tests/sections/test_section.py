@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, Mesh
-from slideviz.sections.cases import cut_cases
-from slideviz.sections.cut import Cutter
+from slideviz.sections.cut import Cutter, cut_cases
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import joined
 from slideviz.session.section_start import span

@@ -14,8 +14,7 @@ from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.handle import HANDLE_COLOUR
 from slideviz.gui.viewport.pulled import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, Pulled
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.pick import to_display
-from slideviz.scene.pick_cell import on_plane
+from slideviz.scene.pick import on_plane, to_display
 from slideviz.sections.handles import Grips, Part, dragged, grips, nearest
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
