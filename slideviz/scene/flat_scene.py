@@ -14,7 +14,7 @@ from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import PolygonActor, Twins, plain_colour
+from slideviz.scene.polygon_actor import PolygonActor, Instances, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -60,7 +60,7 @@ class FlatScene:
         self.polygons: Polygons | None = None
         self._all: Polygons | None = None
         self._shown = PolygonActor(self.stage, "flat")
-        self._twins = Twins(self.stage, self._shown)
+        self._instances = Instances(self.stage, self._shown)
         self._mark = PolygonActor(self.stage, "marked", pickable=False)
         self._style_mark()
         self._period = Period()
@@ -142,7 +142,7 @@ class FlatScene:
             for number, matrix in matrices(self.session, pair).items():
                 if pair is not None and keeps(section, matrix):
                     found[number] = flat_matrix(section, pair, number, matrix)
-        self._twins.show(found)
+        self._instances.show(found)
 
     def _style_mark(self) -> None:
         prop, mapper = self._mark.actor.prop, self._mark.mapper
@@ -185,7 +185,7 @@ class FlatScene:
         """Return the cell at a pixel counted from the lower left, or None."""
         if self.polygons is None or not len(self.polygons):
             return None
-        shown = [self._shown.actor, *self._twins.drawn.values()]
+        shown = [self._shown.actor, *self._instances.drawn.values()]
         cells = self.polygons.cells
         return pick.front_cell(self.stage.plotter, x, y, [(one, cells) for one in shown])
 
@@ -203,7 +203,10 @@ class FlatScene:
         if self._all is None or not len(self._all):
             return None
         own = self._all.points
-        parts = [moved(own, np.array(twin.user_matrix)) for twin in self._twins.drawn.values()]
+        parts = [
+            moved(own, np.array(instance.user_matrix))
+            for instance in self._instances.drawn.values()
+        ]
         parts.append(own)
         low = np.min([part.min(axis=0) for part in parts], axis=0)
         high = np.max([part.max(axis=0) for part in parts], axis=0)

@@ -78,14 +78,14 @@ def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
     return shape
 
 
-class Twins:
+class Instances:
     """Images of one actor under matrices, with its data, mapper and property.
 
     Parameters
     ----------
     stage : Stage
     base : PolygonActor
-        What is repeated; the twins are named like it, with their numbers.
+        What is repeated; the instances are named like it, with their numbers.
     """
 
     def __init__(self, stage: Stage, base: PolygonActor) -> None:
@@ -101,12 +101,12 @@ class Twins:
         for number, matrix in matrices.items():
             if number not in self.drawn:
                 name = f"{base.name}:{number}"
-                twin = pv.Actor(mapper=self.base.mapper, prop=base.prop, name=name)
+                instance = pv.Actor(mapper=self.base.mapper, prop=base.prop, name=name)
                 self.stage.plotter.add_actor(
-                    twin, name=twin.name, reset_camera=False, render=False, pickable=True
+                    instance, name=instance.name, reset_camera=False, render=False, pickable=True
                 )
                 # One mapper has one shader: that of the actor that is drawn first.
-                twin.SetShaderProperty(base.GetShaderProperty())
-                self.drawn[number] = twin
+                instance.SetShaderProperty(base.GetShaderProperty())
+                self.drawn[number] = instance
             self.drawn[number].user_matrix = matrix
             self.drawn[number].visibility = base.visibility

@@ -13,7 +13,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.mesh import recoloured
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import PolygonActor, Twins, plain_colour
+from slideviz.scene.polygon_actor import PolygonActor, Instances, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
@@ -74,7 +74,7 @@ class SectionLayer:
         """Forget the mesh."""
         self.drawn: dict[str, SectionDrawn] = {}
         self._period = Period()
-        self._twins: dict[str, Twins] = {}
+        self._instances: dict[str, Instances] = {}
         self._lines.clear()
         self._lines_of: tuple[object, ...] = ()
         self._box: tuple[tuple[object, ...], Box] | None = None
@@ -93,8 +93,10 @@ class SectionLayer:
 
     def actors(self) -> list[Any]:
         """Return all that sections show, of neighbours too."""
-        twins = (twin for one in self._twins.values() for twin in one.drawn.values())
-        return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *twins]
+        instances = (
+            instance for one in self._instances.values() for instance in one.drawn.values()
+        )
+        return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *instances]
 
     def update(self, old: Session | None, new: Session) -> None:
         """Show another state; only what differs is cut or coloured again."""
@@ -102,8 +104,8 @@ class SectionLayer:
             return
         wanted = self._wanted(new)
         for name in [name for name in self.drawn if name not in wanted]:
-            if name in self._twins:
-                self._twins.pop(name).show({})
+            if name in self._instances:
+                self._instances.pop(name).show({})
             self.stage.remove(name)
             del self.drawn[name]
         again = recoloured(old, new)
@@ -111,11 +113,11 @@ class SectionLayer:
             self._draw(name, (section, number, matrix), new, again)
         neighbours = self._neighbours(new)
         for name, (section, number, _) in wanted.items():
-            if number == 0 and (neighbours or name in self._twins):
+            if number == 0 and (neighbours or name in self._instances):
                 base = self.drawn[name].shown
-                twins = self._twins.setdefault(name, Twins(self.stage, base))
+                instances = self._instances.setdefault(name, Instances(self.stage, base))
                 # The period takes these onto themselves: nothing has to be cut again.
-                twins.show({at: m for at, m in neighbours.items() if keeps(section, m)})
+                instances.show({at: m for at, m in neighbours.items() if keeps(section, m)})
         if new.frame.mesh.dim == 2:
             self._draw_lines(new, neighbours)
 
