@@ -14,7 +14,7 @@ from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import PolygonActor, Instances, plain_colour
+from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons

@@ -13,7 +13,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.mesh import recoloured
 from slideviz.scene.passages import Period, matrices
-from slideviz.scene.polygon_actor import PolygonActor, Instances, plain_colour
+from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
 from slideviz.scene.stage import Stage
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section

@@ -289,7 +289,7 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     assert flat.across.name == "s cos(θ sin α)"
     low, high = flat.scene.bounds()
     assert low[1] == pytest.approx(-high[1], rel=0.1), "level, with a passage on each side"
-    assert len(flat.scene._twins.drawn) == 2
+    assert len(flat.scene._instances.drawn) == 2
     answers("ask_save", tmp_path / "again.cfg")
     window.actions_.by_name["save_case"].trigger()
     text = (tmp_path / "again.cfg").read_text()
