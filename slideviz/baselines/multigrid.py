@@ -14,11 +14,12 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+from numba import prange
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array, bsr_matrix
 
-from slideviz.baselines import sweeps
 from slideviz.mesh.model import FloatArray
+from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
 
@@ -39,6 +40,8 @@ WAIT_SECONDS = 0.1
 
 MAKING = 0.3
 """The part of the work that making the hierarchy takes."""
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +165,7 @@ def _product(matrix: Any, x: FloatArray) -> FloatArray:
     """Return the product of a matrix in blocks (n, n) with a vector (n,)."""
     out = np.empty((len(matrix.indptr) - 1, matrix.data.shape[1]))
     with one_at_a_time(matrix.data.size):
-        sweeps.product(matrix.indptr, matrix.indices, matrix.data, x.reshape(out.shape), out)
+        product(matrix.indptr, matrix.indices, matrix.data, x.reshape(out.shape), out)
     return out.ravel()
 
 
@@ -170,7 +173,7 @@ def _sweep(level: Level, right: FloatArray, x: FloatArray, backward: bool) -> No
     """Smooth x (n,) in place."""
     matrix, shape = level.matrix, level.inverse.shape[:2]
     blocks = right.reshape(shape), x.reshape(shape)
-    sweeps.sweep(matrix.indptr, matrix.indices, matrix.data, level.inverse, *blocks, backward)
+    sweep(matrix.indptr, matrix.indices, matrix.data, level.inverse, *blocks, backward)
 
 
 def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
@@ -209,3 +212,46 @@ def _conjugate_gradients(
         before, energy = energy, float(left @ z)
         along = z + (energy / before) * along
     raise AssertionError
+
+
+@njit(**_OPTIONS)
+def sweep(indptr, indices, data, inverse, right, x, backward):  # type: ignore[no-untyped-def]
+    """Make one Gauss and Seidel sweep by blocks, on x (m, b) in place.
+
+    ``data`` (k, b, b) and ``inverse`` (m, b, b): the blocks, and the inverse of the diagonal ones.
+    """
+    m, b = x.shape
+    left = np.empty(b)
+    for step in range(m):
+        row = m - 1 - step if backward else step
+        for i in range(b):
+            left[i] = right[row, i]
+        for k in range(indptr[row], indptr[row + 1]):
+            column = indices[k]
+            if column != row:
+                for i in range(b):
+                    total = 0.0
+                    for j in range(b):
+                        total += data[k, i, j] * x[column, j]
+                    left[i] -= total
+        for i in range(b):
+            total = 0.0
+            for j in range(b):
+                total += inverse[row, i, j] * left[j]
+            x[row, i] = total
+
+
+@njit(parallel=True, **_OPTIONS)
+def product(indptr, indices, data, x, out):  # type: ignore[no-untyped-def]
+    """Write the product of a matrix in blocks with x (m, b) to out (m, b)."""
+    m, b = x.shape
+    for row in prange(m):
+        for i in range(b):
+            out[row, i] = 0.0
+        for k in range(indptr[row], indptr[row + 1]):
+            column = indices[k]
+            for i in range(b):
+                total = 0.0
+                for j in range(b):
+                    total += data[k, i, j] * x[column, j]
+                out[row, i] += total

@@ -1,6 +1,6 @@
 import pytest
 
-from slideviz.baselines import element_loops, sweeps, weighting
+from slideviz.baselines import idw, multigrid, stiffness
 from slideviz.rbf import closest, compiled
 from slideviz.session import jit_warmup
 
@@ -8,7 +8,7 @@ from slideviz.session import jit_warmup
 def signatures():
     return {
         name: len(loop.signatures)
-        for module in (compiled, closest, element_loops, sweeps, weighting)
+        for module in (compiled, closest, idw, multigrid, stiffness)
         for name, loop in vars(module).items()
         if hasattr(loop, "signatures")
     }
