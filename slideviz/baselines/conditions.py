@@ -11,9 +11,9 @@ from slideviz.baselines.stiffness import Conditions
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.periodic import axis_basis
 from slideviz.rbf.classify import RANK_TOLERANCE
+from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.problem import Problem
-from slideviz.rbf.rows import merge
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ from slideviz.baselines.multigrid import Found, solve
 from slideviz.baselines.stiffness import assemble
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.constraint_rows import AGREE, merge
 from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
-from slideviz.rbf.rows import AGREE, merge
 
 HOPELESS = 1e-3
 """Fall of the residual that must be reached; what is between it and the tolerance is told."""

@@ -21,10 +21,10 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, half_chord
+from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick
 from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
-from slideviz.rbf.rows import merge
 
 TINY = 1e-24
 """Square of the distance, over the reference length, below which nodes coincide: there the

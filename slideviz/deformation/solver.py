@@ -16,8 +16,8 @@ from slideviz.deformation.stepping import Climb, Progress, Step, Trial, renumber
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.problem import Watch
-from slideviz.rbf.rows import Rows, blocks
 
 __all__ = ["Progress", "Step", "Trial", "deform", "folded_at"]
 
@@ -173,7 +173,7 @@ def _systems(plan: Plan, case: Case) -> list[int]:
         return [nodes]
     dim = plan.coords.shape[1]
     along = np.concatenate([np.eye(dim), normals])
-    block = blocks(Rows(np.arange(len(along)), along, np.zeros((len(along), 1))))
+    block = blocks(ConstraintRows(np.arange(len(along)), along, np.zeros((len(along), 1))))
     each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
     return [int(n) for n in each if n] + [nodes] * plan.tracks.curved
 

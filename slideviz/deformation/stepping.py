@@ -14,9 +14,9 @@ from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
+from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
-from slideviz.rbf.rows import AGREE
 
 HALVINGS = 3
 """How often a step that folds a cell is halved."""

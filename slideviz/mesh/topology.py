@@ -20,7 +20,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.mesh.rows import row_groups
+from slideviz.mesh.unique_rows import row_groups
 
 FEATURE_ANGLE_DEG = 40.0
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch, linear_terms
-from slideviz.rbf.rows import Rows, blocks
 from slideviz.rbf.solve import (
     NOTHING,
     Factor,
@@ -40,13 +40,13 @@ class ExactFit:
     def __init__(self, problem: Problem, watch: Watch) -> None:
         d = problem.values.shape[1]
         self._problem, self._watch = problem, watch
-        self._rows: Rows | None = None
+        self._rows: ConstraintRows | None = None
         self._factors: dict[int, Factor] = {}
         self.history: tuple[Cycle, ...] = ()
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         self.dropped: IntArray = np.empty(0, np.int64)
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: ConstraintRows) -> None:
         """Solve with these rows and all before them."""
         rows, done = rows.by_position(self._problem.coords), 0
         if self._rows is not None:
@@ -64,7 +64,7 @@ class ExactFit:
         self.found = gathered(rows, weights)
 
     def _solve(
-        self, rows: Rows, part: IntArray, done: int, weights: FloatArray, tick: Tick
+        self, rows: ConstraintRows, part: IntArray, done: int, weights: FloatArray, tick: Tick
     ) -> IntArray:
         """Write the weights of one block of rows, of which those below ``done`` are factorised.
 
@@ -98,13 +98,15 @@ class ExactFit:
         )
 
 
-def _parts(rows: Rows) -> list[IntArray]:
+def _parts(rows: ConstraintRows) -> list[IntArray]:
     """Return the rows of each block of the system."""
     block = blocks(rows)
     return [np.flatnonzero(block == k) for k in np.unique(block)]
 
 
-def gathered(rows: Rows, weights: FloatArray, tail: FloatArray | None = None) -> Interpolant:
+def gathered(
+    rows: ConstraintRows, weights: FloatArray, tail: FloatArray | None = None
+) -> Interpolant:
     """Return the interpolant of one weight for each row, (r, m)."""
     if rows.normals is None:
         return Interpolant(rows.nodes, weights, tail)
@@ -115,7 +117,7 @@ def gathered(rows: Rows, weights: FloatArray, tail: FloatArray | None = None) ->
     return Interpolant(nodes[order], total[order], tail)
 
 
-def row_terms(problem: Problem, rows: Rows) -> FloatArray:
+def row_terms(problem: Problem, rows: ConstraintRows) -> FloatArray:
     """Return the polynomial's terms in each row, (r, q), or (r, q d) with normals."""
     terms = linear_terms(problem.basis, problem.features[:, rows.nodes])
     if rows.normals is None:
@@ -123,7 +125,7 @@ def row_terms(problem: Problem, rows: Rows) -> FloatArray:
     return np.einsum("rq,rd->rqd", terms, rows.normals).reshape(len(terms), -1)
 
 
-def saddle_fit(problem: Problem, rows: Rows) -> tuple[Interpolant, bool]:
+def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, bool]:
     """Return the interpolant with polynomial, and whether the system was singular."""
     place = problem.features[:, rows.nodes], rows.normals
     solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.right)

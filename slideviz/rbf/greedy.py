@@ -14,14 +14,14 @@ what these lacked (``Problem.lag``), so that the tolerance holds for the whole d
 
 Candidates are sorted by position, and every number depends on one candidate and the order of
 the control nodes alone: neither numbering nor threads change the selection. Where errors are
-equal but for rounding, as on symmetric meshes, the position decides (``pool.favour``), so that
+equal but for rounding, as on symmetric meshes, the position decides (`selection.favour`), so that
 another processor chooses the same nodes.
 
 Every selection ends: a cycle without a new row is the last, and levels, which may choose the
 same rows again, are given up when the error no longer falls from one to the next, or when they
-have chosen as many rows as there are (``patience``). Then one last level takes all it needs. If
-an error stays above the tolerance, ``short`` says why, and what was found at the lowest error
-is kept where that is clearly better.
+have chosen as many rows as there are (`selection.Patience`). Then one last level takes all it
+needs. If an error stays above the tolerance, ``short`` says why, and what was found at the lowest
+error is kept where that is clearly better.
 """
 
 from __future__ import annotations
@@ -32,14 +32,12 @@ from time import perf_counter
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
-from slideviz.rbf.growing import Growing, newton
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.rbf.patience import Patience
-from slideviz.rbf.pool import favour, pool
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
-from slideviz.rbf.rows import Rows, blocks
+from slideviz.rbf.selection import GrowingFactor, Patience, favour, newton, pool
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
 STALE = 0.3
@@ -78,7 +76,7 @@ class GreedyFit:
         self.dropped: IntArray = np.empty(0, np.int64)
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._level = history[-1].level if history else 1
-        self._rows = Rows(np.empty(0, np.int64), None, np.empty((0, d)))
+        self._rows = ConstraintRows(np.empty(0, np.int64), None, np.empty((0, d)))
         self._candidate = self._block = np.empty(0, np.int64)
         self._known = problem.beginning()
         self._new_level()
@@ -91,12 +89,12 @@ class GreedyFit:
         self._chosen = np.empty(0, np.int64)
         self._barred = np.zeros(len(self._rows.nodes), bool)
 
-    def _empty(self) -> list[Growing]:
+    def _empty(self) -> list[GrowingFactor]:
         """Return a factor without rows for each block."""
         count = int(self._block.max(initial=0)) + 1
-        return [Growing(self._rows.right.shape[1]) for _ in range(count)]
+        return [GrowingFactor(self._rows.right.shape[1]) for _ in range(count)]
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: ConstraintRows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""
         rows = rows.by_position(self._problem.coords)
         first = not len(self._rows.nodes)
@@ -218,7 +216,7 @@ class GreedyFit:
     def _own(self, target: FloatArray) -> Interpolant:
         """Return the interpolant of this level."""
         chosen, normals = self._chosen, self._rows.normals
-        rows = Rows(
+        rows = ConstraintRows(
             self._rows.nodes[chosen], None if normals is None else normals[chosen], target[chosen]
         )
         if self._tailed:
@@ -269,9 +267,15 @@ class GreedyFit:
         if normals is not None:
             vectors = np.zeros((len(errors), d))
             np.add.at(vectors, self._candidate, residual * normals)
-        chosen = len(self.found.nodes), len(np.unique(self._candidate[self._chosen]))
         per_node = max(1, len(self._candidate) // max(1, len(errors)))
-        return pool(errors, vectors, self._settings, chosen, per_node)
+        return pool(
+            errors,
+            vectors,
+            self._settings,
+            chosen=len(self.found.nodes),
+            chosen_in_level=len(np.unique(self._candidate[self._chosen])),
+            per_node=per_node,
+        )
 
     def _pick(
         self,
@@ -293,15 +297,21 @@ class GreedyFit:
         floor = 0.0 if self._settings.pick != "block" else STALE * largest
         floor = max(floor, self._settings.tolerance)
         candidate = self._candidate[rows]
-        named = candidate, self._favour[candidate]
-        picked, bases = newton(schur, residual, named, (count, floor))
+        picked, bases = newton(
+            schur,
+            residual,
+            nodes=candidate,
+            factor=self._favour[candidate],
+            count=count,
+            floor=floor,
+        )
         diagonal = np.concatenate([np.diag(s) for s in schur])
         self._barred[rows[diagonal <= PIVOT_GUARD]] = True
         turn, start = len(self._chosen) + np.arange(len(picked)), 0
         for k, factor in enumerate(self._grown):
             mine = (picked >= start) & (picked < start + len(parts[k]))
             at = picked[mine] - start
-            factor.append(parts[k][at], turn[mine], (left[k][:, at].T, bases[k][at]))
+            factor.append(parts[k][at], turn[mine], beside=left[k][:, at].T, corner=bases[k][at])
             factor.follow(target)
             start += len(parts[k])
         self._chosen = np.concatenate([self._chosen, rows[picked]])
@@ -316,14 +326,14 @@ class GreedyFit:
                 left, schur = self._remaining(factor, part)
                 made = factorise(schur)
                 turn = len(self._chosen) + np.arange(len(made.kept))
-                factor.append(part[made.kept], turn, (left[:, made.kept].T, made.lower))
+                factor.append(part[made.kept], turn, beside=left[:, made.kept].T, corner=made.lower)
                 factor.follow(target)
                 self._chosen = np.concatenate([self._chosen, part[made.kept]])
             self._barred[rows] = True
             self._now = self._own(target)
         self.found = self._settled.plus(self._now)
 
-    def _remaining(self, factor: Growing, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:

@@ -18,8 +18,8 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
+from slideviz.rbf.constraint_rows import refuse
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.rows import refuse
 
 COINCIDENT = 1e-12
 """Nodes nearer than this part of the mesh's extent are in one place."""

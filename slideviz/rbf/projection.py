@@ -5,6 +5,10 @@ The exact closest point on the node's own piece, not the thesis's nearest-midpoi
 undeformed boundary, in the working frame, so an arc about the axis stays an arc, and a slid
 node never leaves its curve or surface however many steps are made. With periodic displacement
 they go on beyond the periodic boundaries: on what begins at the other one.
+
+A blade that moves along its hub leaves the place where it stood, and nodes of the hub follow into
+it; but the hub has no facets there. So at the rim of a moving boundary a surface is extended
+flat, in the plane of its last facet, as far as the boundary moves.
 """
 
 from __future__ import annotations
@@ -16,9 +20,10 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, find_joints, unit
-from slideviz.rbf.apron import edge_apron, surface_apron
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
+
+Place = Callable[[IntArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +105,15 @@ def find_tracks(
         member = np.isin(labels, chosen)
         of_node[nodes] = len(tracks)
         curved |= _bends(corner_vectors(sides[member]))
-        apron = surface_apron(boundary, member, moving, place, reach)
-        corners = np.concatenate([_simplices(sides[member]), apron])
+        beyond = surface_extension(boundary, member, moving, place, reach)
+        corners = np.concatenate([_simplices(sides[member]), beyond])
         tracks.append(ClosestPoints(_continued(corners, shift)))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(tracks)
             corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
-            corners = np.concatenate([corners, edge_apron(ends, moving, place, reach)])
+            corners = np.concatenate([corners, edge_extension(ends, moving, place, reach)])
             tracks.append(ClosestPoints(_continued(corners, shift)))
     return Tracks(tuple(tracks), of_node, bool(curved))
 
@@ -239,3 +244,52 @@ def _edge_chains(
         if len(segments):
             chains.append((classes.edge[node_label == value], segments))
     return chains
+
+
+def surface_extension(
+    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place, reach: float
+) -> FloatArray:
+    """Return simplices (s, c, d) beyond the moving rim of a surface (3D) or curve (2D).
+
+    Parameters
+    ----------
+    member : (f,) bool
+        Facets of the surface.
+    moving : (n,) bool
+        Nodes of the moving boundaries.
+    place : callable
+        Corners of facets, segments or single nodes (m, k) in the undeformed frame.
+    reach : float
+        How far the extension goes.
+    """
+    inside = member[boundary.joints]
+    rim = (inside.sum(axis=1) == 1) & moving[boundary.joint_nodes].all(axis=1)
+    facet = np.where(inside[:, 0], boundary.joints[:, 0], boundary.joints[:, 1])[rim]
+    ends = place(boundary.joint_nodes[rim])
+    sides = place(boundary.facets[facet])
+    if not len(facet):
+        return np.empty((0, boundary.dim, boundary.dim))
+    out = ends.mean(axis=1) - sides.mean(axis=1)
+    if boundary.dim == 2:
+        return np.concatenate([ends, ends + reach * unit(out)[:, None]], axis=1)
+    along = unit(ends[:, 1] - ends[:, 0])
+    out -= np.einsum("ed,ed->e", out, along)[:, None] * along
+    far = ends + reach * unit(out)[:, None]
+    first = np.stack([ends[:, 0], ends[:, 1], far[:, 1]], axis=1)
+    second = np.stack([ends[:, 0], far[:, 1], far[:, 0]], axis=1)
+    return np.concatenate([first, second])
+
+
+def edge_extension(
+    segments: IntArray, moving: np.ndarray, place: Place, reach: float
+) -> FloatArray:
+    """Return segments (s, 2, d) beyond the moving ends of a chain of segments (m, 2)."""
+    node, count = np.unique(segments, return_counts=True)
+    last = node[(count == 1) & moving[node]]
+    corners = place(segments)
+    found = []
+    for column in (0, 1):
+        rows = np.isin(segments[:, column], last)
+        end, before = corners[rows, column], corners[rows, 1 - column]
+        found.append(np.stack([end, end + reach * unit(end - before)], axis=1))
+    return np.concatenate(found)

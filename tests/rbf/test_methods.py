@@ -11,10 +11,10 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.errors import DeformError
+from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.methods import METHODS
 from slideviz.rbf.problem import Problem, Watch
-from slideviz.rbf.rows import merge
 from tests import builders
 from tests.oracles import radial, sliding
 

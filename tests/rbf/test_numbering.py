@@ -11,11 +11,11 @@ import slideviz as sv
 from slideviz.case.model import Case, Reduction, Scale, Translate
 from slideviz.rbf.classify import _Around, _cluster
 from slideviz.rbf.closest import ClosestPoints
-from slideviz.rbf.correction import correct
 from slideviz.rbf.evaluate import Basis, no_tick
-from slideviz.rbf.pool import TIE, favour
+from slideviz.rbf.methods import correct
 from slideviz.rbf.problem import Problem
 from slideviz.rbf.problem import Reduction as Settings
+from slideviz.rbf.selection import TIE, favour
 from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS

@@ -10,7 +10,7 @@ from slideviz.case.model import Case, Reduction, Translate
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.rbf.patience import LOSSES, Patience
+from slideviz.rbf.selection import LOSSES, Patience
 from slideviz.samples.table import write_sample
 from tests import builders
 

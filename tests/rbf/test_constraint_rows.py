@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 import slideviz as sv
 from slideviz.case.model import Case, Reduction
 from slideviz.rbf import exact, greedy
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix
-from slideviz.rbf.growing import Growing, newton
-from slideviz.rbf.rows import Rows, blocks
+from slideviz.rbf.selection import GrowingFactor, newton
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
 
 
 def rows_along(*normals):
     normals = np.array(normals, float)
-    return Rows(np.arange(len(normals)), normals, np.zeros((len(normals), 1)))
+    return ConstraintRows(np.arange(len(normals)), normals, np.zeros((len(normals), 1)))
 
 
 def test_rows_along_axes_are_in_blocks_of_their_own():
@@ -45,7 +45,7 @@ def test_rounding_ties_nothing():
 
 
 def test_rows_without_directions_are_one_block():
-    assert set(blocks(Rows(np.arange(4), None, np.zeros((4, 3))))) == {0}
+    assert set(blocks(ConstraintRows(np.arange(4), None, np.zeros((4, 3))))) == {0}
 
 
 def counted(monkeypatch, together):
@@ -139,15 +139,17 @@ def test_the_newton_greedy_factorises_what_it_picks():
     systems = [matrix(Basis(2.5), (block, None)) for block in x]
     residual = rng.normal(size=(18, 1))
     candidate = np.tile(np.arange(9), 2)
-    picked, bases = newton(systems, residual, (candidate, np.ones(len(candidate))), (4, 0.0))
+    picked, bases = newton(
+        systems, residual, nodes=candidate, factor=np.ones(len(candidate)), count=4, floor=0.0
+    )
     assert len(picked) == 8
     assert sorted(candidate[picked[:2]]) == [candidate[picked[0]]] * 2
     errors = np.hypot(*residual.reshape(2, 9))
     assert candidate[picked[0]] == np.argmax(errors)
     for k, (system, basis) in enumerate(zip(systems, bases, strict=True)):
         mine = picked[(picked >= 9 * k) & (picked < 9 * k + 9)] - 9 * k
-        factor = Growing(1)
-        factor.append(mine, np.arange(4), (np.empty((4, 0)), basis[mine]))
+        factor = GrowingFactor(1)
+        factor.append(mine, np.arange(4), beside=np.empty((4, 0)), corner=basis[mine])
         factor.follow(residual[9 * k : 9 * k + 9])
         part = system[np.ix_(mine, mine)]
         np.testing.assert_allclose(factor.lower @ factor.lower.T, part, atol=1e-12)

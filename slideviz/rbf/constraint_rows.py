@@ -24,7 +24,7 @@ boundaries, far below any angle that a mesh could mean."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class ConstraintRows:
     """Scalar constraints: the displacement of ``nodes`` along ``normals`` is ``right``.
 
     Attributes
@@ -41,26 +41,26 @@ class Rows:
     normals: FloatArray | None
     right: FloatArray
 
-    def followed_by(self, more: Rows) -> Rows:
+    def followed_by(self, more: ConstraintRows) -> ConstraintRows:
         """Return these rows and then others, both without normals."""
         nodes = np.concatenate([self.nodes, more.nodes])
-        return Rows(nodes, None, np.concatenate([self.right, more.right]))
+        return ConstraintRows(nodes, None, np.concatenate([self.right, more.right]))
 
-    def by_position(self, coords: FloatArray) -> Rows:
+    def by_position(self, coords: FloatArray) -> ConstraintRows:
         """Return the rows ordered by the coordinates (n, d) of their nodes."""
         at = coords[self.nodes]
         order = np.lexsort([np.arange(len(at)), *at.T[::-1]])
         normals = None if self.normals is None else self.normals[order]
-        return Rows(self.nodes[order], normals, self.right[order])
+        return ConstraintRows(self.nodes[order], normals, self.right[order])
 
 
-def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> Rows:
+def full_rows(problem: Problem, nodes: IntArray, values: FloatArray) -> ConstraintRows:
     """Return the rows of nodes with known displacement, coinciding ones merged."""
     merged, data = merge(problem, nodes, values + problem.behind(nodes))
-    return Rows(merged, None, data)
+    return ConstraintRows(merged, None, data)
 
 
-def sliding_rows(problem: Problem) -> Rows:
+def sliding_rows(problem: Problem) -> ConstraintRows:
     """Return the rows of direct sliding: all axes of known nodes, normals of sliding ones."""
     d = problem.values.shape[1]
     nodes = np.concatenate([np.repeat(problem.known, d), problem.normal_nodes])
@@ -78,10 +78,10 @@ def sliding_rows(problem: Problem) -> Rows:
     for size in np.unique(count[mixed]):
         rows = starts[mixed & (count == size), None] + np.arange(size)
         _orthonormalise(problem, (nodes, normals, right), rows, keep)
-    return Rows(stands[keep], normals[keep], right[keep, None])
+    return ConstraintRows(stands[keep], normals[keep], right[keep, None])
 
 
-def blocks(rows: Rows) -> IntArray:
+def blocks(rows: ConstraintRows) -> IntArray:
     """Return the block of each row, (r,): rows of different blocks are perpendicular.
 
     G_ab = phi_ab (n_a . n_b) is zero between them. Known nodes have a row for each axis of the

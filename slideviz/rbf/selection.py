@@ -1,0 +1,245 @@
+"""Parts of the greedy selection: its pool of candidates, picking in the pool, Cholesky factors.
+
+`pool` says which candidates a cycle looks at and how many of them it picks, `newton` picks them,
+`GrowingFactor` takes them into the system, and `Patience` ends levels that lower no error.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.problem import Reduction
+from slideviz.rbf.solve import PIVOT_GUARD, solve_lower
+
+POOL = 768
+"""Largest number of rows in the pool of a block."""
+
+POOL_START = 192
+POOL_SHARE = 6
+"""The pool begins small and has this many candidates for each node to pick: as good, measured
+by the number of control nodes, and cheaper than the largest one from the start."""
+
+BLOCK_LIMIT = 128
+"""Largest number of nodes picked in a cycle."""
+
+TIE = 1e-4
+"""Errors that differ by less than this part may count as equal: far above their rounding, far
+below what matters for the choice."""
+
+FALL = 0.9
+"""An error has fallen when it is below this part of what it was."""
+
+LOSSES = 8
+"""How often in a row an error may fail to fall."""
+
+
+class GrowingFactor:
+    """The Cholesky factor of one block of the system, L L^T = G, and ``half`` = L^-1 b.
+
+    Attributes
+    ----------
+    rows : (k,) int64
+        The chosen rows of the problem.
+    turn : (k,) int64
+        When each was chosen, counted over all blocks.
+    lower : (k, k) float64
+    half : (k, m) float64
+    """
+
+    def __init__(self, width: int) -> None:
+        self.rows = self.turn = np.empty(0, np.int64)
+        self.lower = self._store = np.empty((0, 0))
+        self.half = np.empty((0, width))
+
+    def append(
+        self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
+    ) -> None:
+        """Append rows to the factor: L21 is ``beside`` what it has, L22 the new ``corner``."""
+        n, more = len(self.rows), len(rows)
+        if n + more > len(self._store):
+            # Room for twice as much: copying the factor in every cycle would cost as much as
+            # computing it.
+            self._store = np.zeros((2 * (n + more), 2 * (n + more)))
+            self._store[:n, :n] = self.lower
+        self._store[n : n + more, :n] = beside
+        self._store[n : n + more, n : n + more] = corner
+        self.lower = self._store[: n + more, : n + more]
+        self.rows = np.concatenate([self.rows, rows])
+        self.turn = np.concatenate([self.turn, turn])
+
+    def follow(self, target: FloatArray) -> None:
+        """Bring ``half`` up to date with the rows appended; ``target`` (r, m) is b."""
+        n = len(self.half)
+        rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.half
+        self.half = np.concatenate([self.half, solve_lower(self.lower[n:, n:], rest)])
+
+    def weights(self) -> FloatArray:
+        """Return the weights (k, m) that solve G w = b."""
+        return solve_lower(self.lower, self.half, transposed=True)
+
+
+def newton(
+    schur: list[FloatArray],
+    residual: FloatArray,
+    *,
+    nodes: IntArray,
+    factor: FloatArray,
+    count: int,
+    floor: float,
+) -> tuple[IntArray, list[FloatArray]]:
+    """Return the rows picked by the one-node Newton greedy, and the Newton basis of each block.
+
+    Parameters
+    ----------
+    schur : list of (p_k, p_k)
+        What remains of the pool's matrix after the nodes chosen before, block after block.
+    residual : (p, m)
+        Of all rows of the pool, those of a block together, p the sum of all p_k.
+    nodes : (p,)
+        The node of each row; all rows of a node are picked together.
+    factor : (p,)
+        What the error of each row is multiplied with, to decide between equal ones (`favour`).
+    count
+        Number of nodes to pick.
+    floor
+        The error below which to stop (the first node is always taken).
+
+    Returns
+    -------
+    picked : (q,) int64
+        In the order of choice.
+    basis : list of (p_k, p_k)
+        A column for each picked row of the block, in that order; the rest is zero.
+    """
+    stops = np.cumsum([len(s) for s in schur])
+    block = np.repeat(np.arange(len(schur)), [len(s) for s in schur])
+    pivot = np.concatenate([np.diag(s) for s in schur])
+    rest = residual.copy()
+    basis = [np.zeros((len(s), min(len(s), count * 3))) for s in schur]
+    used = [0] * len(schur)
+    open_ = pivot > PIVOT_GUARD
+    picked: list[int] = []
+    names, first, group = np.unique(nodes, return_index=True, return_inverse=True)
+    favoured = factor[first]
+    for turn in range(count):
+        squares = np.where(open_, np.einsum("pm,pm->p", rest, rest), 0.0)
+        error = np.sqrt(np.bincount(group, squares, len(names)))
+        best = int(np.argmax(error * favoured))
+        if error[best] <= 0 or (turn and error[best] < floor):
+            break
+        for row in np.flatnonzero((group == best) & open_):
+            if pivot[row] <= PIVOT_GUARD:
+                continue
+            b = block[row]
+            here = slice(stops[b] - len(schur[b]), stops[b])
+            k, local = used[b], row - here.start
+            # The matrix is symmetric, and a row of it lies together.
+            v = schur[b][local] - basis[b][:, :k] @ basis[b][local, :k]
+            v /= np.sqrt(pivot[row])
+            rest[here] -= np.outer(v, rest[row] / np.sqrt(pivot[row]))
+            pivot[here] -= v * v
+            basis[b][:, k] = v
+            used[b] += 1
+            picked.append(int(row))
+        open_ &= (group != best) & (pivot > PIVOT_GUARD)
+    return np.array(picked, np.int64), [f[:, :k] for f, k in zip(basis, used, strict=True)]
+
+
+def favour(coords: FloatArray) -> FloatArray:
+    """Return a factor for the error of each candidate, (c,), that decides between equal ones.
+
+    From 1 to 1 + TIE, along a direction that no symmetry of a mesh is likely to have: no sum of
+    whole multiples of its components is zero, so no two points of a grid are alike.
+
+    Parameters
+    ----------
+    coords : (c, d)
+    """
+    if not len(coords):
+        return np.empty(0)
+    along = coords @ np.array([1.0, 0.6180339887, 0.4142135624])[: coords.shape[1]]
+    low, high = along.min(), along.max()
+    return 1.0 + TIE * (along - low) / max(high - low, 1e-300)
+
+
+def pool(
+    errors: FloatArray,
+    vectors: FloatArray,
+    settings: Reduction,
+    *,
+    chosen: int,
+    chosen_in_level: int,
+    per_node: int,
+) -> tuple[int, IntArray]:
+    """Return how many nodes to pick, and the candidates to pick them from.
+
+    Parameters
+    ----------
+    errors : (c,)
+        Of each candidate, times its ``favour``; negative where it cannot be picked.
+    vectors : (c, d)
+        The errors as vectors in the frame.
+    chosen, chosen_in_level
+        Nodes picked so far: in all levels, and in this one.
+    per_node
+        Rows of a candidate.
+    """
+    eligible = np.count_nonzero(errors > settings.tolerance)
+    if not eligible:
+        return 0, np.empty(0, np.int64)
+    worst = int(np.argmax(errors))
+    if settings.pick == "one":
+        return 1, np.array([worst])
+    if settings.pick == "double":
+        return _double(errors, vectors, worst, settings.tolerance)
+    count = int(np.clip(chosen // 4, 4, BLOCK_LIMIT))
+    size = min(eligible, POOL // per_node, max(POOL_START, POOL_SHARE * count))
+    order = np.argsort(-errors, kind="stable")[:size]
+    if settings.level == "size":
+        count = min(count, max(1, settings.level_size - chosen_in_level))
+    if settings.max_nodes is not None:
+        count = min(count, max(1, settings.max_nodes - chosen))
+    return count, np.sort(order)
+
+
+def _double(
+    errors: FloatArray, vectors: FloatArray, worst: int, tolerance: float
+) -> tuple[int, IntArray]:
+    """Return the worst candidate and the worst one whose error is more than 90° from its."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    cosine = vectors @ vectors[worst] / np.maximum(lengths * lengths[worst], 1e-300)
+    # Errors along different axes are perpendicular but for rounding.
+    opposite = np.where(cosine < -TIE, errors, -1.0)
+    second = int(np.argmax(opposite))
+    if opposite[second] <= tolerance:
+        return 1, np.array([worst])
+    return 2, np.sort([worst, second])
+
+
+class Patience:
+    """Ends the waiting for an error that does not fall, or that costs too much to lower.
+
+    Attributes
+    ----------
+    budget : float
+        What the waiting may cost in all, in the caller's unit.
+    """
+
+    def __init__(self, error: float, budget: float) -> None:
+        self.budget = budget
+        self._lowest, self._losses, self._spent = error, 0, 0.0
+
+    def ends(self, error: float, cost: float) -> bool:
+        """Tell, after one more turn, whether there should be no other of its kind.
+
+        Parameters
+        ----------
+        error, cost
+            The error after this turn, and what the turn cost.
+        """
+        fell = error < FALL * self._lowest
+        self._lowest = error if fell else self._lowest
+        self._losses = 0 if fell else self._losses + 1
+        self._spent += cost
+        return self._losses >= LOSSES or self._spent > self.budget
