@@ -6,6 +6,7 @@ Everything that a file has wrong is reported at once. Paths in it are relative t
 from __future__ import annotations
 
 import os
+import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +17,10 @@ from slideviz.case.key import GROUPS, REDUCTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
 from slideviz.case.model import Case, FromFile
-from slideviz.case.reference import describe_keys
 from slideviz.case.words import nearest, shown
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.terms import ROLES
-
-__all__ = ["describe_keys", "read_case", "set_key", "write_case"]
 
 _ROLE_OF = {term.key: role for role, term in ROLES.items()}
 
@@ -221,3 +219,29 @@ def _to_folder(file: Path, folder: Path) -> Path:
     if len(os.path.commonpath([real, folder])) > 1:
         return Path(os.path.relpath(real, folder))
     return real
+
+
+def describe_keys() -> str:
+    """Return the reference of all keys, under headings, each with values, default and meaning."""
+    lines = [
+        "Keys of a case file: KEY= value, one in each line, in any order.",
+        "",
+        *textwrap.wrap(
+            "Comments begin with %, # or $. A line that ends with a backslash goes on in the "
+            "next. Paths are relative to the file. Names with other signs than letters, digits "
+            'and _ . - : / @ + stand between double quotes: "tip #2". NONE or ( ) is an empty '
+            "list. Keys marked + are slideviz's own, the others are RBF-SliDe's too.",
+            width=90,
+        ),
+    ]
+    for group in GROUPS:
+        lines += ["", group.upper()]
+        for key in KEYS.values():
+            if key.group == group:
+                mark = " " if key.rbf_slide else "+"
+                lines.append(f"{mark} {key.name}= {key.kind.allowed}   [{key.default}]")
+                lines += textwrap.wrap(
+                    key.meaning, 90, initial_indent="      ", subsequent_indent="      "
+                )
+                lines += [f"        {line}" for line in key.kind.details]
+    return "\n".join(lines)

@@ -1,15 +1,86 @@
-"""What was found out about a mesh, as long as the mesh is there."""
+"""Boundary and outer surface of a mesh, cached as long as the mesh lives."""
 
 from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
-from slideviz.mesh.model import IntArray, Marker, Mesh
-from slideviz.mesh.outer import outer_facets
-from slideviz.mesh.topology import Boundary, find_boundary
+import numpy as np
+
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
+from slideviz.mesh.topology import FEATURE_ANGLE_DEG, Boundary, find_boundary, find_pieces
+
+_MOST_PARTS = 64
+"""With more than this the surface is rough, and its edges say nothing."""
+_WIDTH = {2: 2, 3: 4}
+_VTK = {2: 3, 3: 5, 4: 9}
 
 _BOUNDARIES: WeakKeyDictionary[Mesh, Boundary] = WeakKeyDictionary()
 _SHELLS: WeakKeyDictionary[Mesh, IntArray] = WeakKeyDictionary()
+
+
+def outer_facets(mesh: Mesh) -> Cells:
+    """Return the sides that only one cell has, as lines, or triangles and quadrilaterals."""
+    width = _WIDTH[mesh.dim]
+    tables = [np.empty((0, width), np.int64)]
+    for vtk, (_, nodes) in mesh.cells.by_type.items():
+        for local in ELEMENTS[vtk].facets:
+            table = np.full((len(nodes), width), -1, np.int64)
+            table[:, : len(local)] = nodes[:, local]
+            tables.append(table)
+    facets = np.concatenate(tables)
+    outer = facets[_once(np.sort(facets, axis=1), len(mesh.points))]
+    sizes = (outer >= 0).sum(axis=1)
+    return Cells.from_blocks(
+        (_VTK[int(size)], outer[sizes == size][:, :size]) for size in np.unique(sizes)
+    )
+
+
+def _once(keys: IntArray, n_points: int) -> IntArray:
+    """Return the rows, in order, whose key (sorted nodes, padded with -1) stands once."""
+    # Two nodes in one integer make the sort twice as fast; 3e9 points would be needed to overflow.
+    base = n_points + 1
+    packed = [(keys[:, k] + 1) * base + keys[:, k + 1] + 1 for k in range(0, keys.shape[1], 2)]
+    order = np.lexsort(packed)
+    same = np.ones(len(order) - 1, bool)
+    for column in packed:
+        same &= column[order[1:]] == column[order[:-1]]
+    alone = ~np.append(False, same) & ~np.append(same, False)
+    return np.sort(order[alone])
+
+
+def smooth_parts(mesh: Mesh, facets: Cells) -> tuple[Marker, ...]:
+    """Return the outer surface as markers, divided at its edges, the largest first.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Points and cells.
+    facets : Cells
+        The sides to divide, each of one cell of the mesh.
+    """
+    if not len(facets):
+        return ()
+    whole = Mesh(mesh.points, mesh.cells, (Marker("boundary", facets),), name=mesh.name)
+    boundary = find_boundary(whole)
+    piece = find_pieces(boundary, mesh.points, FEATURE_ANGLE_DEG)
+    if piece.max() >= _MOST_PARTS:
+        piece = find_pieces(boundary, mesh.points, 180.0)
+    if piece.max() >= _MOST_PARTS or piece.max() == 0:
+        return whole.markers
+    order = np.argsort(-np.bincount(piece), kind="stable")
+    return tuple(
+        Marker(f"boundary_{number}", _as_cells(boundary.facets[piece == k]))
+        for number, k in enumerate(order.tolist(), 1)
+    )
+
+
+def _as_cells(facets: IntArray) -> Cells:
+    """Return facets (f, 2), or (f, 4) where a triangle repeats its last node, as cells."""
+    if facets.shape[1] == 2:
+        return Cells.from_blocks([(3, facets)])
+    triangle = facets[:, 2] == facets[:, 3]
+    return Cells.from_blocks([(5, facets[triangle][:, :3]), (9, facets[~triangle])])
 
 
 def boundary_of(mesh: Mesh) -> Boundary:

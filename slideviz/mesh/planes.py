@@ -1,4 +1,10 @@
-"""The simplices of a surface in space: distances from them, and which sides they part."""
+"""Boundaries as simplices, their planes, and a tree of bounding boxes to find those near a point.
+
+`Surface` has the lines (2D) or triangles (3D) of a boundary; `Planes` measures distances from them
+and says which sides they part; `BoxTree` finds near ones for many queries at once. Facets of one
+mesh differ in size by factors of a million, so that a search by distance between their centres
+finds far too many; boxes adapt to each.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +13,160 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.mesh.boxes import BoxTree
+from slideviz.errors import MeshError
+from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import FloatArray, IntArray
-    from slideviz.mesh.simplices import Surface
+    from slideviz.mesh.model import Cells, FloatArray, IntArray
+
+
+LEAF = 4
+"""Most items under the last boxes of the tree."""
 
 ANGLE = 1e-6
 """A direction that is off a simplex by less than this angle, in radians, lies in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Simplices in the order of the facets that they are part of.
+
+    Attributes
+    ----------
+    nodes : (s, d) int64
+        Two or three nodes each.
+    facet : (s,) int64
+        The element each is part of: a quadrilateral is two triangles.
+    """
+
+    nodes: IntArray
+    facet: IntArray
+
+    @classmethod
+    def of(cls, cells: Cells, dim: int) -> Surface:
+        """Return the simplices of a boundary of a mesh of dimension ``dim``.
+
+        Raises
+        ------
+        MeshError
+            An element has another dimension than a boundary.
+        """
+        parts, facets = [np.empty((0, dim), np.int64)], [np.empty(0, np.int64)]
+        for vtk, (ids, nodes) in cells.by_type.items():
+            row = ELEMENTS[vtk]
+            if row.dim != dim - 1:
+                raise MeshError(
+                    f"a boundary of a mesh of dimension {dim} has a {row.name} (dimension "
+                    f"{row.dim}); its elements must have dimension {dim - 1}"
+                )
+            for first in range(1, row.n_nodes - dim + 2):
+                parts.append(nodes[:, [0, *range(first, first + dim - 1)]])
+                facets.append(ids)
+        found, facet = np.concatenate(parts), np.concatenate(facets)
+        order = np.argsort(facet, kind="stable")
+        return cls(found[order], facet[order])
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def keep(self, wanted: NDArray[np.bool_]) -> Surface:
+        """Return the simplices where ``wanted`` (s,) is true."""
+        return Surface(self.nodes[wanted], self.facet[wanted])
+
+    def without(self, nodes: IntArray) -> Surface:
+        """Return the surface without the facets that have any of ``nodes``."""
+        held = self.facet[np.isin(self.nodes, nodes).any(axis=1)]
+        return self.keep(~np.isin(self.facet, held)) if len(held) else self
+
+    def within(self, points: FloatArray, other: Surface, margin: float) -> Surface:
+        """Return the simplices that the box around ``other`` touches; points are (n, d)."""
+        if not len(other):
+            return other
+        space, corners = points[other.nodes.ravel()], points[self.nodes]
+        low, high = space.min(axis=0) - margin, space.max(axis=0) + margin
+        meets = (corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)
+        return self.keep(meets.all(axis=1))
+
+    @property
+    def edges(self) -> IntArray:
+        """Return the edges in both directions, sorted, each once: (e, 2)."""
+        size = self.nodes.shape[1]
+        pairs = [(i, k) for i in range(size) for k in range(size) if i != k]
+        return np.unique(self.nodes[:, pairs].reshape(-1, 2), axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class BoxTree:
+    """A complete binary tree over boxes.
+
+    Attributes
+    ----------
+    order : (s,) int64
+        The items as the leaves hold them, filled up with -1.
+    levels : tuple of ((k, d), (k, d))
+        Low and high corners of the boxes, from the root (k = 1) to the items (k = s).
+    """
+
+    order: IntArray
+    levels: tuple[tuple[FloatArray, FloatArray], ...]
+
+    @classmethod
+    def of(cls, low: FloatArray, high: FloatArray) -> BoxTree:
+        """Return the tree over n ≥ 1 boxes with corners ``low``, ``high`` (n, d)."""
+        n, d = low.shape
+        depth = max(0, int(np.ceil(np.log2(n / LEAF))))
+        order = np.concatenate((np.arange(n), np.full((LEAF << depth) - n, -1)))
+        centre = 0.5 * (low + high)
+        for level in range(depth):
+            # Each block is cut in two at the median of its longest axis.
+            block = order.reshape(1 << level, -1)
+            at = centre[block]
+            axis = np.ptp(at, axis=1).argmax(axis=1)
+            along = np.take_along_axis(at, axis[:, None, None], axis=2)[..., 0]
+            order = np.take_along_axis(block, along.argsort(axis=1, kind="stable"), axis=1).ravel()
+        filler = (order < 0)[:, None]
+        levels = [(np.where(filler, np.inf, low[order]), np.where(filler, -np.inf, high[order]))]
+        for size in [LEAF] + depth * [2]:
+            below, above = levels[0]
+            levels.insert(
+                0, (below.reshape(-1, size, d).min(axis=1), above.reshape(-1, size, d).max(axis=1))
+            )
+        return cls(order, tuple(levels))
+
+    def near(
+        self, corners: FloatArray, axes: FloatArray, margin: float
+    ) -> tuple[IntArray, IntArray]:
+        """Return pairs (p,), (p,) of a query and an item that its box, and it, may touch.
+
+        Parameters
+        ----------
+        corners : (q, k, d)
+            Points whose convex hull is the query.
+        axes : (q, c, d)
+            Unit vectors in whose direction a query has no width: a box off the plane through
+            its first corner is not near. This spares large queries that are oblique to the
+            coordinate axes most of the search.
+        margin : float
+            What is as far off as this is near.
+        """
+        low, high = corners.min(axis=1) - margin, corners.max(axis=1) + margin
+        query, node = np.arange(len(low)), np.zeros(len(low), np.int64)
+        for depth, (below, above) in enumerate(self.levels):
+            if depth:
+                size = len(below) // len(self.levels[depth - 1][0])
+                query = np.repeat(query, size)
+                node = (node[:, None] * size + np.arange(size)).ravel()
+            meets = (low[query] <= above[node]) & (high[query] >= below[node])
+            query, node = query[meets.all(axis=1)], node[meets.all(axis=1)]
+            middle = 0.5 * (above[node] + below[node])
+            half = 0.5 * (above[node] - below[node])
+            offset = np.einsum("pcd,pd->pc", axes[query], middle - corners[query, 0])
+            reach = np.einsum("pcd,pd->pc", np.abs(axes[query]), half) + margin
+            meets = ~(np.abs(offset) > reach)
+            query, node = query[meets.all(axis=1)], node[meets.all(axis=1)]
+        return query, self.order[node]
 
 
 @dataclass(frozen=True, eq=False)

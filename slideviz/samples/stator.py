@@ -2,22 +2,25 @@
 
 The grid of ``passage``, an O-grid in a channel, is smoothed at three radii in the plane of z
 and r theta; between them z and theta are quadratic in r. The annulus has the extents of the
-thesis's Aachen stator; its blade is our own.
+thesis's Aachen stator; its blade is our own. A fine grid is a smoothed coarse one with cubic
+splines on each of its blocks. The variant ``optimise`` moves the blade as an optimiser might:
+twist, lean and bumps.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise, product
+
 import numpy as np
+from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.samples.blade import Section, camber
-from slideviz.samples.bumps import reshaped
-from slideviz.samples.channel import Shares, counts
-from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points
-from slideviz.samples.refine import refined
+from slideviz.samples.blade import Section, blade_nodes, camber
+from slideviz.samples.channel import Counts, Shares, counts
+from slideviz.samples.passage import Grid, layer_parts, make_grid, smoothed, straight_points
 from slideviz.samples.thesis import FILE
 
 QUADRILATERAL, HEXAHEDRON = 9, 12
@@ -41,6 +44,14 @@ RADIAL = 0.62
 """Cells in r over those along the inflow."""
 ROUGH = 1e-3
 """Step of the smoothing of a finer grid at which it ends, in chords."""
+
+TWIST_DEG = -8.0
+"""Turn about the stacking line at the shroud; none at the hub."""
+LEAN_DEG = -3.0
+"""Shift in theta at the shroud; none at the hub. So far that the blade leaves its old passage."""
+BUMPS, SEED = 40, 41
+HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
+"""Greatest height of a bump, and its least and greatest radius, in the unit of length."""
 
 
 def stator_mesh(size: int) -> Mesh:
@@ -155,3 +166,91 @@ def _repeated(cells: IntArray, nodes: int, layers: int) -> IntArray:
     """Return the cells of the first layer in all layers: (layers * k, n)."""
     shift = nodes * np.arange(layers)[:, None, None]
     return (cells + shift).reshape(-1, cells.shape[1])
+
+
+def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
+    """Return the displacement of blade nodes, which keeps their distance from the axis: (k, 3).
+
+    Parameters
+    ----------
+    points : (k, 3)
+        Nodes of the blade; the axis is z.
+    radii : (float, float)
+        Hub and shroud.
+    stack_z : float
+        Where the line that the twist turns about meets theta = 0.
+    """
+    r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    z, arc = points[:, 2], r * theta
+    span = (r - radii[0]) / (radii[1] - radii[0])
+    twist = np.radians(TWIST_DEG) * span**2
+    away = z - stack_z
+    moved_z = stack_z + np.cos(twist) * away - np.sin(twist) * arc
+    moved_arc = np.sin(twist) * away + np.cos(twist) * arc
+    moved_arc += r * np.radians(LEAN_DEG) * np.sin(np.pi / 2 * span) + _bumps(points)
+    angle = moved_arc / r
+    return np.column_stack([r * np.cos(angle), r * np.sin(angle), moved_z]) - points
+
+
+def _bumps(points: FloatArray) -> FloatArray:
+    """Return the sum of smooth bumps around random nodes' places, in r theta: (k,)."""
+    random = np.random.default_rng(SEED)
+    low, high = points.min(axis=0), points.max(axis=0)
+    total = np.zeros(len(points))
+    for _ in range(BUMPS):
+        centre = random.uniform(low, high)
+        width, height = random.uniform(*WIDTH), random.uniform(-HEIGHT, HEIGHT)
+        near = np.sum((points - centre) ** 2, axis=1) / width**2
+        total += height * np.exp(-near)
+    return total
+
+
+def refined(coarse: Grid, points: FloatArray, fine: Grid, section: Section) -> FloatArray:
+    """Return the fine grid's nodes (m, 2), at the same relative places as the coarse one's.
+
+    Blade nodes are put onto the blade, and the O-grid above them moves along.
+    """
+    found = np.full((int(fine.quads.max()) + 1, 2), np.nan)
+    places = [_channel_knots(grid.n) for grid in (coarse, fine)]
+    for i, j in product(range(3), range(3)):
+        if i == j == 1:
+            continue
+        old, new = (
+            grid.number[a[i] : a[i + 1] + 1, b[j] : b[j + 1] + 1]
+            for grid, (a, b) in zip((coarse, fine), places, strict=True)
+        )
+        found[new] = _spline(points[old], new.shape)
+    turns = [_ring_knots(grid.n) for grid in (coarse, fine)]
+    for side in range(4):
+        old, new = (
+            np.roll(grid.ring, -start, axis=1)[:, : stop - start + 1]
+            for grid, knots in zip((coarse, fine), turns, strict=True)
+            for start, stop in [list(pairwise(knots))[side]]
+        )
+        found[new[:-1]] = _spline(points[old], new.shape)[:-1]
+    blade = blade_nodes(fine.n.lower, fine.ring.shape[1] - fine.n.lower, section)
+    fade = 1 - layer_parts(fine.n)[:-1, None, None]
+    found[fine.ring[:-1]] += fade * (blade - found[fine.ring[0]])
+    return found
+
+
+def _channel_knots(n: Counts) -> tuple[list[int], list[int]]:
+    """Return where the blocks of the channel begin and end, in both directions."""
+    along = np.cumsum([0, n.ahead, n.along, n.behind]).tolist()
+    return along, np.cumsum([0, n.below, n.beside, n.above]).tolist()
+
+
+def _ring_knots(n: Counts) -> list[int]:
+    """Return the columns of the O-grid at the corners of the hole, the first one again."""
+    return (n.nose + np.cumsum([0, n.along, n.beside, n.along, n.beside])).tolist()
+
+
+def _spline(block: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return a block (a, b, 2) resampled to another number of nodes: (*shape, 2)."""
+    x, y = (np.linspace(0, 1, size) for size in block.shape[:2])
+    new_x, new_y = (np.linspace(0, 1, size) for size in shape)
+    kx, ky = min(3, len(x) - 1), min(3, len(y) - 1)
+    columns = [
+        RectBivariateSpline(x, y, block[..., k], kx=kx, ky=ky)(new_x, new_y) for k in range(2)
+    ]
+    return np.stack(columns, axis=2)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from slideviz.errors import MeshError
-from slideviz.mesh import piercing
-from slideviz.mesh.boxes import LEAF, BoxTree
+from slideviz.mesh import crossing
 from slideviz.mesh.crossing import TOLERANCE, first_crossing, swept_crossing
 from slideviz.mesh.model import Cells
-from slideviz.mesh.planes import line_normals, normals
+from slideviz.mesh.planes import LEAF, BoxTree, line_normals, normals
 from tests.oracles import crossing as oracle
 
 
@@ -372,7 +371,7 @@ def test_chunk_size_does_not_matter(d, monkeypatch):
         higher[body.nodes, -1] += 0.6
         whole = first_crossing(points, body, others), swept_crossing(higher, points, body, others)
         for chunk in (1, 3, 1000):
-            monkeypatch.setattr(piercing, "CHUNK", chunk)
+            monkeypatch.setattr(crossing, "CHUNK", chunk)
             parts = (
                 first_crossing(points, body, others),
                 swept_crossing(higher, points, body, others),

@@ -14,11 +14,11 @@ from su2_samples import SOLID, SQUARE, assert_same, bits, meshes, save
 
 import slideviz
 from slideviz.errors import MeshError
+from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.meshio_bridge import read_foreign
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.outer import outer_facets
 
 GMSH_22 = """\
 $MeshFormat

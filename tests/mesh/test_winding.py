@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from slideviz.deformation.intersection import winding
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.winding import winding
 from tests.builders import airfoil, annulus, cube, passage, sphere_in_box, square
 
 MESHES = (square(), cube(4), cube(3, "mixed"), cube(3, "simplex"), passage(), sphere_in_box())

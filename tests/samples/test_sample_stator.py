@@ -15,8 +15,7 @@ from slideviz.mesh.periodic import pair_up
 from slideviz.samples.blade import Section, blade_nodes
 from slideviz.samples.channel import Shares, counts
 from slideviz.samples.passage import make_grid, smoothed, straight_points
-from slideviz.samples.refine import refined
-from slideviz.samples.stator import stator_mesh
+from slideviz.samples.stator import refined, stator_mesh
 from slideviz.samples.table import DEFAULT_SIZES, Sample, sample, write_sample
 
 made = cache(sample)

@@ -12,8 +12,7 @@ import slideviz as sv
 from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.samples.passage import passage_mesh
-from slideviz.samples.smooth import smooth
+from slideviz.samples.passage import passage_mesh, smooth
 from slideviz.samples.table import SAMPLES, VARIANTS, Sample, sample, write_sample
 
 ROOT = Path(__file__).parents[2]

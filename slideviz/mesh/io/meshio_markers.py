@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
-from slideviz.mesh.outer import outer_facets, smooth_parts
 
 if TYPE_CHECKING:
     import meshio
