@@ -63,7 +63,7 @@ def _wait(read: int) -> None:
         number = os.read(read, 1)[0]
     try:
         # Nothing is to be undone as long as this is not loaded.
-        undo = getattr(sys.modules.get("slideviz.mesh.undone"), "undo", None)
+        undo = getattr(sys.modules.get("slideviz.mesh.io.cleanup"), "undo", None)
         if undo is not None:
             undo()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar

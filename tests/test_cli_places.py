@@ -12,7 +12,7 @@ from slideviz.cli import commands, parser, run
 from slideviz.cli.places import inputs_of
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.io.inputs import spared
+from slideviz.mesh.io.file_checks import protected
 from slideviz.samples.table import write_sample
 
 CASE = ["square.cfg", "--set", "STEPS=1"]
@@ -143,7 +143,7 @@ def test_every_path_of_every_command_is_known_as_read_or_written(name):
 def test_nothing_that_writes_gets_round_it(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"old")
-    with spared(lambda: {path: "the input mesh"}):
+    with protected(lambda: {path: "the input mesh"}):
         for other in (tmp_path / "b", tmp_path / "c"):
             other.unlink(missing_ok=True)
         (tmp_path / "b").hardlink_to(path)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.undone import PREFIX, draft
+from slideviz.mesh.io.cleanup import PREFIX, draft
 from slideviz.samples.table import write_sample
 
 SAID = {

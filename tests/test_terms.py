@@ -57,12 +57,12 @@ def test_only_what_has_a_tip_is_explained():
 def test_each_value_has_what_computes_or_draws_it():
     from matplotlib import colormaps
 
-    from slideviz.mesh import skew
+    from slideviz.mesh import metrics
     from slideviz.rbf import kernels, methods
     from slideviz.study.combinations import METHODS
 
     assert methods.METHODS.keys() == terms.SLIDING.keys()
-    assert skew.METRICS.keys() == terms.METRICS.keys()
+    assert metrics.METRICS.keys() == terms.METRICS.keys()
     assert kernels.KERNELS.keys() == terms.KERNELS.keys()
     assert set(terms.COLOUR_MAPS) <= set(colormaps)
     assert set(METHODS) == {*terms.SLIDING, *terms.METHODS} - {"rbf"}

@@ -37,12 +37,12 @@ def _run(argv: Sequence[str]) -> int:
         from slideviz.cli.parser import parse
         from slideviz.cli.places import inputs_of
         from slideviz.cli.progress import compiling_told
-        from slideviz.mesh.io.inputs import spared
+        from slideviz.mesh.io.file_checks import protected
 
         arguments = parse(argv)
         arguments.inputs = inputs_of(arguments)
         with (
-            spared(lambda: arguments.inputs),
+            protected(lambda: arguments.inputs),
             compiling_told(getattr(arguments, "quiet", False)),
         ):
             return int(arguments.command(arguments))

@@ -80,7 +80,7 @@ def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
     """
     from slideviz.errors import CaseError
     from slideviz.mesh.io.atomic import require_writable
-    from slideviz.mesh.io.inputs import require_no_input
+    from slideviz.mesh.io.file_checks import require_no_input
 
     there = [one for one in outputs if one.path is not None and str(one.path) != "-"]
     for one in there:
@@ -130,7 +130,7 @@ def _paths(one: Output) -> Iterator[Path]:
 
 def _meet(one: Output, other: Output) -> bool:
     """Tell whether two results would go to one file; the other is a file."""
-    from slideviz.mesh.io.inputs import same_file
+    from slideviz.mesh.io.file_checks import same_file
 
     assert one.path is not None
     assert other.path is not None

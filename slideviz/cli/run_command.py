@@ -90,7 +90,7 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
     from slideviz.cli.places import Output, require_places
-    from slideviz.mesh.io.inputs import same_file
+    from slideviz.mesh.io.file_checks import same_file
 
     assert case.mesh_file is not None
     may_force = not arguments.force and same_file(output, case.mesh_file)

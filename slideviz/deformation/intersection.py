@@ -24,7 +24,9 @@ HALF = 0.5
 """Winding between those of inside and outside."""
 
 
-def clash(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
+def intersection_message(
+    case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
+) -> str | None:
     """Return a sentence when a moved boundary ends up inside another one or out of the mesh.
 
     None when all is well. Boundaries that share nodes are not compared: where a blade stands on a
@@ -63,7 +65,7 @@ def _new_crossing(
     return None
 
 
-def jump(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
+def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
     """Return a sentence when a moved node crosses another boundary on its straight way."""
     after = np.array(mesh.points)
     after[nodes] += vectors

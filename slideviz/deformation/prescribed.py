@@ -10,7 +10,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.deformation.classes import find_classes
-from slideviz.deformation.intersection import clash, jump
+from slideviz.deformation.intersection import intersection_message, jump_message
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import TOLERANCE, Pair
@@ -80,10 +80,10 @@ def prescribed(
     alike
         By which part of the largest displacement those of images may differ.
     """
-    problem = clash(case, mesh, moved.nodes, moved.vectors)
+    problem = intersection_message(case, mesh, moved.nodes, moved.vectors)
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
-    remark = jump(case, mesh, moved.nodes, moved.vectors)
+    remark = jump_message(case, mesh, moved.nodes, moved.vectors)
     boundary, fans, classes = surfaces
     known = np.concatenate([classes.moving, classes.fixed])
     if not len(known):

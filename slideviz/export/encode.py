@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import png_bytes
 from slideviz.mesh.io.atomic import atomic_write, require_writable
-from slideviz.mesh.io.inputs import require_no_input
-from slideviz.mesh.undone import draft, ended
+from slideviz.mesh.io.cleanup import draft, ended
+from slideviz.mesh.io.file_checks import require_no_input
 
 if TYPE_CHECKING:
     from PIL.Image import Image

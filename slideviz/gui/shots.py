@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.shots_wait import settle
-from slideviz.mesh.undone import draft, ended
+from slideviz.mesh.io.cleanup import draft, ended
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow

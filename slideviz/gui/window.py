@@ -30,7 +30,7 @@ from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.questions import Banner
 from slideviz.gui.widgets.tips import plain_labels
-from slideviz.mesh.io.inputs import spared
+from slideviz.mesh.io.file_checks import protected
 from slideviz.session import changes, jobs
 from slideviz.session.run_requirements import Missing
 from slideviz.session.store import Store
@@ -76,7 +76,7 @@ class MainWindow(QMainWindow):
         self._closed = False
         self.left_behind = False
         self._kept = ExitStack()
-        self._kept.enter_context(spared(self._inputs))
+        self._kept.enter_context(protected(self._inputs))
         self._make_centre(multi_samples)
         self.docks_ = Docks(self)
         self._make_status()

@@ -2,7 +2,7 @@
 
 ``f_ss = √f_size · f_skew`` (De Boer, Van der Schoot, Bijl 2007), all in 0 to 1, 1 is best.
 ``f_size`` compares with the undeformed cell: ``min(τ, 1/τ)``, τ the ratio of the sums of corner
-Jacobians. ``f_skew`` is that of `slideviz.mesh.skew`.
+Jacobians. ``f_skew`` is that of `slideviz.mesh.metrics`.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from slideviz.mesh.jacobians import (
     determinant,
     total,
 )
+from slideviz.mesh.metrics import METRICS
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.orientation import corner_sums, orientation
-from slideviz.mesh.skew import METRICS
 from slideviz.mesh.validity import INVERTED, UNPROVEN, VALID, prove
 from slideviz.terms import Metric
 

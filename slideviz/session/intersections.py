@@ -7,7 +7,7 @@ from pathlib import Path
 
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
-from slideviz.deformation.intersection import clash
+from slideviz.deformation.intersection import intersection_message
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import Report, Stopped
@@ -32,7 +32,7 @@ def find_clash(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str
         if not all(path.is_file() for path in files):
             return ""
         moved = displacements(case, mesh)
-        found = clash(case, mesh, moved.nodes, moved.vectors)
+        found = intersection_message(case, mesh, moved.nodes, moved.vectors)
     except SlidevizError as error:
         return _first_line(error, files)
     return found[0].upper() + found[1:] + "." if found else ""

@@ -17,7 +17,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.meshio_bridge import read_foreign
+from slideviz.mesh.io.meshio_bridge import read_with_meshio
 from slideviz.mesh.model import Cells, Marker, Mesh
 
 GMSH_22 = """\
@@ -108,8 +108,8 @@ ABAQUS = """\
 
 @pytest.fixture(autouse=True)
 def _in_this_process(monkeypatch):
-    """Read in this process, where it is quick and can be patched; test_apart.py does the rest."""
-    monkeypatch.setattr("slideviz.mesh.io.subprocess_reader.read_apart", read_foreign)
+    """Read in this process, where it is quick and can be patched."""
+    monkeypatch.setattr("slideviz.mesh.io.subprocess_reader.read_in_subprocess", read_with_meshio)
 
 
 @pytest.fixture(scope="module")

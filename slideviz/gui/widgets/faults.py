@@ -21,8 +21,8 @@ from typing import Any
 from qtpy.QtCore import QObject, QTimer, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
+from slideviz.mesh.io.cleanup import is_alive
 from slideviz.mesh.io.private import private_file, private_folder
-from slideviz.mesh.undone import is_alive
 
 REST_S = 5.0
 """An error that was told is told again when it has not come for so long."""

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from slideviz.errors import MeshError, SlidevizError
-from slideviz.mesh.io.inputs import require_no_input
-from slideviz.mesh.undone import draft
+from slideviz.mesh.io.cleanup import draft
+from slideviz.mesh.io.file_checks import require_no_input
 
 _REMEDIES = {
     errno.ENOENT: "the folder does not exist; create it first",
@@ -48,7 +48,7 @@ def atomic_write(
     error : type of SlidevizError
         The class of error to raise: ``MeshError`` unless another is given.
     replaces : Path, optional
-        The input that may be written over; see `slideviz.mesh.io.inputs`.
+        The input that may be written over; see `slideviz.mesh.io.file_checks`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.opened import require_ordinary
+from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.su2 import read_su2
 from slideviz.mesh.io.su2_scan import Progress
 from slideviz.mesh.io.su2_write import su2_blocks
@@ -53,9 +53,9 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
             raise path_error(
                 path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
             )
-        from slideviz.mesh.io.subprocess_reader import read_apart
+        from slideviz.mesh.io.subprocess_reader import read_in_subprocess
 
-        return read_apart(path, tick)
+        return read_in_subprocess(path, tick)
     except MemoryError as problem:
         raise path_error(
             path, "there is not enough memory to read it; use a machine with more"
@@ -149,10 +149,10 @@ def write(
     replaces = path if overwrite else None
     values = _checked(mesh, cell_data or {})
     if path.suffix.lower() != ".su2":
-        from slideviz.mesh.io.meshio_write import write_foreign
+        from slideviz.mesh.io.meshio_write import write_other_format
 
         moved = {} if base is None else {"displacement": mesh.points - base.points}
-        write_foreign(path, mesh, values, moved, replaces)
+        write_other_format(path, mesh, values, moved, replaces)
         return
     if values:
         raise path_error(

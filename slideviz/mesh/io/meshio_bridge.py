@@ -47,7 +47,7 @@ _MOST_FILES = 100
 """Files that may be named in a row, each by the one before: they may name each other."""
 
 
-def read_foreign(path: Path, progress: Progress) -> Mesh:
+def read_with_meshio(path: Path, progress: Progress) -> Mesh:
     """Return the mesh of a file that meshio reads.
 
     Cells of the highest dimension are the mesh; those of one dimension less are its boundaries,

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
 from slideviz.mesh.io.quiet_meshio import formats_of, load, quiet
 from slideviz.mesh.model import IntArray, Mesh
-from slideviz.mesh.undone import draft
 
 if TYPE_CHECKING:
     import meshio
@@ -50,7 +50,7 @@ _BLOCK_BYTES = 3 << 18
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
-def write_foreign(
+def write_other_format(
     path: Path,
     mesh: Mesh,
     cell_data: Mapping[str, NDArray],

@@ -21,10 +21,10 @@ from pathlib import Path
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
-from slideviz.mesh.io.meshio_bridge import read_foreign
+from slideviz.mesh.io.cleanup import ended
+from slideviz.mesh.io.meshio_bridge import read_with_meshio
 from slideviz.mesh.io.su2_scan import Progress
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.undone import ended
 
 _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
@@ -37,13 +37,13 @@ _CHUNK_BYTES = 1 << 20
 _SET_DEATH_SIGNAL = 1
 
 
-def read_apart(path: Path, progress: Progress) -> Mesh:
-    """Return the mesh of a file that meshio reads, as ``read_foreign`` does.
+def read_in_subprocess(path: Path, progress: Progress) -> Mesh:
+    """Return the mesh of a file that meshio reads, as ``read_with_meshio`` does.
 
     Raises
     ------
     MeshError
-        As ``read_foreign``, and when the reader takes too long, or crashes.
+        As ``read_with_meshio``, and when the reader takes too long, or crashes.
     """
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
@@ -140,7 +140,7 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         try:
-            mesh = read_foreign(path, lambda _: None)
+            mesh = read_with_meshio(path, lambda _: None)
         except MeshError as problem:
             pickle.dump(str(problem), channel)
         except MemoryError:

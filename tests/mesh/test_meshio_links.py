@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import read
-from slideviz.mesh.io.meshio_bridge import read_foreign
+from slideviz.mesh.io.meshio_bridge import read_with_meshio
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 TRIANGLE = [("triangle", np.array([[0, 1, 2]]))]
@@ -26,7 +26,7 @@ def folder(tmp_path):
 
 def here(path):
     """Return the mesh as the reader's own process does it."""
-    return read_foreign(path, lambda _: None)
+    return read_with_meshio(path, lambda _: None)
 
 
 def test_numbers_beside_an_xdmf_file_are_read(folder):

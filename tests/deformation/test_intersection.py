@@ -6,7 +6,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
-from slideviz.deformation.intersection import clash, jump
+from slideviz.deformation.intersection import intersection_message as message
+from slideviz.deformation.intersection import jump_message
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.samples.table import sample
@@ -45,7 +46,7 @@ def moved(case, mesh, *motions):
 def test_a_block_in_the_wall_is_told_with_place_and_remedy(square):
     mesh, case = square
     case, *_ = arguments = moved(case, mesh, Translate("BLOCK", (-0.45, 0.0)))
-    text = clash(*arguments)
+    text = message(*arguments)
     assert text is not None
     assert text.startswith("the motion puts BLOCK through LEFT near (0, 0.")
     assert "move BLOCK less" in text
@@ -57,8 +58,8 @@ def test_a_block_in_the_wall_is_told_with_place_and_remedy(square):
 def test_a_block_near_the_wall_is_fine(square, vector):
     mesh, case = square
     arguments = moved(case, mesh, Translate("BLOCK", vector))
-    assert clash(*arguments) is None
-    assert jump(*arguments) is None
+    assert message(*arguments) is None
+    assert jump_message(*arguments) is None
 
 
 def test_a_periodic_boundary_that_moves_along_may_be_passed(square):
@@ -66,9 +67,9 @@ def test_a_periodic_boundary_that_moves_along_may_be_passed(square):
     roles = {**case.roles, "LOWER": "periodic", "UPPER": "periodic"}
     free = case.change(roles=roles, periodic="moving")
     up = Translate("BLOCK", (0.0, 0.49))
-    assert clash(*moved(free, mesh, up)) is None
-    assert "through UPPER" in clash(*moved(free.change(periodic="periodic"), mesh, up))
-    assert "through UPPER" in clash(*moved(case, mesh, up))
+    assert message(*moved(free, mesh, up)) is None
+    assert "through UPPER" in message(*moved(free.change(periodic="periodic"), mesh, up))
+    assert "through UPPER" in message(*moved(case, mesh, up))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_a_periodic_boundary_that_moves_along_may_be_passed(square):
 def test_a_body_that_ends_out_of_the_mesh_is_refused(square, vector, wall):
     mesh, case = square
     case, *_ = arguments = moved(case, mesh, Translate("BLOCK", vector))
-    text = clash(*arguments)
+    text = message(*arguments)
     assert text.startswith(f"the motion takes BLOCK out of the mesh, through {wall} near (")
     assert "move BLOCK less" in text
     with pytest.raises(CaseError, match="takes BLOCK out of the mesh"):
@@ -87,8 +88,8 @@ def test_a_body_that_ends_out_of_the_mesh_is_refused(square, vector, wall):
 def test_nor_may_one_come_out_by_a_turn(square):
     mesh, case = square
     turn = moved(case, mesh, Rotate("BLOCK", 180.0, (2.0, 0.5)))
-    assert "takes BLOCK out of the mesh" in clash(*turn)
-    assert clash(*moved(case, mesh, Rotate("BLOCK", 180.0, (0.45, 0.5)))) is None
+    assert "takes BLOCK out of the mesh" in message(*turn)
+    assert message(*moved(case, mesh, Rotate("BLOCK", 180.0, (0.45, 0.5)))) is None
 
 
 def test_a_jump_over_a_wall_inside_is_a_warning():
@@ -96,12 +97,12 @@ def test_a_jump_over_a_wall_inside_is_a_warning():
     roles = dict.fromkeys(mesh.marker_names, "fixed") | {"one": "moving"}
     case = Case(roles=roles)
     case, *_ = arguments = moved(case, mesh, Translate("one", (6.0, 0.4)))
-    assert clash(*arguments) is None
-    assert "goes through other" in jump(*arguments)
+    assert message(*arguments) is None
+    assert "goes through other" in jump_message(*arguments)
     *_, last = sv.deform(case, mesh)
     assert any("goes through other" in text for text in last.warnings)
     lost = moved(case, mesh, Translate("one", (60.0, 0.0)))
-    assert "takes one out of the mesh" in clash(*lost)
+    assert "takes one out of the mesh" in message(*lost)
 
 
 @pytest.mark.parametrize("gone", ["RIGHT", "UPPER"])
@@ -110,11 +111,13 @@ def test_markers_that_are_not_closed_are_no_excuse(square, gone):
     markers = tuple(marker for marker in mesh.markers if marker.name != gone)
     mesh = Mesh(mesh.points, mesh.cells, markers, name=mesh.name)
     case = case.change(roles={n: role for n, role in case.roles.items() if n != gone})
-    assert "takes BLOCK out of the mesh" in clash(*moved(case, mesh, Translate("BLOCK", (-3, 0.0))))
-    assert "takes BLOCK out of the mesh" in clash(
+    assert "takes BLOCK out of the mesh" in message(
+        *moved(case, mesh, Translate("BLOCK", (-3, 0.0)))
+    )
+    assert "takes BLOCK out of the mesh" in message(
         *moved(case, mesh, Translate("BLOCK", (9.0, 7.0)))
     )
-    assert clash(*moved(case, mesh, Translate("BLOCK", (0.1, 0.2)))) is None
+    assert message(*moved(case, mesh, Translate("BLOCK", (0.1, 0.2)))) is None
 
 
 def test_a_domain_that_moves_as_a_whole_and_an_outer_wall_are_fine(square):
@@ -122,11 +125,11 @@ def test_a_domain_that_moves_as_a_whole_and_an_outer_wall_are_fine(square):
     names = mesh.marker_names
     every = case.change(roles=dict.fromkeys(names, "moving"))
     shift = [Translate(name, (7.0, -3.0)) for name in names]
-    assert clash(*moved(every, mesh, *shift)) is None
+    assert message(*moved(every, mesh, *shift)) is None
     wall = case.change(roles={**case.roles, "BLOCK": "fixed", "RIGHT": "moving"})
-    assert clash(*moved(wall, mesh, Translate("RIGHT", (1.5, 0.0)))) is None
-    assert clash(*moved(wall, mesh, Translate("RIGHT", (-0.3, 0.0)))) is None
-    beyond = clash(*moved(wall, mesh, Translate("RIGHT", (-1.5, 0.0))))
+    assert message(*moved(wall, mesh, Translate("RIGHT", (1.5, 0.0)))) is None
+    assert message(*moved(wall, mesh, Translate("RIGHT", (-0.3, 0.0)))) is None
+    beyond = message(*moved(wall, mesh, Translate("RIGHT", (-1.5, 0.0))))
     assert "takes RIGHT out of the mesh, through" in beyond
 
 
@@ -134,8 +137,8 @@ def test_an_airfoil_may_turn_around_in_its_far_field():
     mesh = airfoil()
     case = Case(roles={"airfoil": "moving", "far": "fixed"})
     for motions in ((Rotate("airfoil", 180.0),), (Translate("airfoil", (1.5, 0.5)),)):
-        assert clash(*moved(case, mesh, *motions)) is None
-    out = clash(*moved(case, mesh, Translate("airfoil", (-9.0, 0.0))))
+        assert message(*moved(case, mesh, *motions)) is None
+    out = message(*moved(case, mesh, Translate("airfoil", (-9.0, 0.0))))
     assert "takes airfoil out of the mesh, through far" in out
 
 
@@ -144,8 +147,8 @@ def test_a_blade_may_go_on_in_the_neighbouring_passages(square, pitches):
     mesh, case = square
     roles = {**case.roles, "LOWER": "periodic", "UPPER": "periodic"}
     free = case.change(roles=roles, periodic="moving")
-    assert clash(*moved(free, mesh, Translate("BLOCK", (0.0, pitches)))) is None
-    assert "out of the mesh" in clash(*moved(free, mesh, Translate("BLOCK", (2.0, pitches))))
+    assert message(*moved(free, mesh, Translate("BLOCK", (0.0, pitches)))) is None
+    assert "out of the mesh" in message(*moved(free, mesh, Translate("BLOCK", (2.0, pitches))))
 
 
 @pytest.mark.parametrize("angle_deg", [20.0, 30.0, -75.0, 180.0])
@@ -153,9 +156,9 @@ def test_and_around_the_axis(angle_deg):
     found = sample("polar", 10)
     mesh, case = found.mesh, found.case.change(periodic="moving", sliding="ps")
     round_ = Rotate("BLOCK", angle_deg, (0.0, 0.0))
-    assert clash(*moved(case, mesh, round_)) is None
+    assert message(*moved(case, mesh, round_)) is None
     out = moved(case, mesh, round_, Translate("BLOCK", (9.0, 0.0)))
-    assert "out of the mesh" in clash(*out)
+    assert "out of the mesh" in message(*out)
 
 
 def test_what_leaves_a_mesh_with_internal_boundaries_is_told_where_they_are_not():
@@ -163,8 +166,8 @@ def test_what_leaves_a_mesh_with_internal_boundaries_is_told_where_they_are_not(
     mesh = found.mesh
     roles = {**found.case.roles, "FRONT": "internal", "BACK": "internal"}
     case = found.case.change(roles=roles, periodic="moving", sliding="ps")
-    assert clash(*moved(case, mesh, Translate("BLOCK", (0.0, 0.0, 5.0)))) is None
-    out = clash(*moved(case, mesh, Translate("BLOCK", (5.0, 0.0, 0.0))))
+    assert message(*moved(case, mesh, Translate("BLOCK", (0.0, 0.0, 5.0)))) is None
+    out = message(*moved(case, mesh, Translate("BLOCK", (5.0, 0.0, 0.0))))
     assert "takes BLOCK out of the mesh, through RIGHT" in out
 
 
@@ -174,14 +177,14 @@ def test_nothing_moved_nothing_out(mesh):
     for name in mesh.marker_names:
         case = Case(roles={**roles, name: "moving"})
         still = moved(case, mesh, Translate(name, (0.0, 0.0, 0.0)))
-        assert clash(*still) is None
+        assert message(*still) is None
 
 
 def test_a_turn_that_cuts_is_told(square):
     mesh, case = square
     near = Translate("BLOCK", (0.0, -0.45))
-    assert clash(*moved(case, mesh, near)) is None
-    assert "through LOWER" in clash(*moved(case, mesh, near, Rotate("BLOCK", 60.0)))
+    assert message(*moved(case, mesh, near)) is None
+    assert "through LOWER" in message(*moved(case, mesh, near, Rotate("BLOCK", 60.0)))
 
 
 def test_boundaries_with_common_nodes_are_not_compared():
@@ -190,9 +193,9 @@ def test_boundaries_with_common_nodes_are_not_compared():
     roles = dict.fromkeys(mesh.marker_names, "sliding") | {"LEFT": "moving"}
     case = found.case.change(roles=roles, periodic="none")
     arguments = moved(case, mesh, Translate("LEFT", (-0.1, 0.0, 0.0)))
-    assert clash(*arguments) is None
+    assert message(*arguments) is None
     inward = moved(case, mesh, Translate("LEFT", (0.5, 0.0, 0.0)))
-    assert "through BLOCK" in clash(*inward)
+    assert "through BLOCK" in message(*inward)
     assert np.array_equal(mesh.points, found.mesh.points)
 
 
@@ -203,12 +206,12 @@ def test_what_crosses_before_the_motion_is_no_fault_of_it(square):
     node = int(mesh.marker("BLOCK").nodes[0])
     points[node, 0] -= 0.7
     crossed = mesh.with_points(points)
-    assert clash(*moved(case, mesh.with_points(points), Translate("BLOCK", (0.0, 0.0)))) is None
-    text = clash(*moved(case, crossed, Translate("BLOCK", (0.45, 0.0))))
+    assert message(*moved(case, mesh.with_points(points), Translate("BLOCK", (0.0, 0.0)))) is None
+    text = message(*moved(case, crossed, Translate("BLOCK", (0.45, 0.0))))
     assert text is not None
     assert "through RIGHT near" in text
 
 
 def test_a_body_whose_sides_are_twisted_is_not_lost_by_a_small_motion():
     run = random_run(1464)
-    assert clash(*moved(run.case, run.mesh, *run.case.motions)) is None
+    assert message(*moved(run.case, run.mesh, *run.case.motions)) is None

@@ -6,12 +6,15 @@ here first. The same file may have many names: by links, by ``./``, by another f
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from slideviz.errors import SlidevizError
+from slideviz.mesh.check import printable
 
 Inputs = Mapping[Path, str]
 """What each file is, in words: ``the input mesh``."""
@@ -19,7 +22,7 @@ _known: list[Callable[[], Inputs]] = []
 
 
 @contextmanager
-def spared(inputs: Callable[[], Inputs]) -> Iterator[None]:
+def protected(inputs: Callable[[], Inputs]) -> Iterator[None]:
     """Return a context in which these files are written over only where that was asked for."""
     _known.append(inputs)
     try:
@@ -66,3 +69,34 @@ def same_file(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except (OSError, ValueError):  # one is not there, so they cannot be one by a hard link
         return False
+
+
+def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
+    """Return how many bytes a file has; before it is opened, for some devices act on that.
+
+    Raises
+    ------
+    SlidevizError
+        It is a device or a pipe; ``error`` is the class.
+    OSError, ValueError
+        There is none, or it is a folder.
+    """
+    found = path.stat()
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise error(f"{printable(path)}: this is a device or pipe; choose an ordinary file")
+    return found.st_size
+
+
+def require_length(path: Path, error: type[SlidevizError], what: str, most: int) -> None:
+    """Check a file as `require_ordinary`, and that it has so many bytes at most.
+
+    ``what`` is the kind of file, for the message: ``case file``.
+    """
+    size = require_ordinary(path, error)
+    if size > most:
+        raise error(
+            f"{printable(path)}: has {size / 1e6:,.0f} MB, and no {what} has more than "
+            f"{most / 1e6:,.0f} MB; check the name"
+        )

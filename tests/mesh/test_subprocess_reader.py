@@ -12,7 +12,7 @@ from su2_samples import SOLID, assert_same, save
 from slideviz.errors import MeshError
 from slideviz.mesh.io import subprocess_reader
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.meshio_bridge import read_foreign
+from slideviz.mesh.io.meshio_bridge import read_with_meshio
 
 NETGEN = """\
 mesh3d
@@ -71,7 +71,7 @@ def started(monkeypatch):
 def test_the_mesh_is_the_same(vtu, started, capfd):
     seen = []
     mesh = read(vtu, progress=seen.append)
-    here = read_foreign(vtu, lambda _: None)
+    here = read_with_meshio(vtu, lambda _: None)
     assert_same(mesh, here)
     assert (mesh.name, mesh.source) == (here.name, here.source)
     assert not mesh.points.flags.writeable
@@ -84,7 +84,7 @@ def test_the_mesh_is_the_same(vtu, started, capfd):
 def test_the_fault_is_the_same(tmp_path):
     path = save(tmp_path, "nonsense", "a.msh")
     with pytest.raises(MeshError) as here:
-        read_foreign(path, lambda _: None)
+        read_with_meshio(path, lambda _: None)
     with pytest.raises(MeshError, match=r"a.msh: cannot be read as gmsh: meshio says") as there:
         read(path)
     assert str(there.value) == str(here.value)
