@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.cli import commands, parser, run
+from slideviz.cli import parser, run
 from slideviz.cli.places import inputs_of
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import atomic_write, require_writable
@@ -133,7 +133,7 @@ def path_options(name: str) -> set[str]:
     return {action.dest for action in calls.choices[name]._actions if action.type is Path}
 
 
-@pytest.mark.parametrize("name", commands.COMMANDS)
+@pytest.mark.parametrize("name", parser.COMMANDS)
 def test_every_path_of_every_command_is_known_as_read_or_written(name):
     given = argparse.Namespace(**{option: Path(option) for option in path_options(name)})
     read = {str(path) for path in inputs_of(given)}

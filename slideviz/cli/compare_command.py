@@ -1,4 +1,4 @@
-"""What ``slideviz compare`` does."""
+"""``slideviz compare``: one case by several methods, as table, plots and pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
@@ -22,7 +22,7 @@ KEPT_BYTES = 1_500_000_000
 
 
 def add_compare(calls: argparse._SubParsersAction) -> None:
-    """Add the arguments of ``compare``."""
+    """Add the command ``compare`` to the parser."""
     about = "one case by several methods: table, plots and pictures"
     call = calls.add_parser(
         "compare",
@@ -71,8 +71,8 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.options import read_case
     from slideviz.cli.places import Output, make_folder, require_places
-    from slideviz.cli.run_command import read_case
     from slideviz.errors import CaseError
     from slideviz.study.combinations import METHODS, MODES, warm
     from slideviz.study.table import terminal_head
@@ -89,22 +89,27 @@ def compare(arguments: argparse.Namespace) -> int:
     require_places(arguments, *(Output(table, "compare", named=False) for table in tables))
     cannot = refused(case, mesh, wanted)
 
-    def say(text: str) -> None:
-        if not arguments.quiet:
-            print(text, flush=True)
-
     known = {"methods": tuple(METHODS), "periodic": tuple(MODES)}
     more = {option: names for option, names in known.items() if getattr(arguments, option) is None}
-    say(f"{arguments.case}, {len(mesh.cells):,} cells: {announcement(wanted, cannot, more)}")
+    _say(
+        arguments,
+        f"{arguments.case}, {len(mesh.cells):,} cells: {announcement(wanted, cannot, more)}",
+    )
     warm({one.method for one in wanted if one not in cannot})
-    say(terminal_head())
-    rows, files = _computed(arguments, (case, mesh, wanted, cannot), folder, say)
-    say("drawing plots" + ("" if arguments.no_pictures else " and pictures"))
+    _say(arguments, terminal_head())
+    rows, files = _computed(arguments, case, mesh, wanted, cannot, folder)
+    _say(arguments, "drawing plots" + ("" if arguments.no_pictures else " and pictures"))
     files += _drawn(arguments, case, mesh, rows, folder)
-    say("\n".join(map(str, files)))
+    _say(arguments, "\n".join(map(str, files)))
     if not any(row.result for row in rows):
         raise CaseError(f"no combination could be computed; {files[0]} says why for each")
     return DONE
+
+
+def _say(arguments: argparse.Namespace, text: str) -> None:
+    """Print a text at once, unless ``--quiet`` was asked for."""
+    if not arguments.quiet:
+        print(text, flush=True)
 
 
 def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...]:
@@ -153,9 +158,11 @@ def _items(text: str) -> list[str]:
 
 def _computed(
     arguments: argparse.Namespace,
-    asked: tuple[Case, Mesh, Sequence[Combination], Mapping[Combination, str]],
+    case: Case,
+    mesh: Mesh,
+    wanted: Sequence[Combination],
+    cannot: Mapping[Combination, str],
     folder: Path,
-    say: Callable[[str], None],
 ) -> tuple[list[Row], list[Path]]:
     """Return all rows and the tables written; after each row they have what was finished."""
     from slideviz.study.combinations import bounded, compare
@@ -164,7 +171,6 @@ def _computed(
     table, histories = folder / TABLE, folder / HISTORY
     files = [table]
     rows: list[Row] = []
-    case, mesh, wanted, cannot = asked
     told: list[str] = []
     count = len(wanted) - len(cannot)
     bars: list[Bar] = []
@@ -182,7 +188,7 @@ def _computed(
             save_text(histories, history_text(rows))
             files = [table, histories]
         if tried not in cannot:  # those were told before
-            say(terminal_line(rows[-1], told))
+            _say(arguments, terminal_line(rows[-1], told))
     return rows, files
 
 

@@ -1,25 +1,78 @@
-"""What ``slideviz film`` does, and the words for sizes and details."""
+"""``slideviz film``: deforms a mesh, and writes its steps as a film."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from contextlib import closing
-from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.cli.options import add_changes, add_zoom, changed, read_case, size
 from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.export.reel import Reel
     from slideviz.mesh.model import Mesh
-    from slideviz.scene.moved import Zoom
     from slideviz.session.state import Frame, Run
 
 SMOOTH = 4
 """Films of fewer steps are told that images can be put in between."""
+
+
+def add_film(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``film`` to the parser."""
+    call = calls.add_parser(
+        "film",
+        help="deform a mesh and write the steps as MP4, GIF or numbered pictures",
+        description="Deform a mesh as a case file says, and write the steps as a film.",
+    )
+    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    call.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="FILE.mp4 or FILE.gif; a folder, or a pattern such as step_%%03d.png",
+    )
+    call.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels (1280x800; GIF 800x500; PNG 1600x1000)"
+    )
+    call.add_argument(
+        "--fps", type=float, metavar="N", help="images a second (10; fewer if there are few)"
+    )
+    call.add_argument(
+        "--hold", type=float, default=1.5, metavar="S", help="the last image stays S seconds (1.5)"
+    )
+    call.add_argument(
+        "--between",
+        type=int,
+        default=0,
+        metavar="N",
+        help="images between two steps: nodes on straight lines, quality of that mesh (0)",
+    )
+    call.add_argument(
+        "--color",
+        choices=tuple(QUANTITIES),
+        default="size-skew",
+        help="what the colours say (size-skew)",
+    )
+    add_zoom(call)
+    add_changes(call)
+    call.add_argument(
+        "--beside",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="show beside it a second run with this change, as SLIDING_MODE=none; repeated: one "
+        "run with all of them",
+    )
+    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    call.add_argument("--force", action="store_true", help="replace files that exist")
+    call.set_defaults(command=film)
 
 
 def film(arguments: argparse.Namespace) -> int:
@@ -27,7 +80,6 @@ def film(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, require_places
     from slideviz.cli.progress import Bar
-    from slideviz.cli.run_command import read_case
     from slideviz.export.encode import kind_of
     from slideviz.export.film import film as draw
     from slideviz.export.film import require_pair
@@ -58,7 +110,6 @@ def film(arguments: argparse.Namespace) -> int:
 def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
     from slideviz import quality, read
-    from slideviz.cli.run_command import changed
     from slideviz.errors import CaseError
     from slideviz.scene.moved import require_detail
     from slideviz.session.state import Frame, Run
@@ -133,105 +184,3 @@ def _tell_inverted(arguments: argparse.Namespace, run: Run) -> None:
             f"`slideviz run {arguments.case}` says which, and what may help",
             file=sys.stderr,
         )
-
-
-def add_film(calls: argparse._SubParsersAction) -> None:
-    """Add the command ``film`` to the parser."""
-    call = calls.add_parser(
-        "film",
-        help="deform a mesh and write the steps as MP4, GIF or numbered pictures",
-        description="Deform a mesh as a case file says, and write the steps as a film.",
-    )
-    call.add_argument("case", type=Path, help="the case file (.cfg)")
-    call.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="FILE.mp4 or FILE.gif; a folder, or a pattern such as step_%%03d.png",
-    )
-    call.add_argument(
-        "--size", type=size, metavar="WxH", help="pixels (1280x800; GIF 800x500; PNG 1600x1000)"
-    )
-    call.add_argument(
-        "--fps", type=float, metavar="N", help="images a second (10; fewer if there are few)"
-    )
-    call.add_argument(
-        "--hold", type=float, default=1.5, metavar="S", help="the last image stays S seconds (1.5)"
-    )
-    call.add_argument(
-        "--between",
-        type=int,
-        default=0,
-        metavar="N",
-        help="images between two steps: nodes on straight lines, quality of that mesh (0)",
-    )
-    call.add_argument(
-        "--color",
-        choices=tuple(QUANTITIES),
-        default="size-skew",
-        help="what the colours say (size-skew)",
-    )
-    add_zoom(call)
-    call.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a key of the case for this run; may be repeated",
-    )
-    call.add_argument(
-        "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
-    )
-    call.add_argument(
-        "--beside",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="show beside it a second run with this change, as SLIDING_MODE=none; repeated: one "
-        "run with all of them",
-    )
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
-    call.add_argument("--force", action="store_true", help="replace files that exist")
-    call.set_defaults(command=film)
-
-
-def add_zoom(call: argparse.ArgumentParser) -> None:
-    """Add the option ``--zoom``, which is the same for pictures and films."""
-    call.add_argument(
-        "--zoom",
-        type=zoom,
-        default="auto",
-        metavar="X,Y[,Z],WIDTH",
-        help="middle and width of what is seen; `all` is the whole mesh, `auto` (default) too, "
-        "unless what moves is tiny in it",
-    )
-
-
-def size(text: str) -> tuple[int, int]:
-    """Return width and height of ``1280x800``."""
-    width, sign, height = text.lower().partition("x")
-    if not (sign and width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, as 1280x800")
-    return int(width), int(height)
-
-
-def zoom(text: str) -> Zoom:
-    """Return the detail of ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``, or the words themselves."""
-    if text == "auto":
-        return "auto"
-    if text == "all":
-        return "all"
-    from slideviz.scene.moved import Detail
-
-    try:
-        *centre, width = (float(word) for word in text.split(","))
-    except ValueError:
-        centre, width = [], 0.0
-    if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
-        )
-    return Detail(tuple(centre), width)

@@ -1,4 +1,4 @@
-"""What ``slideviz run`` does."""
+"""``slideviz run``: deforms a mesh as a case file says."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.cli.options import add_changes, add_zoom, read_case, size
 from slideviz.terms import SLIDES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from slideviz.case.model import Case
     from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
@@ -24,11 +23,31 @@ KEPT_BYTES = 1_000_000_000
 """Meshes of steps are kept up to this size, to tell when cells were inverted."""
 
 
+def add_run(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``run`` to the parser."""
+    call = calls.add_parser("run", help="deform a mesh as a case file says")
+    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    call.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
+    add_changes(call)
+    call.add_argument("--json", type=Path, metavar="FILE", help="report as JSON; - is the terminal")
+    call.add_argument(
+        "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
+    )
+    call.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
+    call.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
+    call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
+    add_zoom(call)
+    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
+    call.set_defaults(command=run)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write mesh, report, steps and picture."""
     from slideviz import quality, read, write
     from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.report import run_report, save_history, save_json
+    from slideviz.cli.report import cell_data, run_report, save_history, save_json
     from slideviz.errors import CaseError
     from slideviz.scene.moved import require_detail
 
@@ -76,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         files = {"mesh": output, "quality of each cell": qualities}
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
-        _print_run(report, (found, before), files)
+        _print_run(report, found, before, files)
     for warning in last.warnings:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
     if found.inverted:
@@ -125,44 +144,6 @@ def _require_places(
     )
 
 
-def read_case(arguments: argparse.Namespace) -> Case:
-    """Return the case of the file with the changes of ``--set`` and ``--zone``."""
-    from slideviz import Case
-    from slideviz.cli.places import note_case
-
-    case = changed(Case.read(arguments.case), arguments.set)
-    if getattr(arguments, "step_count", None) is not None:
-        case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
-    case = case if arguments.zone is None else case.change(zone=arguments.zone)
-    note_case(arguments, case)
-    return case
-
-
-def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
-    """Return the case with other values of some keys, each as KEY=VALUE.
-
-    Raises
-    ------
-    CaseError
-        One is not of that form, there is no such key, or the value is wrong.
-    """
-    from slideviz.case.cfg import set_key
-    from slideviz.case.check import idle_roles
-    from slideviz.errors import CaseError
-
-    before = idle_roles(case)
-    for text in texts:
-        key, sign, value = text.partition("=")
-        if not sign:
-            raise CaseError(f"{option} {text!r} is not of the form KEY=VALUE")
-        try:
-            case = set_key(case, key.strip(), value.strip())
-        except CaseError as problem:
-            raise CaseError(str(problem).replace("--set", option)) from problem
-    kept = [warning for warning in case.warnings if warning not in before]
-    return case.change(warnings=(*kept, *idle_roles(case)))
-
-
 def _default_output(mesh_file: Path) -> Path:
     """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
     return Path(f"{mesh_file.stem}_def{mesh_file.suffix}")
@@ -197,8 +178,10 @@ def _write_qualities(path: Path, found: Quality) -> None:
         file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
 
 
-def _print_run(report: dict, found: tuple[Quality, Quality], files: dict[str, Path | None]) -> None:
-    """Print the summary of a run; ``found`` is the quality after it and before."""
+def _print_run(
+    report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
+) -> None:
+    """Print the summary of a run; ``found`` and ``before`` are the quality after it and before."""
     from slideviz.cli.report import counted, quality_lines, table
 
     counts, spent = report["node_counts"], report["seconds"]
@@ -206,7 +189,7 @@ def _print_run(report: dict, found: tuple[Quality, Quality], files: dict[str, Pa
     print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
     zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
     print(f"sliding {report['sliding']}, periodic {report['periodic']}{zone}")
-    print(quality_lines(*found))
+    print(quality_lines(found, before))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
     if report["periodic_misfit"] is not None:
@@ -248,10 +231,3 @@ def _advice(report: dict) -> str:
         ideas.append("PERIODIC_MODE= moving for a repeating mesh")
     ideas.append("another role for the boundaries near these cells")
     return ", ".join(ideas[:-1]) + " or " + ideas[-1]
-
-
-def cell_data(path: Path, found: Quality) -> dict | None:
-    """Return the qualities for formats that hold cell data, None for the others."""
-    if path.suffix.lower() not in (".vtu", ".vtk", ".xdmf"):
-        return None
-    return {"size-skew": found.values, "size": found.size, "skew": found.skew}

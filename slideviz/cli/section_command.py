@@ -1,4 +1,4 @@
-"""What ``slideviz section`` does."""
+"""``slideviz section``: draws a section of a mesh."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slideviz.case.section_shapes import SECTION_SHAPES
+from slideviz.case.section_shapes import SECTION_SHAPES, names
+from slideviz.cli.options import NONE, add_reference, reference_of, words_of
+from slideviz.cli.section_options import limits, neighbours, pixels, reader
+from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -15,13 +18,77 @@ if TYPE_CHECKING:
     from slideviz.mesh.periodic import Pair
     from slideviz.sections.model import Section
 
+CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
+EXAMPLES = """\
+examples:
+  slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
+  slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
+  slideviz section stator.su2 --cone 10,z,0,0,-1.5 --copies 2 -o cone.png
+  slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
+"""
+
+
+def add_section(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``section`` to the parser."""
+    call = calls.add_parser(
+        "section",
+        help=f"picture of a {names()} through a mesh",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    call.add_argument("mesh", type=Path)
+    add = call.add_argument
+    where = call.add_mutually_exclusive_group(required=True)
+    for name, row in SECTION_SHAPES.items():
+        metavar = row.metavar or name.upper()
+        where.add_argument(
+            f"--{name}", type=reader(row), dest="asked", metavar=metavar, help=row.option
+        )
+    add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
+    add_reference(
+        call,
+        "case that names periodic boundaries and axis; its MESH_FILENAME is the reference "
+        "where it has the same cells",
+    )
+    add("--color", choices=tuple(QUANTITIES), default="size-skew", help="(default: size-skew)")
+    add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
+    maps = tuple(COLOUR_MAPS)
+    add("--map", choices=maps, default=maps[0], help=f"colour map (default: {maps[0]})")
+    cells = call.add_mutually_exclusive_group()
+    cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
+    cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
+    view = call.add_mutually_exclusive_group()
+    view.add_argument(
+        "--unrolled",
+        action="store_true",
+        help="what has an axis laid flat, a cylinder to (z, r theta), the default",
+    )
+    view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
+    add(
+        "--copies",
+        type=neighbours,
+        metavar="N",
+        default=0,
+        help="neighbouring passages to draw on each side, or wheel for all of them",
+    )
+    add(
+        "--size",
+        type=pixels,
+        metavar="WxH",
+        help="pixels (default: 1600 wide, and as high as the section needs)",
+    )
+    add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
+    add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
+    add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
+    call.set_defaults(command=section, wrong_usage=call.error)
+
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
     from slideviz import Case, quality, read
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, note_case, require_places
-    from slideviz.cli.reference import NONE, reference_of, words_of
     from slideviz.cli.report import save_json
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings

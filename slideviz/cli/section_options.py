@@ -1,4 +1,4 @@
-"""The options of ``slideviz section``, and how its sections are written."""
+"""How sections, sizes and limits are written on the command line of ``slideviz section``."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms, names
-from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES
+from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -21,74 +19,6 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 MOST_COPIES = 100
 """On each side: more could neither be told apart nor be drawn in reasonable time."""
-
-CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
-EXAMPLES = """\
-examples:
-  slideviz section stator.su2 --cylinder 0.275 --copies 2 -o mid_span.png
-  slideviz section out.su2 --reference mesh.su2 --plane 0,0,1,0,0,0.5 -o half.svg
-  slideviz section stator.su2 --cone 10,z,0,0,-1.5 --copies 2 -o cone.png
-  slideviz section out.su2 --plane z=0.5 --color displacement --reference mesh.su2 -o moved.pdf
-"""
-
-
-def add_section(calls: argparse._SubParsersAction) -> None:
-    """Add the command to the parser's."""
-    from slideviz.cli.reference import add_reference
-    from slideviz.cli.section_command import section as command
-
-    section = calls.add_parser(
-        "section",
-        help=f"picture of a {names()} through a mesh",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    section.add_argument("mesh", type=Path)
-    add = section.add_argument
-    where = section.add_mutually_exclusive_group(required=True)
-    for name, row in SECTION_SHAPES.items():
-        metavar = row.metavar or name.upper()
-        where.add_argument(
-            f"--{name}", type=reader(row), dest="asked", metavar=metavar, help=row.option
-        )
-    add("-o", "--output", type=Path, metavar="FILE", required=True, help=".png, .svg or .pdf")
-    add_reference(
-        section,
-        "case that names periodic boundaries and axis; its MESH_FILENAME is the reference "
-        "where it has the same cells",
-    )
-    add("--color", choices=tuple(QUANTITIES), default="size-skew", help="(default: size-skew)")
-    add("--range", type=limits, metavar="LO,HI", help="ends of the colour bar")
-    maps = tuple(COLOUR_MAPS)
-    add("--map", choices=maps, default=maps[0], help=f"colour map (default: {maps[0]})")
-    cells = section.add_mutually_exclusive_group()
-    cells.add_argument("--whole", action="store_true", default=None, help="show cells whole")
-    cells.add_argument("--cut", action="store_false", dest="whole", help=CUT_HELP)
-    view = section.add_mutually_exclusive_group()
-    view.add_argument(
-        "--unrolled",
-        action="store_true",
-        help="what has an axis laid flat, a cylinder to (z, r theta), the default",
-    )
-    view.add_argument("--3d", action="store_true", dest="in_space", help="show it in space")
-    add(
-        "--copies",
-        type=neighbours,
-        metavar="N",
-        default=0,
-        help="neighbouring passages to draw on each side, or wheel for all of them",
-    )
-    add(
-        "--size",
-        type=pixels,
-        metavar="WxH",
-        help="pixels (default: 1600 wide, and as high as the section needs)",
-    )
-    add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
-    add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
-    add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
-    section.set_defaults(command=command, wrong_usage=section.error)
 
 
 def glued(argv: Sequence[str]) -> list[str]:

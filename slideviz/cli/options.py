@@ -1,0 +1,145 @@
+"""Options that several commands share, and what their values mean."""
+
+from __future__ import annotations
+
+import argparse
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+    from slideviz.scene.moved import Zoom
+
+NONE = "no reference: relative to itself"
+"""Stands in pictures; sizes of cells are not rated then, only their shapes."""
+REMEDY = "give --reference UNDEFORMED"
+
+
+def add_reference(call: argparse.ArgumentParser, case_help: str) -> None:
+    """Add the options ``--reference`` and ``--case``."""
+    call.add_argument(
+        "--reference",
+        type=Path,
+        metavar="UNDEFORMED",
+        help="mesh to compare with; without it only the shape of cells is rated",
+    )
+    call.add_argument("--case", type=Path, metavar="CASE", help=case_help)
+
+
+def reference_of(
+    arguments: argparse.Namespace, mesh: Mesh, case: Case | None
+) -> tuple[Path, Mesh] | None:
+    """Return the undeformed mesh and its file: ``--reference``, or else that of ``--case``.
+
+    The mesh of a case is taken only where it has the cells of ``mesh``: the case may have been
+    given for its periodic boundaries alone.
+    """
+    from slideviz import read
+
+    if arguments.reference is not None:
+        return arguments.reference, read(arguments.reference, zone=arguments.zone)
+    if case is None or case.mesh_file is None or not case.mesh_file.is_file():
+        return None
+    base = read(case.mesh_file, zone=arguments.zone or case.zone)
+    same = base.points.shape == mesh.points.shape and base.cells.same_as(mesh.cells)
+    return (case.mesh_file, base) if same else None
+
+
+def words_of(found: tuple[Path, Mesh] | None) -> str:
+    """Return the line about what the quality is measured against."""
+    return f"{NONE}; {REMEDY}" if found is None else f"reference: {found[0]}"
+
+
+def add_changes(call: argparse.ArgumentParser) -> None:
+    """Add the options ``--set`` and ``--steps``, which change the case for one run."""
+    call.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a key of the case for this run; may be repeated",
+    )
+    call.add_argument(
+        "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
+    )
+
+
+def read_case(arguments: argparse.Namespace) -> Case:
+    """Return the case of the file with the changes of ``--set``, ``--steps`` and ``--zone``."""
+    from slideviz import Case
+    from slideviz.cli.places import note_case
+
+    case = changed(Case.read(arguments.case), arguments.set)
+    if getattr(arguments, "step_count", None) is not None:
+        case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
+    case = case if arguments.zone is None else case.change(zone=arguments.zone)
+    note_case(arguments, case)
+    return case
+
+
+def changed(case: Case, texts: Sequence[str], option: str = "--set") -> Case:
+    """Return the case with other values of some keys, each as KEY=VALUE.
+
+    Raises
+    ------
+    CaseError
+        One is not of that form, there is no such key, or the value is wrong.
+    """
+    from slideviz.case.cfg import set_key
+    from slideviz.case.check import idle_roles
+    from slideviz.errors import CaseError
+
+    before = idle_roles(case)
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not sign:
+            raise CaseError(f"{option} {text!r} is not of the form KEY=VALUE")
+        try:
+            case = set_key(case, key.strip(), value.strip())
+        except CaseError as problem:
+            raise CaseError(str(problem).replace("--set", option)) from problem
+    kept = [warning for warning in case.warnings if warning not in before]
+    return case.change(warnings=(*kept, *idle_roles(case)))
+
+
+def add_zoom(call: argparse.ArgumentParser) -> None:
+    """Add the option ``--zoom``, which is the same for pictures and films."""
+    call.add_argument(
+        "--zoom",
+        type=zoom,
+        default="auto",
+        metavar="X,Y[,Z],WIDTH",
+        help="middle and width of what is seen; `all` is the whole mesh, `auto` (default) too, "
+        "unless what moves is tiny in it",
+    )
+
+
+def zoom(text: str) -> Zoom:
+    """Return the detail of ``X,Y,WIDTH`` or ``X,Y,Z,WIDTH``, or the words themselves."""
+    if text == "auto":
+        return "auto"
+    if text == "all":
+        return "all"
+    from slideviz.scene.moved import Detail
+
+    try:
+        *centre, width = (float(word) for word in text.split(","))
+    except ValueError:
+        centre, width = [], 0.0
+    if len(centre) not in (2, 3) or not (all(map(isfinite, centre)) and 0.0 < width < inf):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither X,Y,WIDTH (X,Y,Z,WIDTH in 3D; WIDTH above 0) nor `all` nor `auto`"
+        )
+    return Detail(tuple(centre), width)
+
+
+def size(text: str) -> tuple[int, int]:
+    """Return width and height of ``1280x800``."""
+    width, sign, height = text.lower().partition("x")
+    if not (sign and width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, as 1280x800")
+    return int(width), int(height)

@@ -1,0 +1,93 @@
+"""``slideviz quality``: the size-skew quality of a mesh."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.cli.options import add_reference, reference_of, words_of
+from slideviz.terms import METRICS
+
+if TYPE_CHECKING:
+    from slideviz.mesh.quality import Quality
+
+
+def add_quality(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``quality`` to the parser."""
+    call = calls.add_parser("quality", help="size-skew quality of a mesh")
+    call.add_argument("mesh", type=Path)
+    add_reference(call, "case that made it: its MESH_FILENAME is the reference")
+    call.add_argument(
+        "--metric",
+        choices=tuple(METRICS),
+        default="knupp",
+        help="rbf-slide: hexahedra as that program rates them (default: knupp)",
+    )
+    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    call.add_argument("--json", type=Path, metavar="FILE", help="as JSON; - is the terminal")
+    call.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="mesh with quality (.vtu), or .csv"
+    )
+    call.set_defaults(command=quality)
+
+
+def quality(arguments: argparse.Namespace) -> int:
+    """Print the quality of a mesh, compared with the undeformed one if it is given."""
+    from slideviz import Case, read, write
+    from slideviz import quality as rate
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.places import Output, note_case, require_places
+    from slideviz.cli.report import (
+        cell_data,
+        histogram_lines,
+        quality_lines,
+        quality_report,
+        save_json,
+        table,
+    )
+
+    is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
+    case = Case.read(arguments.case) if arguments.case else None
+    if case is not None:
+        note_case(arguments, case)
+    require_places(
+        arguments,
+        Output(arguments.output, "-o", is_mesh=not is_table),
+        Output(arguments.json, "--json"),
+    )
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    base = reference_of(arguments, mesh, case)
+    found = rate(mesh, reference=base[1] if base else None, metric=arguments.metric)
+    report = quality_report(mesh, found) | {"reference": str(base[0]) if base else None}
+    if is_table:
+        _write_csv(arguments.output, found)
+    elif arguments.output:
+        write(arguments.output, mesh, cell_data=cell_data(arguments.output, found))
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    else:
+        print(f"{arguments.mesh}: size-skew, metric {found.metric}")
+        print(f"  {words_of(base)}")
+        print(quality_lines(found))
+        print("worst cells:")
+        print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))
+        print("cells by quality:")
+        print(histogram_lines(found))
+    return INVERTED if found.inverted else DONE
+
+
+def _write_csv(path: Path, found: Quality) -> None:
+    """Write id, size-skew, size, skew and status of each cell."""
+    from slideviz.errors import CaseError
+    from slideviz.mesh.io.atomic import atomic_write
+    from slideviz.terms import CELL_STATES
+
+    columns = zip(found.values, found.size, found.skew, found.status, strict=True)
+    lines = ["cell,size_skew,size,skew,status"]
+    for cell, (value, size, skew, status) in enumerate(columns):
+        numbers = f"{float(value)!r},{float(size)!r},{float(skew)!r}"
+        lines.append(f"{cell},{numbers},{CELL_STATES[status]}")
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(lines) + "\n").encode())

@@ -1,0 +1,38 @@
+"""``slideviz sample``: writes a sample case, or lists the samples."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_sample(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``sample`` to the parser."""
+    call = calls.add_parser("sample", help="write a sample case")
+    call.add_argument("name", nargs="?", help="which one; none: list them")
+    call.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
+    call.add_argument("--size", type=int, metavar="N", help="size; what it counts is in the list")
+    call.add_argument("--variant", metavar="NAME", help="other motions; listed without NAME")
+    call.add_argument("--force", action="store_true", help="replace files that exist")
+    call.set_defaults(command=sample)
+
+
+def sample(arguments: argparse.Namespace) -> int:
+    """Write a sample case, or list the samples."""
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.report import table
+    from slideviz.samples.table import SAMPLES, VARIANTS, write_sample
+
+    if arguments.name is None:
+        print("samples (slideviz sample NAME -o DIR):")
+        print(table([(name, about) for name, about in SAMPLES.items()]))
+        print("variants (--variant):")
+        print(table([(name, ", ".join(kinds)) for name, kinds in VARIANTS.items()]))
+        return DONE
+    folder = arguments.output or Path(arguments.name)
+    paths = write_sample(arguments.name, folder, arguments.size, arguments.variant, arguments.force)
+    for path in paths:
+        print(path)
+    case = next(path for path in paths if path.suffix == ".cfg")
+    print(f"now: slideviz run {case}   or: slideviz {case}")
+    return DONE
