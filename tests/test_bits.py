@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slideviz.case.model import Case, Rotate, Scale
-from slideviz.deformation.setup import make_plan
+from slideviz.deformation.setup import make_setup
 from slideviz.mesh.topology import find_boundary
 from tests import builders
 from tools.laws.renumber import renumbered
@@ -39,14 +39,14 @@ def test_frame_motion_and_normals_keep_every_bit(kind, seed):
         origin=tuple(origin),
     )
     other, order = renumbered(mesh, rng)
-    one, two = make_plan(case, mesh), make_plan(case, other)
-    features = [plan.frame.features(plan.coords) for plan in (one, two)]
+    one, two = make_setup(case, mesh), make_setup(case, other)
+    features = [setup.frame.features(setup.coords) for setup in (one, two)]
     assert features[0][:, order].tobytes() == features[1].tobytes()
     asked = np.zeros((2, *mesh.points.shape))
     normals = np.zeros((2, len(mesh.points), mesh.dim, mesh.dim))
-    for row, plan in enumerate((one, two)):
-        asked[row, plan.known] = plan.target
-        nodes, found = plan.constraints(plan.coords)
+    for row, setup in enumerate((one, two)):
+        asked[row, setup.known] = setup.target
+        nodes, found = setup.constraints(setup.coords)
         turn = np.arange(len(nodes)) - np.searchsorted(nodes, nodes)
         normals[row, nodes, turn] = found
     assert (asked[0, order] == asked[1]).all()

@@ -127,7 +127,7 @@ def test_what_fails_later_has_a_line_and_the_reason_once(square, tmp_path, capsy
     def through(case, mesh):
         raise DeformError("the motion puts BLOCK through RIGHT")
 
-    monkeypatch.setattr("slideviz.study.combinations.make_plan", through)
+    monkeypatch.setattr("slideviz.study.combinations.make_setup", through)
     assert run([*argv, "-o", str(out), "--no-pictures"]) == 1
     printed = capsys.readouterr().out
     assert "2 combinations" in printed

@@ -1,4 +1,4 @@
-"""The staircase: steps, progress, cancel, errors, and geometry that is asking for trouble."""
+"""The solver: steps, progress, cancel, errors, and geometry that is asking for trouble."""
 
 from __future__ import annotations
 
@@ -115,15 +115,15 @@ def test_a_callback_that_raises_ends_the_run_at_once_wherever_it_is(method):
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_a_plan_made_before_gives_the_same_mesh(steps, monkeypatch):
-    from slideviz.deformation.setup import make_plan
+    from slideviz.deformation.setup import make_setup
     from slideviz.samples.table import sample
 
     made = sample("square", 10, "motion")
     case, mesh = made.case.change(steps=steps), made.mesh
     *_, alone = sv.deform(case, mesh)
-    plan = make_plan(case.change(steps=7), mesh)
-    monkeypatch.setattr(solver, "make_plan", None)
-    *_, shared = sv.deform(case, mesh, plan=plan)
+    setup = make_setup(case.change(steps=7), mesh)
+    monkeypatch.setattr(solver, "make_setup", None)
+    *_, shared = sv.deform(case, mesh, setup=setup)
     assert np.array_equal(shared.mesh.points, alone.mesh.points)
     assert shared.warnings == alone.warnings
 

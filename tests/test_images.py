@@ -14,7 +14,7 @@ import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
 from slideviz.cli import run as command
 from slideviz.deformation import stepping
-from slideviz.deformation.setup import make_plan
+from slideviz.deformation.setup import make_setup
 from slideviz.errors import DeformError, Note
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf.frames import make_frame
@@ -152,7 +152,7 @@ def test_a_node_is_fixed_where_its_image_is(one, method, periodic):
     assert len(at_rest) == 2
     np.testing.assert_array_equal(step.mesh.points[at_rest], mesh.points[at_rest])
     assert step.node_counts["moving"] == 7
-    counted = make_plan(case, mesh).classes
+    counted = make_setup(case, mesh).classes
     assert set(at_rest) <= set(counted.fixed)
 
 
@@ -240,16 +240,16 @@ def test_images_that_moved_differently_are_an_error_with_nodes_and_numbers():
         periodic="moving",
         sliding="ps",
     )
-    plan = make_plan(case, mesh)
+    setup = make_setup(case, mesh)
     node = int(mesh.marker("y_p").nodes[-1])
-    wrong = plan.target.copy()
-    wrong[plan.known == node, 1] += 1e-9
+    wrong = setup.target.copy()
+    wrong[setup.known == node, 1] += 1e-9
     with pytest.raises(
         DeformError,
         match=rf"node {node}, now at 1\.1, 1, and its periodic image, node \d+, have moved "
         r"differently, by 1e-09; .* choose PERIODIC_MODE= none",
     ):
-        next(sv.deform(case, mesh, plan=replace(plan, target=wrong)))
+        next(sv.deform(case, mesh, setup=replace(setup, target=wrong)))
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e3])
@@ -337,7 +337,7 @@ def test_the_view_has_the_same_types_as_a_run():
     types = NodeTypes()
     found = types.of(changes.set_view(session, points="types"))
     fixed = found.nodes[found.kinds == list(NODE_TYPES).index("fixed")]
-    np.testing.assert_array_equal(fixed, make_plan(case, mesh).classes.fixed)
+    np.testing.assert_array_equal(fixed, make_setup(case, mesh).classes.fixed)
     # Markers that do not match are told beside the Run button; the types are there all the same.
     points = mesh.points.copy()
     points[mesh.marker("y_p").nodes[2], 0] += 0.03

@@ -14,7 +14,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.deformation.setup import make_plan
+from slideviz.deformation.setup import make_setup
 from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.axis import corners
 from slideviz.rbf.closest import ClosestPoints
@@ -151,12 +151,12 @@ def check(mesh, case, before):
     *_, last = sv.deform(case, mesh)
     points = last.mesh.points
     assert np.all(np.isfinite(points))
-    plan = make_plan(case, mesh)
-    goal = plan.frame.points(plan.coords[plan.known] + plan.target)
-    np.testing.assert_allclose(points[plan.known], goal, rtol=0, atol=1e-12 * mesh.extent)
-    off_boundary(plan, points, mesh)
+    setup = make_setup(case, mesh)
+    goal = setup.frame.points(setup.coords[setup.known] + setup.target)
+    np.testing.assert_allclose(points[setup.known], goal, rtol=0, atol=1e-12 * mesh.extent)
+    off_boundary(setup, points, mesh)
     if case.periodic in ("fixed", "moving"):
-        images_stay(plan, points, mesh)
+        images_stay(setup, points, mesh)
     after = sv.quality(last.mesh, mesh)
     assert after.inverted == 0
     assert after.min > 0.5 * before.min
@@ -165,10 +165,10 @@ def check(mesh, case, before):
     assert all(("nearly coincide" in t) or ("whose copy it is" in t) for t in last.warnings)
 
 
-def off_boundary(plan, points, mesh):
+def off_boundary(setup, points, mesh):
     """Sliding nodes are on the undeformed boundary of their markers, one period on included."""
-    coords, classes, fans = plan.frame.coords(points), plan.classes, plan.fans
-    shift = plan.frame.shift()
+    coords, classes, fans = setup.frame.coords(points), setup.classes, setup.fans
+    shift = setup.frame.shift()
     on = np.zeros((len(points), len(mesh.markers)), bool)
     on[classes.cluster_node[classes.row_cluster], fans.fan_marker[classes.row_fan]] = True
     gap = np.full(len(points), np.inf)
@@ -176,8 +176,8 @@ def off_boundary(plan, points, mesh):
         nodes = np.flatnonzero(on[:, marker])
         if not len(nodes):
             continue
-        facets = plan.boundary.facets[plan.boundary.marker == marker]
-        side = corners(plan.coords, facets, plan.axis)
+        facets = setup.boundary.facets[setup.boundary.marker == marker]
+        side = corners(setup.coords, facets, setup.axis)
         if mesh.dim == 3:
             side = np.concatenate([side[:, :3], side[:, [0, 2, 3]]])
         track = ClosestPoints(side)
@@ -185,16 +185,16 @@ def off_boundary(plan, points, mesh):
             at = coords[nodes] + step
             gap[nodes] = np.minimum(gap[nodes], np.linalg.norm(track.query(at) - at, axis=1))
     # On the axis every angle is the same place.
-    assert not coords[plan.axis, 0].any()
-    sliding = classes.sliding[~plan.axis[classes.sliding]]
+    assert not coords[setup.axis, 0].any()
+    sliding = classes.sliding[~setup.axis[classes.sliding]]
     assert np.isfinite(gap[sliding]).all()
     # Images move alike, so one of them may be off by what the two boundaries differ.
-    differ = 2.0 * max((pair.mismatch for pair in plan.pairs), default=0.0)
-    assert gap[sliding].max(initial=0.0) < 1e-9 * mesh.extent + differ * bool(len(plan.images))
+    differ = 2.0 * max((pair.mismatch for pair in setup.pairs), default=0.0)
+    assert gap[sliding].max(initial=0.0) < 1e-9 * mesh.extent + differ * bool(len(setup.images))
 
 
-def images_stay(plan, points, mesh):
-    coords = plan.frame.coords(points)
-    before = plan.coords[plan.images[:, 1]] - plan.coords[plan.images[:, 0]]
-    after = coords[plan.images[:, 1]] - coords[plan.images[:, 0]]
+def images_stay(setup, points, mesh):
+    coords = setup.frame.coords(points)
+    before = setup.coords[setup.images[:, 1]] - setup.coords[setup.images[:, 0]]
+    after = coords[setup.images[:, 1]] - coords[setup.images[:, 0]]
     np.testing.assert_allclose(after, before, rtol=0, atol=1e-12 * mesh.extent)

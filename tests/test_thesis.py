@@ -226,9 +226,9 @@ def test_node_counts_of_the_dense_square(thesis, method, expected):
 
 
 def node_counts(mesh, case):
-    from slideviz.deformation.setup import make_plan
+    from slideviz.deformation.setup import make_setup
 
-    return make_plan(case, mesh).classes.counts()
+    return make_setup(case, mesh).classes.counts()
 
 
 @pytest.mark.parametrize("name", ["hexahedron", "cylindrical"])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from slideviz.deformation.setup import Plan
+from slideviz.deformation.setup import Setup
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Solution
 
@@ -30,7 +30,7 @@ HOPELESS = 0.1
 
 
 def unsoundness(
-    plan: Plan, mesh: Mesh, solution: Solution, moved: FloatArray, part: float
+    setup: Setup, mesh: Mesh, solution: Solution, moved: FloatArray, part: float
 ) -> str | None:
     """Return a sentence where the result of a step cannot be right: why, and what helps.
 
@@ -42,23 +42,23 @@ def unsoundness(
     part : float
         Of the whole displacement, 0 to 1.
     """
-    largest = part * float(np.linalg.norm(plan.target, axis=1).max(initial=0.0))
+    largest = part * float(np.linalg.norm(setup.target, axis=1).max(initial=0.0))
     if solution.lost > HOPELESS * largest:
         return (
             f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
             f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
-            f"{_cause(plan, mesh, moved)}"
+            f"{_cause(setup, mesh, moved)}"
         )
-    shift = moved - plan.coords
+    shift = moved - setup.coords
     length = np.linalg.norm(shift, axis=1)
     if length.max() <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     # Sliding nodes first, for what they do is data to all others.
     limit = np.full(
-        len(length), GROWTH * _reach(plan, shift, largest, ("moving", "fixed", "sliding"))
+        len(length), GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding"))
     )
-    slid = plan.classes.sliding
-    limit[slid] = GROWTH * _reach(plan, shift, largest, ("moving",))
+    slid = setup.classes.sliding
+    limit[slid] = GROWTH * _reach(setup, shift, largest, ("moving",))
     beyond = length > limit
     if not beyond.any():
         return None
@@ -68,11 +68,11 @@ def unsoundness(
     return (
         f"node {node} at ({where}) would go {length[node]:.3g} far, {length[node] / largest:.3g} "
         f"times the largest displacement that is asked for ({largest:.3g}): "
-        f"{_cause(plan, mesh, moved)}"
+        f"{_cause(setup, mesh, moved)}"
     )
 
 
-def _reach(plan: Plan, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
+def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
     """Return how far the displacement of boundaries of some kinds may carry nodes.
 
     A body that turns or is stretched takes what is smooth around it along, the farther the more:
@@ -81,37 +81,37 @@ def _reach(plan: Plan, shift: FloatArray, largest: float, kinds: tuple[str, ...]
     """
     chosen = np.zeros(len(shift), bool)
     for kind in kinds:
-        chosen[getattr(plan.classes, kind)] = True
+        chosen[getattr(setup.classes, kind)] = True
     strains = [0.0]
-    for index in range(len(plan.boundary.names)):
-        nodes = np.unique(plan.boundary.facets[plan.boundary.marker == index])
+    for index in range(len(setup.boundary.names)):
+        nodes = np.unique(setup.boundary.facets[setup.boundary.marker == index])
         nodes = nodes[chosen[nodes]]
         farthest = np.linalg.norm(shift[nodes], axis=1).max(initial=0.0)
         if len(nodes) > 1 and farthest <= TAKEN * largest:
-            at, moved = plan.coords[nodes], shift[nodes]
+            at, moved = setup.coords[nodes], shift[nodes]
             size = np.linalg.norm(at - at.mean(axis=0), axis=1).max()
             strains.append(np.linalg.norm(moved - moved.mean(axis=0), axis=1).max() / size)
-    return max(largest, float(max(strains)) * float(np.ptp(plan.coords, axis=0).max()))
+    return max(largest, float(max(strains)) * float(np.ptp(setup.coords, axis=0).max()))
 
 
-def _cause(plan: Plan, mesh: Mesh, moved: FloatArray) -> str:
+def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     """Return why the interpolation fails, and what helps."""
-    nodes = np.concatenate([plan.known, plan.classes.sliding])
-    at, shift = plan.coords[nodes], (moved - plan.coords)[nodes]
+    nodes = np.concatenate([setup.known, setup.classes.sliding])
+    at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
     near = cKDTree(at).query(at, k=min(2, len(nodes)))
     gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
     apart = np.linalg.norm(shift - shift[others], axis=1)
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))
-    usual = float(np.linalg.norm(plan.target, axis=1).max()) / mesh.extent
+    usual = float(np.linalg.norm(setup.target, axis=1).max()) / mesh.extent
     if steep[k] < STEEP * usual:
         return (
-            f"{plan.basis.kernel} is too smooth for nodes so close to each other; use a less "
+            f"{setup.basis.kernel} is too smooth for nodes so close to each other; use a less "
             "smooth RBF_KERNEL such as wendland-c0, a smaller INFLUENCE_FACTOR, or "
             "DATA_REDUCTION= YES"
         )
     pair = sorted((int(nodes[k]), int(nodes[others[k]])))
-    named = " and ".join(f"{node} ({_boundaries(plan, node)})" for node in pair)
+    named = " and ".join(f"{node} ({_boundaries(setup, node)})" for node in pair)
     return (
         f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
         "smooth function cannot follow; let the boundary that stays go along (role moving, "
@@ -120,7 +120,7 @@ def _cause(plan: Plan, mesh: Mesh, moved: FloatArray) -> str:
     )
 
 
-def _boundaries(plan: Plan, node: int) -> str:
+def _boundaries(setup: Setup, node: int) -> str:
     """Return the names of the boundaries that a node is on."""
-    mine = (plan.boundary.facets == node).any(axis=1)
-    return ", ".join(plan.boundary.names[k] for k in np.unique(plan.boundary.marker[mine]))
+    mine = (setup.boundary.facets == node).any(axis=1)
+    return ", ".join(setup.boundary.names[k] for k in np.unique(setup.boundary.marker[mine]))

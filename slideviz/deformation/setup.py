@@ -44,7 +44,7 @@ REACH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Setup:
     """Everything that stays the same over the steps.
 
     Attributes
@@ -140,8 +140,8 @@ class Plan:
         slid[copy[both]] = moved
 
 
-def make_plan(case: Case, mesh: Mesh) -> Plan:
-    """Return the plan of a deformation.
+def make_setup(case: Case, mesh: Mesh) -> Setup:
+    """Return what stays the same over the steps of a deformation.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def make_plan(case: Case, mesh: Mesh) -> Plan:
     )
     second = np.flatnonzero(stands != np.arange(len(stands)))
     images = np.stack([stands[second], second], axis=1)
-    return Plan(
+    return Setup(
         frame=frame,
         basis=Basis(
             case.influence_factor * mesh.extent,

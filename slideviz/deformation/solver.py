@@ -1,4 +1,4 @@
-"""The staircase: ``deform(case, mesh)`` yields one deformed mesh for each step.
+"""The solver: ``deform(case, mesh)`` yields one deformed mesh for each step.
 
 Whoever pulls the generator owns progress and cancel; the command line, a test and the window's
 worker run the same code.
@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deformation.setup import Plan, make_plan
-from slideviz.deformation.stepping import Climb, Progress, Step, Trial, renumbered
+from slideviz.deformation.setup import Setup, make_setup
+from slideviz.deformation.stepping import Progress, Step, Stepping, Trial, renumbered
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
@@ -33,7 +33,7 @@ def deform(
     case: Case,
     mesh: Mesh,
     progress: Callable[[Progress], None] | None = None,
-    plan: Plan | None = None,
+    setup: Setup | None = None,
 ) -> Iterator[Step]:
     """Yield the deformed mesh of each step.
 
@@ -45,8 +45,8 @@ def deform(
         The undeformed mesh.
     progress
         Called often with a ``Progress``; an exception it raises ends the run at once.
-    plan
-        What ``make_plan`` returned for this mesh and a case that differs in the number of steps
+    setup
+        What ``make_setup`` returned for this mesh and a case that differs in the number of steps
         alone; it is made when there is none.
 
     Raises
@@ -64,15 +64,15 @@ def deform(
     """
     tell = progress or (lambda _: None)
     watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))
-    if plan is None:
+    if setup is None:
         with watch.phase("classify"):
-            plan = make_plan(case, mesh)
-    _require_memory(plan, case)
-    climb = Climb(case, mesh, plan, tell, watch.seconds)
-    yield from climb.steps(case.steps) if case.steps else _automatic(climb)
+            setup = make_setup(case, mesh)
+    _require_memory(setup, case)
+    stepping = Stepping(case, mesh, setup, tell, watch.seconds)
+    yield from stepping.steps(case.steps) if case.steps else _automatic(stepping)
 
 
-def _automatic(climb: Climb) -> Iterator[Step]:
+def _automatic(stepping: Stepping) -> Iterator[Step]:
     """Yield the steps of the smallest number of them that is enough.
 
     Enough: no cell is inverted, and the next number does not raise the minimum quality by more
@@ -90,17 +90,17 @@ def _automatic(climb: Climb) -> Iterator[Step]:
         if tried and count <= tried[-1].steps:
             continue  # halving made so many already
         try:
-            steps = list(climb.steps(count, halve=True))
+            steps = list(stepping.steps(count, halve=True))
         except UnsoundError as problem:
             worse, failure = worse + 1, problem
             if worse == 2:
                 break
             continue
-        found = quality(steps[-1].mesh, climb.mesh, climb.case.quality_metric)
+        found = quality(steps[-1].mesh, stepping.mesh, stepping.case.quality_metric)
         trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
         tried.append(trial)
         if best is not None and best[0].inverted == 0:
-            gain = climb.case.steps_gain * best[0].min
+            gain = stepping.case.steps_gain * best[0].min
             if trial.inverted or trial.min - best[0].min <= gain:
                 break
         if best is None or (-trial.inverted, trial.min) > (-best[0].inverted, best[0].min):
@@ -140,17 +140,17 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     return first
 
 
-def _require_memory(plan: Plan, case: Case) -> None:
+def _require_memory(setup: Setup, case: Case) -> None:
     """Raise DeformError when the system would not fit into memory."""
     if case.method == "elastic":
         _require_free(
-            ELASTIC_BYTES[plan.coords.shape[1]] * len(plan.coords),
-            f"linear elasticity of {len(plan.coords)} nodes needs",
+            ELASTIC_BYTES[setup.coords.shape[1]] * len(setup.coords),
+            f"linear elasticity of {len(setup.coords)} nodes needs",
             "use METHOD= rbf with DATA_REDUCTION= YES, METHOD= idw, or a coarser mesh",
         )
-    if case.method != "rbf" or plan.reduction is not None:
+    if case.method != "rbf" or setup.reduction is not None:
         return  # nothing is dense; the selection keeps no matrix of all candidates
-    sizes = _systems(plan, case)
+    sizes = _systems(setup, case)
     _require_free(
         8.0 * (sum(n**2 for n in sizes) + 1.6 * max(sizes) ** 2),
         f"{sum(sizes)} unknowns need",
@@ -159,23 +159,23 @@ def _require_memory(plan: Plan, case: Case) -> None:
     )
 
 
-def _systems(plan: Plan, case: Case) -> list[int]:
+def _systems(setup: Setup, case: Case) -> list[int]:
     """Return the unknowns of the systems whose factors are kept together.
 
     Direct sliding falls apart into one system for each axis where normals lie along axes, and
     solves for all boundary nodes again where boundaries are curved.
     """
-    counts = plan.classes.counts()
+    counts = setup.classes.counts()
     known = counts["moving"] + counts["fixed"]
     nodes = known + counts["sliding_edge"] + counts["sliding_surface"]
-    normals = plan.constraints(plan.coords)[1] if case.sliding == "ds" else ()
+    normals = setup.constraints(setup.coords)[1] if case.sliding == "ds" else ()
     if not len(normals):
         return [nodes]
-    dim = plan.coords.shape[1]
+    dim = setup.coords.shape[1]
     along = np.concatenate([np.eye(dim), normals])
     block = blocks(ConstraintRows(np.arange(len(along)), along, np.zeros((len(along), 1))))
     each = np.bincount(block, np.r_[np.full(dim, known), np.ones(len(normals))])
-    return [int(n) for n in each if n] + [nodes] * plan.tracks.curved
+    return [int(n) for n in each if n] + [nodes] * setup.tracks.curved
 
 
 def _require_free(needed: float, what: str, remedy: str) -> None:

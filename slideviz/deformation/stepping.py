@@ -1,4 +1,4 @@
-"""One climb: the steps of a deformation, one after the other."""
+"""Stepping: one deformation in a number of steps, each from where the one before ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.deformation.bounds import unsoundness
-from slideviz.deformation.setup import Plan
+from slideviz.deformation.setup import Setup
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -113,12 +113,12 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Climb:
-    """What a climb needs.
+class Stepping:
+    """One deformation, ready to be made in any number of steps.
 
     Attributes
     ----------
-    case, mesh, plan
+    case, mesh, setup
         What is asked, the undeformed mesh, and the arrays made of both.
     tell : callable
         Receives ``Progress``; may raise to stop.
@@ -128,7 +128,7 @@ class Climb:
 
     case: Case
     mesh: Mesh
-    plan: Plan
+    setup: Setup
     tell: Callable[[Progress], None]
     seconds: dict[str, float]
 
@@ -145,10 +145,10 @@ class Climb:
         DeformError
             A step cannot be solved, or its result cannot be right.
         """
-        plan, mesh = self.plan, self.mesh
+        setup, mesh = self.setup, self.mesh
         ahead = [(k / count, 0) for k in range(1, count + 1)]
-        coords, done, index, folded = plan.coords, 0.0, 0, 0
-        warnings = [*self.case.warnings, *plan.warnings]
+        coords, done, index, folded = setup.coords, 0.0, 0, 0
+        warnings = [*self.case.warnings, *setup.warnings]
         told: list[str] = []
         worst = 0.0
         seconds = dict(self.seconds)
@@ -157,16 +157,16 @@ class Climb:
             part, halvings = ahead[0]
             total = index + len(ahead)
             watch = Watch(self._report(index + 1, total), seconds)
-            goal = plan.coords[plan.known] + plan.target * part
-            solution = _step(plan, coords, goal, watch, before)
-            moved = _moved(plan, coords, solution.displacement, goal)
-            points = _cartesian(plan, mesh.points, moved)
+            goal = setup.coords[setup.known] + setup.target * part
+            solution = _step(setup, coords, goal, watch, before)
+            moved = _moved(setup, coords, solution.displacement, goal)
+            points = _cartesian(setup, mesh.points, moved)
             if mesh.halo is not None:
                 points = mesh.halo.follow(mesh.points, points)
-                moved = _followed(plan, mesh.halo, points, moved)
+                moved = _followed(setup, mesh.halo, points, moved)
             if not np.all(np.isfinite(points)):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
-            unsound = unsoundness(plan, mesh, solution, moved, part)
+            unsound = unsoundness(setup, mesh, solution, moved, part)
             if halve:
                 now = quality(mesh.with_points(points), mesh).inverted
                 if (now > folded or unsound) and halvings < HALVINGS:
@@ -180,7 +180,7 @@ class Climb:
             before = solution
             ahead.pop(0)
             if solution.short and solution.max_error > worst:
-                told, worst = [_short_warning(plan, solution, index)], solution.max_error
+                told, worst = [_short_warning(setup, solution, index)], solution.max_error
             elif not told:
                 told = _dropped_warning(solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
@@ -199,7 +199,7 @@ class Climb:
         watch: Watch,
         warnings: list[str],
     ) -> Step:
-        plan = self.plan
+        setup = self.setup
         return Step(
             index,
             total,
@@ -207,12 +207,12 @@ class Climb:
             solution.control_nodes,
             solution.max_error,
             solution.condition,
-            plan.classes.counts(),
+            setup.classes.counts(),
             watch.seconds,
             tuple(warnings),
             solution.history,
             control=solution.control,
-            periodic_misfit=largest_misfit(plan.frame, plan.coords, points, plan.images),
+            periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
         )
 
 
@@ -224,7 +224,7 @@ def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
 
 
 def _step(
-    plan: Plan,
+    setup: Setup,
     coords: FloatArray,
     goal: FloatArray,
     watch: Watch,
@@ -235,70 +235,72 @@ def _step(
     Of periodic images only the one that stands for them is in the problem, and it is copied to
     the others.
     """
-    once = plan.once(plan.known)
-    known, classes = plan.known[once], plan.classes
-    normal_nodes, normals = plan.constraints(coords)
+    once = setup.once(setup.known)
+    known, classes = setup.known[once], setup.classes
+    normal_nodes, normals = setup.constraints(coords)
     problem = Problem(
-        basis=plan.basis,
-        features=plan.frame.features(coords),
+        basis=setup.basis,
+        features=setup.frame.features(coords),
         known=known,
         values=goal[once] - coords[known],
-        edge=classes.edge[plan.once(classes.edge)],
-        surface=classes.surface[plan.once(classes.surface)],
+        edge=classes.edge[setup.once(classes.edge)],
+        surface=classes.surface[setup.once(classes.surface)],
         normal_nodes=normal_nodes,
         normals=normals,
-        same_as=plan.same_as,
-        project=lambda nodes, free: plan.project(coords, nodes, free),
-        curved=plan.tracks.curved,
-        cartesian=plan.frame.points,
+        same_as=setup.same_as,
+        project=lambda nodes, free: setup.project(coords, nodes, free),
+        curved=setup.tracks.curved,
+        cartesian=setup.frame.points,
         coords=coords,
-        shift=plan.frame.shift(),
-        reduction=plan.reduction,
+        shift=setup.frame.shift(),
+        reduction=setup.reduction,
         before=before,
     )
-    found = plan.solve(problem, watch)
-    first, second = plan.images.T
+    found = setup.solve(problem, watch)
+    first, second = setup.images.T
     found.displacement[second] = found.displacement[first]
     return found
 
 
 def _moved(
-    plan: Plan, coords: FloatArray, displacement: FloatArray, goal: FloatArray
+    setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
     """Return the new coordinates; known nodes are where they must be."""
-    displacement[plan.axis, :2] = 0.0
+    displacement[setup.axis, :2] = 0.0
     # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
     moved = np.where(displacement == 0, coords, coords + displacement)
-    moved[plan.known] = np.where(goal == plan.coords[plan.known], plan.coords[plan.known], goal)
+    moved[setup.known] = np.where(
+        goal == setup.coords[setup.known], setup.coords[setup.known], goal
+    )
     return moved
 
 
-def _cartesian(plan: Plan, points: FloatArray, coords: FloatArray) -> FloatArray:
+def _cartesian(setup: Setup, points: FloatArray, coords: FloatArray) -> FloatArray:
     """Return the Cartesian points; nodes whose coordinates did not change keep every bit."""
-    if not plan.frame.cylindrical:
+    if not setup.frame.cylindrical:
         return coords
-    rest = np.all(coords == plan.coords, axis=1, keepdims=True)
-    return np.where(rest, points, plan.frame.points(coords))
+    rest = np.all(coords == setup.coords, axis=1, keepdims=True)
+    return np.where(rest, points, setup.frame.points(coords))
 
 
-def _followed(plan: Plan, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
+def _followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
     """Return the coordinates with those of copies where their donors put them.
 
     Periodic images are in place already, to the bit, and stay.
     """
-    copies = np.setdiff1d(halo.receivers, plan.images)
+    copies = np.setdiff1d(halo.receivers, setup.images)
     out = moved.copy()
-    out[copies] = plan.frame.coords(points[copies])
+    out[copies] = setup.frame.coords(points[copies])
     return out
 
 
-def _short_warning(plan: Plan, solution: Solution, index: int) -> str:
+def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
     """Return the sentence about a selection that ended above its tolerance."""
-    assert plan.reduction is not None
+    assert setup.reduction is not None
     return (
         f"step {index}: the data reduction ended with {solution.control_nodes} control nodes at "
         f"an error of {solution.max_error:.3g}, above its tolerance of "
-        f"{plan.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
+        f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
         "their displacement, but what is near them follows by the correction alone"
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from slideviz import terms
 from slideviz.case.model import Case, Translate
-from slideviz.deformation.setup import Plan, make_plan
+from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.solver import deform
 from slideviz.deformation.stepping import Progress, Step
 from slideviz.errors import Cancelled, SlidevizError
@@ -142,7 +142,7 @@ class _Shared:
     """What runs with the same method and mode have in common, and the time it took."""
 
     first: Combination
-    plan: Plan
+    setup: Setup
     seconds: float
     processor_seconds: float
 
@@ -200,8 +200,8 @@ def compare(
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:
     clock = _Clock()
     with clock:
-        plan = make_plan(combination.applied(case), mesh)
-    return _Shared(combination, plan, clock.seconds, clock.processor)
+        setup = make_setup(combination.applied(case), mesh)
+    return _Shared(combination, setup, clock.seconds, clock.processor)
 
 
 def _result(
@@ -214,7 +214,7 @@ def _result(
     """Return the result of a combination; only the deformation is timed."""
     applied = combination.applied(case)
     progress = (lambda now: tell(combination, now)) if tell else None
-    pulled = deform(applied, mesh, progress, shared.plan)
+    pulled = deform(applied, mesh, progress, shared.setup)
     clock = _Clock(shared.seconds, shared.processor_seconds)
     steps: list[Step] = []
     quality_of: list[tuple[float, float]] = []
@@ -240,7 +240,7 @@ def _result(
         condition=max(step.condition for step in steps),
         seconds=clock.seconds,
         processor_seconds=clock.processor,
-        tolerance=shared.plan.reduction.tolerance if shared.plan.reduction else None,
+        tolerance=shared.setup.reduction.tolerance if shared.setup.reduction else None,
         history=tuple((step.index, cycle) for step in steps for cycle in step.history),
         warnings=steps[-1].warnings,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from slideviz.deformation.setup import make_plan
+from slideviz.deformation.setup import make_setup
 from tests import test_real_meshes as real
 
 pytestmark = real.pytestmark
@@ -29,5 +29,5 @@ def test_boundaries_are_kept_and_images_move_alike(name, method, periodic):
     sliding = "ds" if method == "elastic" else "ps"
     mesh, case = real.make_case(name, sliding, periodic)
     case = case.change(method=method, reduction=None)
-    assert all("whose copy it is" in text for text in make_plan(case, mesh).warnings)
+    assert all("whose copy it is" in text for text in make_setup(case, mesh).warnings)
     real.check(mesh, case, real.load(real.CASES[name][0])[1])

@@ -67,7 +67,7 @@ def test_what_contradicts_the_case_is_known_before_anything_is_computed(square, 
     def never(*_):
         raise AssertionError("nothing is to be computed")
 
-    monkeypatch.setattr(comparing, "make_plan", never)
+    monkeypatch.setattr(comparing, "make_setup", never)
     wanted = combinations(("none", "ps"), ("fixed", "moving"), (1, 4))
     found = refused(square.case, square.mesh, wanted)
     assert set(found) == {Combination("none", "moving", n) for n in (1, 4)}
@@ -142,10 +142,10 @@ def test_the_plan_is_made_once_for_all_numbers_of_steps(square, monkeypatch):
 
     def counted(case, mesh):
         made.append((case.sliding, case.periodic))
-        return make_plan(case, mesh)
+        return make_setup(case, mesh)
 
-    make_plan = comparing.make_plan
-    monkeypatch.setattr(comparing, "make_plan", counted)
+    make_setup = comparing.make_setup
+    monkeypatch.setattr(comparing, "make_setup", counted)
     list(compare(square.case, square.mesh, combinations(("none", "ps"), ("none",), (1, 2, 3))))
     assert made == [("none", "none"), ("ps", "none")]
 
@@ -168,10 +168,10 @@ def test_a_combination_that_cannot_be_is_a_row_and_the_others_follow(rows):
 def test_a_run_that_fails_does_not_take_the_others_with_it(square, monkeypatch, problem, words):
     deform = comparing.deform
 
-    def failing(case, mesh, progress=None, plan=None):
+    def failing(case, mesh, progress=None, setup=None):
         if case.steps == 2:
             raise problem
-        return deform(case, mesh, progress, plan)
+        return deform(case, mesh, progress, setup)
 
     monkeypatch.setattr(comparing, "deform", failing)
     wanted = combinations(("ps",), ("none",), (1, 2, 3))
