@@ -51,7 +51,8 @@ def weighted_means(
     basis: Basis,
     targets: FloatArray,
     sources: FloatArray,
-    data: tuple[FloatArray, FloatArray],
+    values: FloatArray,
+    weights: FloatArray,
     power: float,
     tick: Tick = no_tick,
 ) -> FloatArray:
@@ -64,8 +65,8 @@ def weighted_means(
         rounding; its period chooses the distance.
     targets, sources : (k, N), (k, n)
         Features, as ``Frame.features`` gives them.
-    data : (n, d), (n,)
-        Values v_j and weights g_j.
+    values, weights : (n, d), (n,)
+        v_j and g_j.
     power
         c.
     tick
@@ -76,7 +77,7 @@ def weighted_means(
     if basis.period > 0:
         scale[1:3] = 1.0
     x, c = _rows(targets, 4) * scale, _rows(sources, 4) * scale
-    v, g = _rows(data[0].T, 3), np.ascontiguousarray(data[1], float)
+    v, g = _rows(values.T, 3), np.ascontiguousarray(weights, float)
     total = x.shape[1]
     out = np.empty((3, total))
     size = max(1, CHUNK // max(1, c.shape[1]))
@@ -90,7 +91,7 @@ def weighted_means(
                 weigh(part, c, v, g, power, result)
         out[:, start : start + size] = result
         tick(min(1.0, (start + size) / total))
-    return np.ascontiguousarray(out[: data[0].shape[1]].T)
+    return np.ascontiguousarray(out[: values.shape[1]].T)
 
 
 def _rows(values: FloatArray, rows: int) -> FloatArray:
@@ -112,14 +113,14 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
     for level in (problem.edge, problem.surface):
         if not len(level):
             continue
-        free = _at(problem, watch, (nodes, values), level, weights)
+        free = _at(problem, watch, nodes, values, level, weights)
         if problem.curved:
             free = within(problem, level, free)
         with watch.phase("project"):
             slid = problem.project(level, free)
         nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
     everywhere = np.arange(len(problem.coords))
-    displacement = _at(problem, watch, (nodes, values), everywhere, weights)
+    displacement = _at(problem, watch, nodes, values, everywhere, weights)
     errors = np.linalg.norm(displacement[nodes] - values, axis=1)
     displacement[nodes] = values
     return Solution(
@@ -134,12 +135,13 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
 def _at(
     problem: Problem,
     watch: Watch,
-    known: tuple[IntArray, FloatArray],
+    known: IntArray,
+    values: FloatArray,
     targets: IntArray,
     weights: Weights,
 ) -> FloatArray:
     """Return the displacements (m, d) of nodes from those of the known ones."""
-    nodes, values = merge(problem, *known)
+    nodes, values = merge(problem, known, values)
     own = np.where(np.any(values != 0, axis=1), 1.0, weights.fixed_weight)
     features = problem.features
     with watch.phase("evaluate") as tick:
@@ -147,7 +149,8 @@ def _at(
             problem.basis,
             features[:, targets],
             features[:, nodes],
-            (values, own),
+            values,
+            own,
             weights.power,
             tick,
         )

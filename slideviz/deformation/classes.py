@@ -65,16 +65,16 @@ def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:
 
 
 def find_classes(
-    case: Case, mesh: Mesh, surfaces: tuple[Boundary, Fans], frame: Frame, stands: IntArray
+    case: Case, mesh: Mesh, boundary: Boundary, fans: Fans, frame: Frame, stands: IntArray
 ) -> Classes:
     """Return the classes of all nodes, given which of its images stands for each (n,)."""
-    boundary, fans = surfaces
     normals = fan_normals(boundary, fans, mesh.points)
     return classify(
         fans,
         fan_roles(boundary, fans, case.roles),
         frame.turned_back(frame.coords(mesh.points[fans.fan_node]), normals),
         stands,
-        (case.sliding, case.periodic),
-        case.feature_angle_deg,
+        sliding=case.sliding,
+        periodic=case.periodic,
+        feature_angle_deg=case.feature_angle_deg,
     )

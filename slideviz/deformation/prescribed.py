@@ -68,8 +68,11 @@ def alikeness(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
 def prescribed(
     case: Case,
     mesh: Mesh,
+    *,
     frame: Frame,
-    surfaces: tuple[Boundary, Fans, Classes],
+    boundary: Boundary,
+    fans: Fans,
+    classes: Classes,
     moved: Displacements,
     alike: float,
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
@@ -84,7 +87,6 @@ def prescribed(
     if problem:
         raise CaseError(f"{mesh.name}: {problem}")
     remark = jump_message(case, mesh, moved.nodes, moved.vectors)
-    boundary, fans, classes = surfaces
     known = np.concatenate([classes.moving, classes.fixed])
     if not len(known):
         raise DeformError(
@@ -97,9 +99,9 @@ def prescribed(
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):
-        alone = find_classes(case, mesh, (boundary, fans), frame, np.arange(len(values)))
+        alone = find_classes(case, mesh, boundary, fans, frame, np.arange(len(values)))
         coords = frame.coords(mesh.points)
         corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
         normals = fan_normals(boundary, fans, coords, corners)
-        require_free(values, source, follow, (alone, normals), allowed)
+        require_free(values, source, follow, alone, normals, allowed)
     return known, values[known], (*moved.warnings, *((remark,) if remark else ()))

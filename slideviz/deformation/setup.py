@@ -163,14 +163,20 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
     beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
     coords = frame.coords(mesh.points)
     free = case.periodic in ("fixed", "moving")
-    classes = find_classes(case, mesh, (boundary, fans), frame, stands)
+    classes = find_classes(case, mesh, boundary, fans, frame, stands)
     classes = replace(classes, beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    moved = displaced(asked, mesh)
-    surfaces = boundary, fans, classes
-    alike = alikeness(case, mesh, pairs)
-    known, target, warnings = prescribed(case, mesh, frame, surfaces, moved, alike)
+    known, target, warnings = prescribed(
+        case,
+        mesh,
+        frame=frame,
+        boundary=boundary,
+        fans=fans,
+        classes=classes,
+        moved=displaced(asked, mesh),
+        alike=alikeness(case, mesh, pairs),
+    )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     reduction = _reduction(case, mesh.extent)
     tracks = find_tracks(
@@ -178,7 +184,9 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
         fans,
         classes,
         lambda nodes: corners_of(coords, nodes, axis),
-        (case.roles, case.feature_angle_deg, frame.shift() if free and pairs else None),
+        roles=case.roles,
+        feature_angle_deg=case.feature_angle_deg,
+        shift=frame.shift() if free and pairs else None,
         reach=REACH * largest,
     )
     second = np.flatnonzero(stands != np.arange(len(stands)))

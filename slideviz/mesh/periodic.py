@@ -149,7 +149,7 @@ def match(
     allowed = TOLERANCE * mesh.extent
     best: tuple[float, Pair] | None = None
     for one in kinds:
-        pair, worst = _match_kind(mesh, (first, second), one, (tuple(axis), tuple(origin)))
+        pair, worst = _match_kind(mesh, first, second, one, axis=axis, origin=origin)
         assert pair is not None
         if worst <= allowed:
             return pair
@@ -165,9 +165,12 @@ def match(
 
 def _match_kind(
     mesh: Mesh,
-    names: tuple[str, str],
+    first: str,
+    second: str,
     kind: str,
-    frame: tuple[tuple[float, ...], tuple[float, ...]],
+    *,
+    axis: Sequence[float],
+    origin: Sequence[float],
     bound: float = np.inf,
 ) -> tuple[Pair | None, float]:
     """Return the best pair of one kind and its largest mismatch (inf when not one to one).
@@ -175,9 +178,9 @@ def _match_kind(
     Nodes are looked for within ``bound`` of the images only: where there is none, there is no
     pair. That is a hundred times faster for boundaries that are far from matching.
     """
-    a, b = (mesh.marker(name).nodes for name in names)
+    a, b = (mesh.marker(name).nodes for name in (first, second))
     xa, xb = mesh.points[a], mesh.points[b]
-    axis, origin = (0.0, 0.0, 1.0) if mesh.dim == 2 else frame[0], frame[1]
+    axis = _Z if mesh.dim == 2 else axis
     vector, angle = np.zeros(mesh.dim), 0.0
     if kind == "translational":
         vector = ordered_sum(xb) / len(b) - ordered_sum(xa) / len(a)
@@ -199,7 +202,8 @@ def _match_kind(
     one_to_one &= kind == "rotational" or not len(np.intersect1d(a, b))
     trivial = max(float(np.linalg.norm(vector)) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
     pair = Pair(
-        *names,
+        first,
+        second,
         "translational" if kind == "translational" else "rotational",
         frozen_array(vector, np.float64),
         angle,
@@ -256,21 +260,23 @@ def pair_up(
     found = pairs_of(list(names), None)
     if found is None:
         period = next((reason for reason in reasons if "one period" in str(reason)), None)
-        raise period or _left_over(mesh, names, (kind, axis, origin), reasons[0])
+        raise period or _left_over(mesh, names, reasons[0], kind=kind, axis=axis, origin=origin)
     return found
 
 
 def _left_over(
     mesh: Mesh,
     names: Sequence[str],
-    how: tuple[PeriodicType, Sequence[float], Sequence[float]],
     first: MeshError,
+    *,
+    kind: PeriodicType,
+    axis: Sequence[float],
+    origin: Sequence[float],
 ) -> MeshError:
     """Return the error for markers that have no partner; it names the pairs that match, too.
 
-    ``how`` has kind, axis and origin of `pair_up`; without any pair, the error is ``first``.
+    Without any pair, the error is ``first``.
     """
-    kind, axis, origin = how
     kinds: tuple[PeriodicType, ...] = ("translational", "rotational") if kind == "auto" else (kind,)
     good: list[Pair] = []
     alone, why = list(names), "they are no images of each other; choose other markers"
@@ -343,8 +349,9 @@ def find_pairs(
             if count[first] != count[second] or taken & {first, second}:
                 continue
             going_on()
-            frame = (axis, (0.0, 0.0, 0.0))
-            pair, worst = _match_kind(mesh, (first, second), kind, frame, 2.0 * allowed)
+            pair, worst = _match_kind(
+                mesh, first, second, kind, axis=axis, origin=(0.0, 0.0, 0.0), bound=2.0 * allowed
+            )
             if pair is not None and worst <= allowed:
                 found.append(pair)
     return tuple(found)

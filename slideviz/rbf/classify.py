@@ -92,7 +92,9 @@ def classify(
     fan_role: np.ndarray,
     normals: FloatArray,
     stands: IntArray,
-    method: tuple[str, str],
+    *,
+    sliding: str,
+    periodic: str,
     feature_angle_deg: float,
 ) -> Classes:
     """Return the classes of all nodes.
@@ -106,12 +108,13 @@ def classify(
         images (``Frame.turned_back``).
     stands : (n,)
         For each node the one of its periodic images that stands for all of them.
-    method
-        ``(sliding, periodic)``: ``none``, ``ps`` or ``ds``, and ``none``, ``periodic``,
-        ``fixed`` or ``moving``.
+    sliding
+        ``none``, ``ps`` or ``ds``.
+    periodic
+        ``none``, ``periodic``, ``fixed`` or ``moving``.
     """
     at = stands[fans.fan_node]
-    effect = _effects(fan_role, at, *method)
+    effect = _effects(fan_role, at, sliding, periodic)
     total = len(stands)
     moving = _nodes_with(at, effect == "moving", total)
     fixed = _nodes_with(at, effect == "fixed", total) & ~moving
@@ -119,7 +122,7 @@ def classify(
     smooth, merge = np.cos(np.radians(feature_angle_deg * np.array([1.0, MERGE_FRACTION])))
     around = _Around(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
     rows, extra = _slide_rows(around, active)
-    if method[1] == "fixed":
+    if periodic == "fixed":
         # Vertices are held: nodes that would be fixed if the periodic markers slid, too.
         watched = active | ((fan_role == "periodic") & ~(moving | fixed)[at])
         _, held = _slide_rows(around, watched)
@@ -127,7 +130,7 @@ def classify(
         extra = np.concatenate([extra, held[touched[held]]])
     fixed[extra] = True
     keep = ~fixed[at[rows[:, 0]]]
-    return _collect((moving[stands], fixed[stands]), rows[keep], at, stands, normals.shape[1])
+    return _collect(moving[stands], fixed[stands], rows[keep], at, stands, normals.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +253,8 @@ def _rank(normals: FloatArray, labels: IntArray) -> int:
 
 
 def _collect(
-    known: tuple[np.ndarray, np.ndarray],
+    moving: np.ndarray,
+    fixed: np.ndarray,
     rows: IntArray,
     at: IntArray,
     stands: IntArray,
@@ -272,8 +276,8 @@ def _collect(
     slid, per_node = np.unique(cluster_node, return_counts=True)
     on_surface = (per_node == 1) if dim == 3 else np.zeros(len(slid), bool)
     return Classes(
-        np.flatnonzero(known[0]),
-        np.flatnonzero(known[1]),
+        np.flatnonzero(moving),
+        np.flatnonzero(fixed),
         slid[~on_surface],
         slid[on_surface],
         cluster_node,

@@ -77,7 +77,7 @@ def sliding_rows(problem: Problem) -> ConstraintRows:
     keep = np.ones(len(nodes), bool)
     for size in np.unique(count[mixed]):
         rows = starts[mixed & (count == size), None] + np.arange(size)
-        _orthonormalise(problem, (nodes, normals, right), rows, keep)
+        _orthonormalise(problem, nodes, normals, right, rows, keep)
     return ConstraintRows(stands[keep], normals[keep], right[keep, None])
 
 
@@ -99,7 +99,9 @@ def blocks(rows: ConstraintRows) -> IntArray:
 
 def _orthonormalise(
     problem: Problem,
-    system: tuple[IntArray, FloatArray, FloatArray],
+    nodes: IntArray,
+    normals: FloatArray,
+    right: FloatArray,
     rows: IntArray,
     keep: np.ndarray,
 ) -> None:
@@ -107,13 +109,12 @@ def _orthonormalise(
 
     Parameters
     ----------
-    system
-        Nodes (r,), normals (r, d) and right-hand sides (r,).
+    nodes, normals, right : (r,), (r, d), (r,)
+        The constraints, ``right`` their right-hand sides.
     rows : (g, k)
         The k rows of each group of coinciding nodes.
     keep : (r,) bool
     """
-    nodes, normals, right = system
     for k, row in enumerate(rows.T):
         n, b = normals[row], right[row]
         for other in rows.T[:k]:

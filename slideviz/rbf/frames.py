@@ -144,7 +144,6 @@ def make_frame(
     pairs: Sequence[Pair],
     *,
     periodic_distance: bool,
-    rotational_about: tuple[Sequence[float], Sequence[float]] | None = None,
 ) -> Frame:
     """Return the frame that periodic pairs ask for.
 
@@ -156,8 +155,6 @@ def make_frame(
         The periodic pairs; all have one period. Empty: not periodic.
     periodic_distance
         False keeps the frame of the pairs but with the plain distance (PERIODIC_MODE= none).
-    rotational_about
-        Axis and origin of a cylindrical frame without pairs.
     """
     dim = points.shape[1]
     if pairs and pairs[0].kind == "translational":
@@ -165,17 +162,15 @@ def make_frame(
             return Frame(dim)
         length = pairs[0].period
         return Frame(dim, direction=pairs[0].vector / length, period=length)
-    if pairs:
-        rotational_about = pairs[0].axis, pairs[0].origin
-    if rotational_about is None:
+    if not pairs:
         return Frame(dim)
-    axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(rotational_about[0], float)
-    origin = np.asarray(rotational_about[1], float)
+    axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(pairs[0].axis, float)
+    origin = np.asarray(pairs[0].origin, float)
     local = in_axis_frame(points, axis, origin)
     radii = np.hypot(local[:, 0], local[:, 1])
     return Frame(
         dim,
-        period=pairs[0].period if pairs and periodic_distance else 0.0,
+        period=pairs[0].period if periodic_distance else 0.0,
         axis=axis,
         origin=origin,
         theta0=_middle_angle(np.arctan2(local[:, 1], local[:, 0])[radii > 1e-9 * radii.max()]),

@@ -98,7 +98,8 @@ def require_free(
     values: FloatArray,
     source: IntArray,
     nodes: IntArray,
-    alone: tuple[Classes, FloatArray],
+    classes: Classes,
+    normals: FloatArray,
     allowed: float,
 ) -> None:
     """Raise DeformError when nodes may not move as the images that they follow.
@@ -109,14 +110,16 @@ def require_free(
         As ``spread`` returns them.
     nodes : (m,)
         Those that move only because an image does.
-    alone
-        The classes as if there were no images, and the normals of all fans in the frame.
+    classes
+        As if there were no images.
+    normals : (m, d)
+        Of all fans, in the frame.
     """
     off = np.zeros(len(values))
-    held = np.isin(alone[0].fixed, nodes)
-    off[alone[0].fixed[held]] = np.abs(values[alone[0].fixed[held]]).max(axis=1, initial=0.0)
-    rows, normals = directions(*alone)
-    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", values[rows], normals)))
+    held = classes.fixed[np.isin(classes.fixed, nodes)]
+    off[held] = np.abs(values[held]).max(axis=1, initial=0.0)
+    rows, across = directions(classes, normals)
+    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", values[rows], across)))
     worst = int(nodes[np.argmax(off[nodes])])
     if off[worst] > allowed:
         refuse(worst, int(source[worst]), float(off[worst]))

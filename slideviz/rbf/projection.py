@@ -72,7 +72,10 @@ def find_tracks(
     fans: Fans,
     classes: Classes,
     place: Callable[[IntArray], FloatArray],
-    settings: tuple[Mapping[str, str], float, FloatArray | None],
+    *,
+    roles: Mapping[str, str],
+    feature_angle_deg: float,
+    shift: FloatArray | None,
     reach: float = 0.0,
 ) -> Tracks:
     """Return the tracks of all sliding nodes.
@@ -81,13 +84,13 @@ def find_tracks(
     ----------
     place : callable
         Corners (f, k, d) of facets or segments (f, k) in the undeformed working frame.
-    settings
-        Roles by marker, feature angle in degrees, and the shift (d,) of one period by which
-        tracks are continued beyond periodic boundaries (None: they end there).
+    roles
+        By marker.
+    shift : (d,) or None
+        One period, by which tracks are continued beyond periodic boundaries; None: they end there.
     reach
         How far tracks are continued where moving boundaries stand on them.
     """
-    roles, angle_deg, shift = settings
     of_node = np.full(classes.total, -1, np.int64)
     tracks: list[ClosestPoints] = []
     curved = False
@@ -95,7 +98,7 @@ def find_tracks(
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
     across = _across(boundary, classes.stands, roles) if shift is not None else None
-    labels = _surface_labels(boundary, corner_vectors(sides), roles, angle_deg, across)
+    labels = _surface_labels(boundary, corner_vectors(sides), roles, feature_angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
     fan_facet[fans.fan] = fans.facet

@@ -89,7 +89,7 @@ class NodeTypes:
             except MeshError:  # until its markers match, the case is as without periodicity
                 alone = case.change(periodic="none", periodic_type="translational")
                 _, frame, stands = find_period(alone, mesh, boundary)
-            classes = find_classes(case, mesh, (boundary, self._fans[2]), frame, stands)
+            classes = find_classes(case, mesh, boundary, self._fans[2], frame, stands)
         except SlidevizError:
             return NOTHING  # what is wrong with the case is said beside the Run button
         place = {kind: index for index, kind in enumerate(NODE_TYPES)}

@@ -27,7 +27,15 @@ def found(mesh, roles, method=("ps", "none"), angle=40.0, images=()):
     for first, second in images:
         stands[second] = first
     role = fan_roles(boundary, fans, roles)
-    classes = classify(fans, role, normals, stands, method, angle)
+    classes = classify(
+        fans,
+        role,
+        normals,
+        stands,
+        sliding=method[0],
+        periodic=method[1],
+        feature_angle_deg=angle,
+    )
     return classes, directions(classes, normals)
 
 

@@ -65,9 +65,23 @@ def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points)
     normals, stands = fan_normals(boundary, fans, mesh.points), np.arange(len(mesh.points))
-    classes = classify(fans, fan_roles(boundary, fans, roles), normals, stands, method, 40.0)
+    classes = classify(
+        fans,
+        fan_roles(boundary, fans, roles),
+        normals,
+        stands,
+        sliding=method[0],
+        periodic=method[1],
+        feature_angle_deg=40.0,
+    )
     return classes, find_tracks(
-        boundary, fans, classes, lambda nodes: mesh.points[nodes], (roles, 40.0, shift)
+        boundary,
+        fans,
+        classes,
+        lambda nodes: mesh.points[nodes],
+        roles=roles,
+        feature_angle_deg=40.0,
+        shift=shift,
     )
 
 
