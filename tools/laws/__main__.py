@@ -16,8 +16,7 @@ from slideviz.deformation.solver import deform
 from slideviz.errors import SlidevizError
 from slideviz.mesh.io.files import write
 from tools.laws.cases import random_run
-from tools.laws.check import Outcome, check
-from tools.laws.simplify import simplified
+from tools.laws.check import Outcome, check, simplified
 
 EVERY_LOOP = (58, 6, 34, 25, 38, 76, 99, 1, 95, 35, 59, 60)
 """Seeds that together use all methods, frames and types of cells."""
