@@ -111,12 +111,14 @@ def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, 
 def title_of(folder, monkeypatch, mesh, *options):
     from slideviz.plots import section_picture
 
-    seen = []
-    monkeypatch.setattr(section_picture, "write_title", lambda *words: seen.append(words))
+    seen, real = [], section_picture.draw_section
+    monkeypatch.setattr(
+        section_picture, "draw_section", lambda *given: seen.append(real(*given)) or seen[-1]
+    )
     assert call(folder, mesh, "--plane", "z=0.55", *options) in (0, 3)
-    ((_, _, _, second),) = seen
+    (figure,) = seen
     monkeypatch.undo()
-    return second
+    return figure.get_suptitle().replace("\n", " ")
 
 
 def test_in_2d_a_section_is_a_line_or_a_circle(folder, capsys):

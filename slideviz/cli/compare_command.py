@@ -206,9 +206,9 @@ def _drawn(
     arguments: argparse.Namespace, case: Case, mesh: Mesh, rows: Sequence[Row], folder: Path
 ) -> list[Path]:
     """Return the plots and pictures written."""
-    from slideviz.study.panels import profiler
+    from slideviz.study.facets import profiler
+    from slideviz.study.montage import DPI, montage
     from slideviz.study.plots import figures, save_figure, steps_name
-    from slideviz.study.sheets import DPI, sheet
 
     span = None if arguments.span == "none" else profiler(case, mesh, arguments.span)
     files = []
@@ -216,7 +216,7 @@ def _drawn(
         files += save_figure(figure, folder, name)
     if not arguments.no_pictures:
         for steps in dict.fromkeys(row.combination.steps for row in rows):
-            pictures = sheet([row for row in rows if row.combination.steps == steps], mesh)
+            pictures = montage([row for row in rows if row.combination.steps == steps], mesh)
             if pictures is not None:
                 name = f"quality_{steps_name(steps)}"
                 files += save_figure(pictures, folder, name, DPI, (".png",))

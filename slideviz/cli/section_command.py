@@ -93,7 +93,12 @@ def section(arguments: argparse.Namespace) -> int:
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint
-    from slideviz.plots.section_picture import SectionStyle, require_picture_name, section_picture
+    from slideviz.plots.section_picture import (
+        SectionStyle,
+        Shown,
+        require_picture_name,
+        section_picture,
+    )
     from slideviz.sections.cut import Cutter
     from slideviz.sections.polygons import joined
     from slideviz.session.passages import show_passages
@@ -125,9 +130,9 @@ def section(arguments: argparse.Namespace) -> int:
     name = Path(mesh.name).name
     note = "" if base is not None or painted.label == "skew" else NONE
     size, trimmed = arguments.size or SectionStyle.size, arguments.size is None
-    style = SectionStyle(size, trimmed, arguments.edges, arguments.in_space, name, note=note)
-    around = surroundings(cutter, mesh.points, matrices)
-    section_picture(pieces, chosen, painted, arguments.output, style, around)
+    style = SectionStyle(size, trimmed, arguments.edges, arguments.in_space, name)
+    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, matrices), note=note)
+    section_picture([shown], chosen, arguments.output, style)
     summary = painted.summary(ids)
     report: dict[str, Any] = {
         "mesh": mesh.name,

@@ -11,8 +11,12 @@ from slideviz.errors import CaseError
 from slideviz.export.titles import pair_names
 from slideviz.plots.around import surroundings
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, require_picture_name, section_picture
-from slideviz.plots.section_picture_pair import Shown, pair_picture
+from slideviz.plots.section_picture import (
+    SectionStyle,
+    Shown,
+    require_picture_name,
+    section_picture,
+)
 from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -74,12 +78,9 @@ def save_section(
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     style = SectionStyle(paper.size, True, session.view.edges, name=name, dpi=paper.dpi)
-    if len(shown) == 2:
-        pair_picture((shown[0], shown[1]), section, path, style)
-        return path
-    (one,) = shown
-    style = replace(style, state=state_words(session), note=one.note)
-    section_picture(one.pieces, section, one.paint, path, style, one.around)
+    if len(shown) == 1:
+        shown = [replace(shown[0], name=state_words(session), place="")]
+    section_picture(shown, section, path, style)
     return path
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from slideviz.color_scheme import PAPER
 from slideviz.mesh.model import FloatArray
+from slideviz.plots.cells import boxes_of, draw_cells
 from slideviz.sections.cut import Cutter
 from slideviz.sections.line import Box, trace
 from slideviz.sections.model import Section
@@ -67,19 +68,17 @@ def draw_around(axes: Any, around: Polygons, section: Section, box: Box) -> None
     box : (2,), (2,) float64
         What the axes show.
     """
-    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.collections import LineCollection
 
-    corner = around.points[around.connectivity, :2]
-    low = np.minimum.reduceat(corner, around.offsets[:-1])
-    high = np.maximum.reduceat(corner, around.offsets[:-1])
+    low, high = boxes_of(around)
     seen = around.take(np.flatnonzero(((high >= box[0]) & (low <= box[1])).all(axis=1)))
     if len(seen):
-        rings = np.split(seen.points[seen.connectivity, :2], seen.offsets[1:-1])
         many = len(seen) > MOST
-        faint = PolyCollection(
-            rings, facecolors=_FACE, edgecolors=_FACE if many else _EDGE, linewidths=0.3, zorder=0
-        )
-        faint.set_rasterized(many)
-        axes.add_collection(faint, autolim=False)
+        look: dict[str, Any] = {
+            "facecolors": _FACE,
+            "edgecolors": _FACE if many else _EDGE,
+            "linewidths": 0.3,
+        }
+        draw_cells(axes, seen, None, **look, zorder=0).set_rasterized(many)
     line = LineCollection(trace(section, box), colors=PAPER.text, linewidths=_LINE, zorder=3)
     axes.add_collection(line, autolim=False)

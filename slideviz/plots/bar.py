@@ -1,33 +1,101 @@
-"""The numbers beside a colour bar of matplotlib."""
+"""Colour bars of matplotlib: numbers at their ends, and what is drawn as inverted."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from slideviz.color_scheme import INVERTED_COLOUR, PAPER
 from slideviz.plots.ticks import bar_ticks
 
+_LINE = 0.6
+"""Points of the outline."""
+_THICK, GAP = 0.14, 0.12
+"""Inches of a bar, and between it and what it stands beside."""
+BELOW = 0.62
+"""Inches between axes with numbers and a label, and a bar below them."""
 
-def number_bar(bar: Any, limits: tuple[float, float], inches: float, letters: float) -> None:
-    """Write as many numbers beside a colour bar as there is room for, and those of its ends.
+
+def beside(axes: Any) -> Any:
+    """Return axes for a bar at the right of others, as high as these and laid out with them."""
+    from matplotlib.transforms import ScaledTranslation, blended_transform_factory
+
+    right = axes.figure.dpi_scale_trans + ScaledTranslation(1.0, 0.0, axes.transAxes)
+    place = blended_transform_factory(right, axes.transAxes)
+    return axes.inset_axes((GAP, 0.0, _THICK, 1.0), transform=place)
+
+
+def below(axes: Any, length: float, gap: float = BELOW) -> Any:
+    """Return axes for a bar below others, laid out with them; of that length and gap in inches."""
+    from matplotlib.transforms import ScaledTranslation
+
+    middle = axes.figure.dpi_scale_trans + ScaledTranslation(0.5, 0.0, axes.transAxes)
+    return axes.inset_axes((-length / 2.0, -gap - _THICK, length, _THICK), transform=middle)
+
+
+def color_bar(
+    axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
+) -> Any:
+    """Draw a colour bar, which has as many numbers as there is room for, and return it.
 
     Parameters
     ----------
-    bar : matplotlib.colorbar.Colorbar
-    limits : (float, float)
-        What its ends stand for.
-    inches : float
-        Its length.
+    axes : matplotlib.axes.Axes
+        What becomes the bar; see `beside` and `below`.
+    scale : matplotlib.cm.ScalarMappable
+        See `slideviz.plots.cells.color_scale`.
+    label : str
     letters : float
-        Typographic points.
+        Typographic points of the numbers; the label has one more.
+    inverted : bool
+        Show below its lower end the colour of inverted cells.
+    upright : bool
+        It is vertical.
     """
+    from matplotlib.cm import ScalarMappable
+
+    bar = axes.figure.colorbar(
+        ScalarMappable(scale.norm, scale.cmap.with_extremes(under=INVERTED_COLOUR)),
+        cax=axes,
+        orientation="vertical" if upright else "horizontal",
+        extend="min" if inverted else "neither",
+        extendfrac=0.05,
+    )
+    bar.set_label(label, fontsize=letters + 1.0)
+    axes.tick_params(labelsize=letters, width=_LINE, length=3, labelcolor=PAPER.text)
+    bar.outline.set_linewidth(_LINE)
+    bar.solids.set_rasterized(False)
+    bar.solids.set_edgecolor("face")
+    _number(bar, scale.get_clim(), letters)
+    if inverted:
+        # Beyond the triangle, clear of the numbers.
+        at, ha, va = ((0.0, -0.07), "left", "top") if upright else ((-0.07, 0.5), "right", "center")
+        style = {"fontsize": letters, "color": PAPER.text, "transform": axes.transAxes}
+        axes.text(*at, "inverted", ha=ha, va=va, **style)
+    return bar
+
+
+def _number(bar: Any, limits: tuple[float, float], letters: float) -> None:
+    """Have numbers at both ends of a bar and between them, by the length it is drawn with."""
     from matplotlib.textpath import TextPath
+    from matplotlib.ticker import FuncFormatter, Locator
 
-    def part(label: str) -> float:
-        box = TextPath((0.0, 0.0), label, size=letters).get_extents()
-        # A little air, for digits that nearly touch read as one number.
-        points = 1.4 * box.height if bar.orientation == "vertical" else box.width + 0.6 * letters
-        return float(points / (72.0 * inches))
+    upright, form = bar.orientation == "vertical", "%g"
 
-    at, form = bar_ticks(*limits, part)
-    bar.set_ticks(at, labels=[form % value for value in at])
-    bar.ax.minorticks_off()
+    class Ends(Locator):
+        def __call__(self) -> Any:
+            nonlocal form
+            long = bar.ax.bbox.height if upright else bar.ax.bbox.width
+            points = max(72.0 * long / bar.ax.figure.dpi, letters)
+
+            def part(text: str) -> float:
+                box = TextPath((0.0, 0.0), text, size=letters).get_extents()
+                # A little air, for digits that nearly touch read as one number.
+                size = 1.4 * box.height if upright else box.width + 0.6 * letters
+                return float(size / points)
+
+            at, form = bar_ticks(*limits, part)
+            return at
+
+    bar.locator = Ends()
+    bar.formatter = FuncFormatter(lambda value, _: form % value)
+    bar.minorticks_off()

@@ -1,8 +1,8 @@
-"""Pictures of sections, drawn with matplotlib: PNG, SVG and PDF alike."""
+"""Pictures of a section, of one run or of two, drawn with matplotlib: PNG, SVG and PDF alike."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,31 +11,40 @@ import numpy as np
 
 from slideviz.color_scheme import PAPER
 from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.around import draw_around, window
+from slideviz.plots.bar import BELOW, GAP, below, beside, color_bar
+from slideviz.plots.cells import THICKEST, color_scale, draw_cells
 from slideviz.plots.section_curve import Colours, CurveRow, curve_of, draw_curves, position_label
-from slideviz.plots.section_dress import add_bar, dress_axes
-from slideviz.plots.section_layout import (
-    Layout,
-    height_for,
-    inches_of,
-    lay_out,
-    plot_layout,
-    room_ratio,
-)
 from slideviz.plots.section_paint import Paint
-from slideviz.plots.section_polygons import shapes_of
-from slideviz.plots.section_space import in_space
-from slideviz.plots.section_title import LETTERS, write_title
+from slideviz.plots.section_space import camera, in_space
 from slideviz.plots.style import PRINT
-from slideviz.plots.written import figure_bytes
+from slideviz.plots.written import empty_figure, fitted, lay_out, trim, write_figure
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 from slideviz.sections.shape import Label
 from slideviz.terms import QUANTITIES
 
 SUFFIXES = (".png", ".svg", ".pdf")
+
+TITLE, LETTERS = 10.0, 9.0
+"""Points of the letters of the title, and of all others."""
+_LETTER_WIDTH = 0.075
+"""Inches that a letter of a label takes."""
+_LONGEST = 36
+"""Letters of a name at the head of a title."""
+
+_SIDES, _ENDS, _BAR = 0.7, 1.0, 0.7
+"""Inches, about, that numbers and labels take beside the axes, these and titles above and below
+them, and the colour bar on its side; by them it is decided what stands where."""
+_HIGHER = {True: 1.4, False: 2.0}
+"""The picture of two may be so many times as high as that of one, where they are beside or above
+each other."""
+_NARROWEST = 2.2
+"""Inches that two sections beside each other need for their titles."""
+_THIN, _MARGIN = 25.0, 0.02
+"""Sections longer than so many times their height get air around them; all get a little, as a part
+of their length."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +63,10 @@ class SectionStyle:
         Show it in space instead of flat.
     name : str
         What was cut: it stands before the section in words, shortened where there is no room.
-    state : str
-        Which state of it: run, method and step.
     dpi : float, optional
         Pixels per inch; left out, letters can be read when the picture is as wide as a page.
-    note : str
-        Stands behind the numbers of the title.
+    title : bool
+        Say above it what was cut, where, and with which quality.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -67,9 +74,64 @@ class SectionStyle:
     edges: bool = True
     in_space: bool = False
     name: str = ""
-    state: str = ""
     dpi: float | None = None
+    title: bool = True
+
+    @property
+    def inches(self) -> tuple[float, float]:
+        """Return width and height on paper."""
+        return self.size[0] / self.pixels_per_inch, self.size[1] / self.pixels_per_inch
+
+    @property
+    def pixels_per_inch(self) -> float:
+        """Return the resolution: small pictures are printed small and large ones in full width."""
+        return self.dpi or self.size[0] / float(np.clip(self.size[0] / 200.0, 5.0, 10.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a section shows of one run.
+
+    Attributes
+    ----------
+    pieces : mapping of int to Polygons
+        What the section shows of each passage; 0 is the mesh itself (see
+        `slideviz.session.passages.show_passages`).
+    paint : Paint
+        Its numbers are those of the cells that the pieces name.
+    around : Polygons, optional
+        The other cells of a 2D mesh (see `slideviz.plots.around.surroundings`).
+    name, place : str
+        Which run it is, and which step of it.
+    note : str
+        Stands behind the numbers of the title.
+    """
+
+    pieces: Mapping[int, Polygons]
+    paint: Paint
+    around: Polygons | None = None
+    name: str = ""
+    place: str = ""
     note: str = ""
+
+    @property
+    def drawn(self) -> dict[int, Polygons]:
+        """Return the pieces in which something is cut."""
+        return {number: piece for number, piece in self.pieces.items() if len(piece)}
+
+    @property
+    def ids(self) -> IntArray:
+        """Return the cells that are cut: of the mesh itself, or, where it is not cut, of all."""
+        drawn = self.drawn
+        return drawn[0].cell_ids if 0 in drawn else joined(list(drawn.values())).cell_ids
+
+    @property
+    def numbers(self) -> str:
+        """Return step, minimum and mean in words."""
+        found = self.paint.sentence(self.ids) if self.drawn else "no cell is cut"
+        if self.place:
+            found = f"{self.place}: {found.removeprefix(f'{self.paint.label}: ')}"
+        return "; ".join(part for part in (found, self.note) if part)
 
 
 def require_picture_name(file: Path) -> None:
@@ -85,170 +147,211 @@ def require_picture_name(file: Path) -> None:
 
 
 def section_picture(
-    pieces: Mapping[int, Polygons],
-    section: Section,
-    paint: Paint,
-    file: str | Path,
-    style: SectionStyle | None = None,
-    around: Polygons | None = None,
+    shown: Sequence[Shown], section: Section, file: str | Path, style: SectionStyle | None = None
 ) -> None:
     """Write the picture of a section; of a cut through a 2D mesh, the curve along it.
 
     Parameters
     ----------
-    pieces : mapping of int to Polygons
-        What the section shows of each passage; 0 is the mesh itself (see
-        `slideviz.session.passages.show_passages`).
+    shown : sequence of Shown
+        One run, or two: left or above, and right or below.
     section : Section
-    paint : Paint
-        Its numbers are those of the cells that the pieces name.
     file : str or Path
         Ends with .png, .svg or .pdf.
     style : SectionStyle, optional
-    around : Polygons, optional
-        The other cells of a 2D mesh (see `slideviz.plots.around.surroundings`).
 
     Raises
     ------
     CaseError
         There is nothing to draw, the name has another end, or the file cannot be written.
     """
-    target, style = Path(file), style or SectionStyle()
+    target = Path(file)
     require_picture_name(target)
-    figure, dpi = draw_section(pieces, section, paint, style, around)
-    write_figure(figure, dpi, target)
+    figure = draw_section(shown, section, style or SectionStyle())
+    write_figure(figure, target, figure.dpi if target.suffix.lower() == ".png" else 300.0)
 
 
-def write_figure(figure: Any, dpi: float, target: Path) -> None:
-    """Write a matplotlib figure, whole or not at all.
-
-    Raises
-    ------
-    CaseError
-        The file cannot be written.
-    """
-    kind = target.suffix.lower()[1:]
-    data = figure_bytes(figure, kind, dpi if kind == "png" else 300)
-    with atomic_write(target, CaseError) as out:
-        out.write(data)
-
-
-def draw_section(
-    pieces: Mapping[int, Polygons],
-    section: Section,
-    paint: Paint,
-    style: SectionStyle,
-    around: Polygons | None = None,
-) -> tuple[Any, float]:
-    """Return the matplotlib figure of a section, and its pixels per inch.
+def draw_section(shown: Sequence[Shown], section: Section, style: SectionStyle) -> Any:
+    """Return the matplotlib figure of a section of one run, or of two.
 
     Raises
     ------
     CaseError
         There is nothing to draw.
     """
-    drawn = {number: piece for number, piece in pieces.items() if len(piece)}
-    if not drawn:
+    every = [piece for one in shown for piece in one.drawn.values()]
+    if not every:
         raise CaseError(f"{section.describe()}: it cuts no cell, so there is nothing to draw")
-    figure, dpi = empty_figure(style)
-    lines = all(piece.sizes.max() == 2 for piece in drawn.values())
+    alone = len(shown) == 1
+    figure = empty_figure(style.inches, style.pixels_per_inch, "compressed")
+    lines = all(piece.sizes.max() == 2 for piece in every)
+    if style.title:
+        in_plane = not any(piece.points[:, 2].any() for piece in every)
+        what = section.describe(2 if in_plane else 3)
+        words = ", ".join(part for part in (shown[0].name * alone, what) if part)
+        named = [f"{one.name}, {one.numbers}" for one in shown] if lines else []
+        _head(figure, (style.name, words), [shown[0].numbers] if alone else named)
     if lines:
-        layout = _curve(figure, joined(list(drawn.values())), section, paint)
+        _curves(figure, shown, section)
     else:
-        layout = _cells(figure, drawn, section, paint, style, around)
-    ids = ids_of(drawn)
-    in_plane = not any(piece.points[:, 2].any() for piece in drawn.values())
-    what = section.describe(2 if in_plane else 3)
-    words = ", ".join(part for part in (style.state, what) if part)
-    numbers = "; ".join(part for part in (paint.sentence(ids), style.note) if part)
-    write_title(figure, layout, (style.name, words), numbers)
-    return figure, dpi
+        _cells(figure, shown, section, style)
+    return figure
 
 
-def empty_figure(style: SectionStyle) -> tuple[Any, float]:
-    """Return an empty figure of the size that is asked for, and its pixels per inch."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    width, height, dpi = inches_of(style.size, style.dpi)
-    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure, dpi
-
-
-def ids_of(drawn: Mapping[int, Polygons]) -> IntArray:
-    """Return the cells that are cut: of the mesh itself, or, where it is not cut, of all."""
-    every = np.unique(np.concatenate([piece.cell_ids for piece in drawn.values()]))
-    return drawn[0].cell_ids if 0 in drawn else every
+def _head(figure: Any, first: tuple[str, str], rest: Sequence[str]) -> None:
+    """Write the title of a figure; a long name at the head of it makes way for the rest."""
+    name, words = first
+    if len(name) > _LONGEST:
+        name = f"{name[: _LONGEST // 2]}…{name[-_LONGEST // 2 :]}"
+    said = "\n".join([f"{name}: {words}" if name else words, *rest])
+    fits, size = fitted(said, figure.get_size_inches()[0] - 0.2, TITLE)
+    figure.suptitle(fits, fontsize=size)
 
 
-def _cells(
-    figure: Any,
-    drawn: Mapping[int, Polygons],
-    section: Section,
-    paint: Paint,
-    style: SectionStyle,
-    around: Polygons | None,
-) -> Layout:
-    """Draw polygons, with a colour bar."""
-    flat, labels = laid_flat(drawn, section, style)
-    flat = folded_last(flat, section, paint)
-    corners = flat.points[flat.connectivity, :2]
-    box, inches = (corners.min(axis=0), corners.max(axis=0)), figure.get_size_inches()
-    if around is not None:
-        box = window(box, around, room_ratio(inches))
-    if style.trimmed:
-        inches = inches[0], height_for(box, inches, bare=style.in_space)
-        figure.set_size_inches(inches)
-    layout = lay_out(box, inches, bare=style.in_space)
-    axes = figure.add_axes(layout.axes)
-    if around is not None:
-        draw_around(axes, around, section, (layout.low, layout.high))
-    shapes = shapes_of(flat, paint, layout.points_per_length, style.edges, lit=style.in_space)
-    axes.add_collection(shapes)
-    dress_axes(axes, layout, labels)
-    if style.in_space:
-        _triad(figure, drawn, section)
-    inverted = any(paint.inverted[piece.cells].any() for piece in drawn.values())
-    add_bar(figure, layout, paint, inverted)
-    return layout
-
-
-def _curve(figure: Any, lines: Polygons, section: Section, paint: Paint) -> Layout:
-    """Draw the numbers along a line or circle."""
-    curve = curve_of(lines, section, paint.values, paint.inverted)
-    return plot_curves(figure, [CurveRow("", curve)], section, paint)
-
-
-def plot_curves(figure: Any, rows: list[CurveRow], section: Section, paint: Paint) -> Layout:
-    """Draw curves along a section into one plot, the last one with its colours below."""
-    layout = plot_layout(figure.get_size_inches())
+def _curves(figure: Any, shown: Sequence[Shown], section: Section) -> None:
+    """Draw the numbers along a line or circle into one plot, the first with its colours below."""
+    rows = []
+    for one in reversed(shown):
+        if one.drawn:
+            lines = joined(list(one.drawn.values()))
+            curve = curve_of(lines, section, one.paint.values, one.paint.inverted)
+            rows.append(CurveRow(one.name * (len(shown) > 1), curve))
+    paint = shown[0].paint
     labels = position_label(section).full, QUANTITIES[paint.label].axis
     colours = Colours(paint.colour_map, paint.limits)
-    style = replace(PRINT, size=LETTERS)
-    draw_curves(figure.add_axes(layout.axes), rows, labels, style, colours)
-    return layout
+    draw_curves(figure.add_subplot(), rows, labels, replace(PRINT, size=LETTERS), colours)
 
 
-def folded_last(flat: Polygons, section: Section, paint: Paint) -> Polygons:
-    """Return what lies on paper in the order in which it is drawn."""
-    if section.whole:
-        return flat
-    # Nothing is in front of another, but folded cells overlap: show them.
-    return flat.take(np.argsort(paint.inverted[flat.cells], kind="stable"))
+def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: SectionStyle) -> None:
+    """Draw polygons, with one colour bar."""
+    flats, labels = _laid_beside(shown, section, style)
+    corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in flats if len(flat)])
+    box = corners.min(axis=0), corners.max(axis=0)
+    width, height = figure.get_size_inches()
+    for one in shown:
+        if one.around is not None:
+            box = window(box, one.around, (width - _SIDES - _BAR) / max(height - _ENDS, 0.1))
+    low, high = aired(*box)
+    upright, scale = arranged(high - low, (width, height), len(shown))
+    if len(shown) > 1:
+        figure.set_size_inches(width, _HIGHER[upright] * height)
+        lay_out(figure, "constrained" if upright else "compressed")
+    grid = (1, len(shown)) if upright else (len(shown), 1)
+    every = figure.subplots(*grid, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, one in zip(every, shown, strict=True):
+        axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        if len(shown) > 1:
+            said = f"{one.name}\n{one.numbers}" if style.title else one.name
+            room = (width - _SIDES - _BAR) / 2.0 if upright else width - _SIDES
+            words, size = fitted(said, room, LETTERS)
+            axes.set_title(words, fontsize=size)
+    paint = shown[0].paint
+    colors = color_scale(paint.colour_map, paint.limits)
+    folded = [
+        one.paint.inverted[piece.cells].any() for one in shown for piece in one.drawn.values()
+    ]
+    if upright:
+        place = beside(every[-1])
+    else:  # it has room for its numbers also where the axes are narrow
+        long = max(0.6 * scale * (high - low)[0], min(2.0, width - 1.5))
+        place = below(every[-1], long, GAP if style.in_space else BELOW)
+    of = paint.label, LETTERS - 1.0
+    color_bar(place, colors, *of, inverted=any(folded), upright=upright)
+    figure.draw_without_rendering()
+    for axes in every:
+        _dress(axes, labels)
+    if style.trimmed:
+        trim(figure, [every] if upright else [[axes] for axes in every])
+    figure.draw_without_rendering()
+    for axes, one, flat in zip(every, shown, flats, strict=True):
+        if one.around is not None:
+            draw_around(axes, one.around, section, (low, high))
+        if len(flat):
+            values = one.paint.shown(flat.cells)
+            draw_cells(axes, flat, values, colors, edges=THICKEST * style.edges, lit=style.in_space)
+    if style.in_space:
+        _triad(figure, shown[0].drawn, section)
+
+
+def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
+    """Return whether sections of a size (2,) stand beside each other, and the scale that they have.
+
+    The colour bar of those is at their right; of others, one above the other, it is below. Of one
+    section it stands where the section is larger.
+    """
+    width, height = inches
+    high = {upright: height * (_HIGHER[upright] if count > 1 else 1.0) for upright in (True, False)}
+    rooms = {
+        True: ((width - _SIDES - _BAR) / count, high[True] - _ENDS),
+        False: (width - _SIDES, (high[False] - _BAR) / count - _ENDS),
+    }
+    scale = {key: float((np.maximum(room, 0.1) / size).min()) for key, room in rooms.items()}
+    fits = count == 1 or rooms[True][0] >= _NARROWEST
+    upright = fits and 1.05 * scale[True] >= scale[False]
+    return upright, scale[upright]
+
+
+def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the box with a margin, and not thinner than one part in ``_THIN``."""
+    size = high - low
+    longest = float(size.max()) or 1.0
+    wanted = np.maximum(size + 2 * _MARGIN * longest, longest / _THIN)
+    extra = (wanted - size) / 2.0
+    return low - extra, high + extra
+
+
+def _dress(axes: Any, labels: tuple[Label, Label] | None) -> None:
+    """Give axes that are laid out labels and numbers, as there is room for them."""
+    from matplotlib.ticker import MaxNLocator
+
+    if labels is None:
+        axes.set_axis_off()
+        return
+    axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
+    axes.spines[:].set_linewidth(0.6)
+    sizes = axes.bbox.size / axes.figure.dpi
+    # One number says nothing of the scale: two, where there is room for them.
+    for axis, label, inches, step, two in zip(
+        (axes.xaxis, axes.yaxis), labels, sizes, (0.65, 0.4), (1.3, 0.3), strict=True
+    ):
+        fits = len(label.full) * _LETTER_WIDTH <= inches
+        axis.set_label_text(label.full if fits else label.short, fontsize=LETTERS)
+        fewer = {"prune": "upper"} if inches < two / 3.0 else {}
+        most, least = int(np.clip(inches / step, 1 if fewer else 2, 9)), 2 if inches >= two else 1
+        steps = [1, 2, 2.5, 5, 10]
+        axis.set_major_locator(MaxNLocator(most, steps=steps, min_n_ticks=least, **fewer))
+    axes.label_outer()
+
+
+def _laid_beside(
+    shown: Sequence[Shown], section: Section, style: SectionStyle
+) -> tuple[list[Polygons], tuple[Label, Label] | None]:
+    """Return what lies on paper of each run, in the order it is drawn, and the axes' names."""
+    flats: list[Polygons] = []
+    labels, near = None, None
+    for one in shown:
+        if not one.drawn:
+            flats.append(next(iter(one.pieces.values())))
+            continue
+        flat, labels = laid_flat(one.drawn, section, style.in_space, near)
+        if near is None:
+            near = section.shape.middle(section, one.drawn[min(one.drawn, key=abs)])
+        if not section.whole:
+            # Nothing is in front of another, but folded cells overlap: show them.
+            flat = flat.take(np.argsort(one.paint.inverted[flat.cells], kind="stable"))
+        flats.append(flat)
+    return flats, labels
 
 
 def laid_flat(
-    pieces: Mapping[int, Polygons],
-    section: Section,
-    style: SectionStyle,
-    beside: float | None = None,
+    pieces: Mapping[int, Polygons], section: Section, space: bool, beside: float | None = None
 ) -> tuple[Polygons, tuple[Label, Label] | None]:
     """Return the pieces as they lie on paper, the nearest last, and what the axes are called.
 
-    The mesh itself lies where its middle is nearest to that of another, ``beside``.
+    In ``space`` the axes have no names. The mesh itself lies where its middle is nearest to that
+    of another, ``beside``.
     """
-    if style.in_space:
+    if space:
         return in_space(list(pieces.values()), section), None
     if not any(piece.points[:, 2].any() for piece in pieces.values()):
         # A 2D mesh, or a plane that lies flat already.
@@ -272,21 +375,15 @@ def laid_flat(
 
 def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:
     """Draw the directions of x, y and z in the lower left corner."""
-    from slideviz.plots.section_space import camera
-
-    rows = camera(next(iter(pieces.values())), section)
-    size = figure.get_size_inches()
-    centre = np.array([0.55, 0.5])
-    for word, towards in zip("xyz", rows[:2].T, strict=True):
-        tip = centre + 0.3 * towards
-        figure.add_artist(_line(np.stack([centre, tip]) / size))
-        # An axis that points at the eye has no length, but its letter needs room all the same.
-        beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
-        at = (tip + 0.12 * beside) / size
-        figure.text(at[0], at[1], word, fontsize=LETTERS, ha="center", va="center")
-
-
-def _line(ends: FloatArray) -> Any:
     from matplotlib.lines import Line2D
 
-    return Line2D(ends[:, 0], ends[:, 1], color=PAPER.text, linewidth=1.0)
+    size, centre = figure.get_size_inches(), np.array([0.55, 0.5])
+    for word, towards in zip(
+        "xyz", camera(next(iter(pieces.values())), section)[:2].T, strict=True
+    ):
+        ends = np.stack([centre, centre + 0.3 * towards]) / size
+        figure.add_artist(Line2D(*ends.T, color=PAPER.text, linewidth=1.0))
+        # An axis that points at the eye has no length, but its letter needs room all the same.
+        beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
+        at = ends[1] + 0.12 * beside / size
+        figure.text(*at, word, fontsize=LETTERS, ha="center", va="center")

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, Look
+from slideviz.plots.written import SMALLEST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-SMALLEST = 8.0
-"""Points; no letter of a plot is smaller at the printed size."""
 
 _ON_LIGHT = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#56b4e9", "#e69f00")
 _ON_DARK = ("#56b4e9", "#e69f00", "#2bc49a", "#e39bc4", "#ffffff", "#f0e442", "#f08040")

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from slideviz.errors import CaseError
-from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots import draw as plots
 from slideviz.plots.spanwise import spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
+from slideviz.plots.written import empty_figure, write_figure
 from slideviz.study.combinations import Row
-from slideviz.study.panels import Line, Panel, Profiler, panels, result_of
+from slideviz.study.facets import Facet, Line, Profiler, facets, result_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,10 +45,10 @@ def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, F
     """
     numbers = list(dict.fromkeys(row.combination.steps for row in rows))
     if len({row.result.steps for row in rows if row.result}) > 1:
-        yield "steps", _grid(panels(rows), (_minimum, _mean, _seconds))
+        yield "steps", _grid(facets(rows), (_minimum, _mean, _seconds))
     for number in numbers:
-        group = panels([row for row in rows if row.combination.steps == number])
-        lines = [line for panel in group for line in panel.lines]
+        group = facets([row for row in rows if row.combination.steps == number])
+        lines = [line for facet in group for line in facet.lines]
         if not lines:
             continue
         name = steps_name(number)
@@ -82,13 +80,9 @@ def save_figure(
     CaseError
         A file cannot be written.
     """
-    paths = []
-    for suffix in suffixes:
-        data = BytesIO()
-        figure.savefig(data, format=suffix[1:], dpi=dpi)
-        paths.append(folder / f"{name}{suffix}")
-        with atomic_write(paths[-1], CaseError) as file:
-            file.write(data.getvalue())
+    paths = [folder / f"{name}{suffix}" for suffix in suffixes]
+    for path in paths:
+        write_figure(figure, path, dpi)
     return paths
 
 
@@ -189,23 +183,18 @@ def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
     return draw
 
 
-def _grid(group: Sequence[Panel], draws: Sequence[_Draw], across: bool = False) -> Figure:
-    """Return a figure with a row for each panel, or a column if ``across``, and one legend."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+def _grid(group: Sequence[Facet], draws: Sequence[_Draw], across: bool = False) -> Figure:
+    """Return a figure with a row for each facet, or a column if ``across``, and one legend."""
     count = len(group)
     shape = (1, count) if across else (count, len(draws))
-    figure = Figure(figsize=(WIDTH, 0.9 + shape[0] * (3.0 if across else 2.1)))
-    figure.set_layout_engine("constrained")
-    FigureCanvasAgg(figure)
+    figure = empty_figure((WIDTH, 0.9 + shape[0] * (3.0 if across else 2.1)), 100.0, "constrained")
     axes = figure.subplots(*shape, squeeze=False)
-    for number, panel in enumerate(group):
+    for number, facet in enumerate(group):
         for column, draw in enumerate(draws):
             here = axes[0, number] if across else axes[number, column]
-            draw(here, panel.lines)
-            if panel.title and column == 0:
-                here.set_title(panel.title, fontsize=PRINT.size + 1, loc="left")
+            draw(here, facet.lines)
+            if facet.title and column == 0:
+                here.set_title(facet.title, fontsize=PRINT.size + 1, loc="left")
             if across and number:
                 here.set_ylabel("")
             if not across and number < count - 1:

@@ -617,8 +617,8 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
     file = tmp_path / "a.png"
     paper = Paper.of_cm(8.5, 6.4)
     save_section(file, session, section, paper, lambda _: None, lambda: False)
-    figure, _ = drawn[0]
-    said = [text.get_text() for text in figure.texts]
+    figure = drawn[0]
+    said = figure.get_suptitle().split("\n")
     assert "run 2, direct sliding, step 2, plane z = 0.52" in said
     assert all(text.get_window_extent().x0 >= 0 for text in figure.texts)
     shapes = figure.axes[0].collections[0]
@@ -644,7 +644,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
     )
     going = (Paper((1600, 1000)), lambda _: None, lambda: False)
     save_section(tmp_path / "a.png", some, MIDDLE, *going)
-    figure, _ = drawn[0]
+    figure = drawn[0]
     cut = shapes_cells(session, MIDDLE)
     assert len(figure.axes[0].collections[0].get_paths()) == np.isin(cut, kept).sum() < len(cut)
     assert any("shown: " in text.get_text() for text in figure.texts)

@@ -21,7 +21,7 @@ from slideviz.plots.section_curve import (
     steps,
 )
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, draw_section
+from slideviz.plots.section_picture import SectionStyle, Shown, draw_section
 from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
@@ -217,8 +217,7 @@ def picture(mesh, section, **style):
     painted = paint(mesh, quality(mesh), "size-skew")
     pieces = {0: cutter.show(mesh.points, section)}
     around = surroundings(cutter, mesh.points, EYE)
-    figure, _ = draw_section(pieces, section, painted, SectionStyle(**style), around)
-    return figure
+    return draw_section([Shown(pieces, painted, around)], section, SectionStyle(**style))
 
 
 def test_the_picture_of_a_cut_is_the_curve(mesh):
@@ -227,7 +226,7 @@ def test_the_picture_of_a_cut_is_the_curve(mesh):
     x, y = steps(curve(mesh, LINE))
     assert np.array_equal(axes.get_lines()[0].get_xdata(), x, equal_nan=True)
     assert np.array_equal(axes.get_lines()[0].get_ydata(), y, equal_nan=True)
-    assert figure.texts[0].get_text() == "line y = 0.45"
+    assert figure.get_suptitle().split("\n")[0] == "line y = 0.45"
     assert axes.get_xlabel() == "x"
     assert axes.get_ylabel() == "size-skew [-]"
 
@@ -254,7 +253,7 @@ def test_a_picture_of_a_3d_section_has_nothing_around_it():
     figure = picture(mesh, Section("plane", (0.0, 0.0, 0.4)))
     (shapes,) = figure.axes[0].collections
     assert isinstance(shapes, PolyCollection)
-    assert figure.texts[0].get_text() == "plane z = 0.4"
+    assert figure.get_suptitle().split("\n")[0] == "plane z = 0.4"
 
 
 def test_what_is_shown_around_a_cut_stays_on_the_mesh():

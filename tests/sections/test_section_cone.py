@@ -13,7 +13,7 @@ from slideviz.errors import CaseError
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.plots.section_paint import paint
-from slideviz.plots.section_picture import SectionStyle, laid_flat, section_picture
+from slideviz.plots.section_picture import SectionStyle, Shown, laid_flat, section_picture
 from slideviz.scene.cylinder_handle import frame_of, pulled_size
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of
@@ -182,7 +182,7 @@ def test_copies_lie_beside_each_other_and_are_turned_about_the_apex(start):
     every = passages(pair, 3)
     assert all(keeps(CUT, matrix) for matrix in every.values())
     pieces = {n: cutter.cut(mesh.points @ m[:3, :3].T, CUT) for n, m in every.items()}
-    flat, labels = laid_flat(pieces, CUT, SectionStyle())
+    flat, labels = laid_flat(pieces, CUT, False)
     assert [label.short for label in labels] == ["s cos", "s sin"]
     angles = np.degrees(np.arctan2(flat.points[:, 1], flat.points[:, 0]))
     lean = np.sin(np.radians(ANGLE))
@@ -316,7 +316,7 @@ def test_it_is_drawn(tmp_path, whole, in_space):
     painted = paint(mesh, quality(mesh), "skew")
     pieces = {0: Cutter.of(mesh).show(mesh.points, section)}
     style = SectionStyle(size=(400, 300), in_space=in_space)
-    section_picture(pieces, section, painted, tmp_path / "a.svg", style)
+    section_picture([Shown(pieces, painted)], section, tmp_path / "a.svg", style)
     text = (tmp_path / "a.svg").read_text()
     assert len(text) > 10_000
 

@@ -1,4 +1,4 @@
-"""Figures of comparisons, and sheets with a picture of each mesh."""
+"""Figures of comparisons, and montages with a picture of each mesh."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from slideviz.case.model import Reduction, Translate
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.study.combinations import METHODS, MODES, compare
-from slideviz.study.panels import panels, profiler
+from slideviz.study.facets import facets, profiler
+from slideviz.study.montage import NOT_KEPT, montage
 from slideviz.study.plots import figures, save_figure, steps_name
-from slideviz.study.sheets import NOT_KEPT, sheet
 from slideviz.study.table import history_text
 from slideviz.study.wanted import combinations
 
@@ -31,29 +31,29 @@ def rows(square):
     return list(compare(square.case, square.mesh, wanted))
 
 
-def test_panels_are_methods_and_a_mode_has_the_same_line_in_each(rows):
-    none, ps = panels(rows)
+def test_facets_are_methods_and_a_mode_has_the_same_line_in_each(rows):
+    none, ps = facets(rows)
     assert (none.title, ps.title) == ("no sliding", "pseudo sliding")
-    lines = {(panel.title, line.label): line.series for panel in (none, ps) for line in panel.lines}
+    lines = {(facet.title, line.label): line.series for facet in (none, ps) for line in facet.lines}
     assert lines["no sliding", MODES["fixed"]] == lines["pseudo sliding", MODES["fixed"]] == 1
     assert ("no sliding", MODES["moving"]) not in lines
 
 
 def test_with_one_mode_the_methods_are_lines(rows):
-    (panel,) = panels([row for row in rows if row.combination.periodic == "fixed"])
-    assert panel.title == ""
-    assert {line.label for line in panel.lines} == {"no sliding", "pseudo sliding"}
-    assert panels([row for row in rows if row.result is None]) == ()
+    (facet,) = facets([row for row in rows if row.combination.periodic == "fixed"])
+    assert facet.title == ""
+    assert {line.label for line in facet.lines} == {"no sliding", "pseudo sliding"}
+    assert facets([row for row in rows if row.result is None]) == ()
 
 
-def test_where_modes_are_fewer_than_methods_they_are_the_panels(rows):
+def test_where_modes_are_fewer_than_methods_they_are_the_facets(rows):
     group = [row for row in rows if row.combination.periodic != "none"]
     third = [
         replace(row, combination=replace(row.combination, method="ds"))
         for row in group
         if row.combination.method == "ps"
     ]
-    fixed, moving = panels([*group, *third])
+    fixed, moving = facets([*group, *third])
     assert (fixed.title, moving.title) == (MODES["fixed"], MODES["moving"])
     names = [METHODS[name][0] for name in ("none", "ps", "ds")]
     assert list(dict.fromkeys(line.label for line in fixed.lines)) == names
@@ -93,7 +93,7 @@ def test_figures_show_the_rows(rows, square):
     assert texts[:3] == [MODES["none"], MODES["fixed"], MODES["moving"]]
     assert min(text.get_fontsize() for text in legend.get_texts()) >= 8
     limits = {axes.get_ylim() for axes in figure.axes[::3]}
-    assert len(limits) == 1, "one scale, so that panels can be compared"
+    assert len(limits) == 1, "one scale, so that facets can be compared"
     assert figure.get_size_inches()[0] <= 7.01
     ps = [row for row in rows if row.combination.method == "ps"]
     drawn_lines = [line for line in figure.axes[3].lines if not line.get_gid()]
@@ -143,22 +143,35 @@ def test_the_span_follows_from_the_case(name, span, coordinate):
         assert make is None
         return
     (row,) = compare(case, made.mesh, combinations(("ps",), ("none",), (1,)))
-    ((line,),) = [panel.lines for panel in panels([row])]
+    ((line,),) = [facet.lines for facet in facets([row])]
     assert make(line).coordinate == coordinate
     assert make(line).count.sum() == len(made.mesh.cells)
 
 
+def texts_of(figure):
+    """Return the foot, and the names, numbers and words of each facet."""
+    texts = [*figure.texts]
+    for axes in figure.axes:
+        texts += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
+    return [text for text in texts if text.get_text()]
+
+
 def words_on(figure):
-    return [text.get_text() for text in figure.texts]
+    return [text.get_text() for text in texts_of(figure)]
 
 
 def overlaps(figure):
     """Return pairs of words, or of words and a picture, that cover each other."""
     figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()
-    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in figure.texts]
-    boxes = [(words, box) for words, box in boxes if words]
-    boxes += [("picture", axes.get_window_extent(renderer)) for axes in figure.axes]
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in texts_of(figure)]
+    boxes += [
+        ("picture", axes.images[0].get_window_extent(renderer))
+        for axes in figure.axes
+        if axes.images
+    ]
+    outside = [words for words, box in boxes if not figure.bbox.padded(1).containsx(box.x1)]
+    assert outside == []
     return [
         (first[0], second[0])
         for k, first in enumerate(boxes)
@@ -167,14 +180,14 @@ def overlaps(figure):
     ]
 
 
-def test_the_sheet_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path):
+def test_the_montage_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_path):
     group = [row for row in rows if row.combination.steps == 4]
-    figure = sheet(group, square.mesh)
+    figure = montage(group, square.mesh)
     assert figure is not None
-    (path,) = save_figure(figure, tmp_path, "sheet", 100, (".png",))
+    (path,) = save_figure(figure, tmp_path, "montage", 100, (".png",))
     words = words_on(figure)
     assert words.count("not possible [1]") == 1
-    foot = " ".join(words[words.index(next(text for text in words if text.startswith("[1]"))) :])
+    foot = " ".join(figure.texts[0].get_text().split())
     assert foot.startswith(f"[1] no sliding with {MODES['moving']}: not possible: PERIODIC_MODE=")
     assert foot.endswith("choose PERIODIC_MODE= fixed"), "the reason is there to its end"
     assert sum(text.startswith("min") for text in words) == 5
@@ -185,7 +198,7 @@ def test_the_sheet_shows_every_mesh_and_why_one_is_missing(rows, square, tmp_pat
     assert overlaps(figure) == []
     with Image.open(path) as image:
         assert image.width > 500
-    assert sheet([row for row in rows if row.result is None], square.mesh) is None
+    assert montage([row for row in rows if row.result is None], square.mesh) is None
 
 
 def test_what_cannot_be_at_all_has_no_place_but_a_note(rows, square):
@@ -195,11 +208,11 @@ def test_what_cannot_be_at_all_has_no_place_but_a_note(rows, square):
         for row in rows
         if row.combination.steps == 4
     ]
-    figure = sheet(group, square.mesh)
+    figure = montage(group, square.mesh)
     words = words_on(figure)
     assert MODES["fixed"] not in words
     assert {MODES["none"], MODES["moving"]} <= set(words)
-    foot = " ".join(words)
+    foot = " ".join(" ".join(words).split())
     assert f"[2] no sliding with {MODES['moving']}: not possible: PERIODIC_MODE=" in foot
     assert f"[1] {MODES['fixed']}: not possible: the motion puts BLADE" in foot
     assert "the end" in foot
@@ -218,10 +231,10 @@ def test_many_methods_stand_beside_each_other(rows, square):
             for method in METHODS
             for mode in modes
         ]
-        figure = sheet(group, square.mesh)
+        figure = montage(group, square.mesh)
         assert overlaps(figure) == [], rising
-        spots = {text.get_text(): text.get_position() for text in figure.texts}
-        heights = {spots[title][1] for title, _ in METHODS.values()}
+        spots = {text.get_text(): text.get_window_extent() for text in texts_of(figure)}
+        heights = {round(spots[title].y0) for title, _ in METHODS.values()}
         assert len(heights) == 1, "in one line"
         width, height = figure.get_size_inches()
         assert height < width
@@ -244,7 +257,7 @@ def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
     (block,) = made.case.markers_with("moving")
     case = made.case.change(motions=(Translate(block, (1e-9, 0.0)),))
     (row,) = compare(case, made.mesh, combinations(("ps",), ("none",), (1,)))
-    figure = sheet([row], made.mesh)
+    figure = montage([row], made.mesh)
     image = figure.axes[0].images[0].get_array()
     high, wide = (length // 4 for length in image.shape[:2])
     middle = image[high // 2 : high, wide : 3 * wide]
@@ -255,10 +268,12 @@ def test_edges_that_would_hide_the_colours_are_left_out(cells, edges):
 def test_a_mesh_that_was_not_kept_leaves_its_numbers_and_the_reason(rows, square):
     group = [row for row in rows if row.combination.steps == 4 and row.result]
     first, *others = group
-    figure = sheet([replace(first, result=replace(first.result, mesh=None)), *others], square.mesh)
+    figure = montage(
+        [replace(first, result=replace(first.result, mesh=None)), *others], square.mesh
+    )
     words = words_on(figure)
     assert words.count("not drawn [1]") == 1
-    assert f"[1] {NOT_KEPT}" in " ".join(words)
+    assert f"[1] {NOT_KEPT}" in " ".join(" ".join(words).split())
     assert sum(text.startswith("min") for text in words) == len(group)
     bare = [replace(row, result=replace(row.result, mesh=None)) for row in group]
-    assert sheet(bare, square.mesh) is None
+    assert montage(bare, square.mesh) is None

@@ -1,8 +1,8 @@
-"""Panels of a comparison: which rows are drawn together, and with which line.
+"""Facets of a comparison's plots: which rows are drawn together, and with which line.
 
-Where both methods and periodic modes vary, each method has a panel and each mode a line, as in
+Where both methods and periodic modes vary, each method has a facet and each mode a line, as in
 the thesis (Figures 5.5, 5.7, 5.8), or the other way round where there are fewer modes; otherwise
-there is one panel with a line for each.
+there is one facet with a line for each.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Span = Literal["r", "x", "y", "z"]
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A row with the name and the number of its line in a panel."""
+    """A row with the name and the number of its line in a facet."""
 
     label: str
     series: int
@@ -31,19 +31,19 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
-    """Rows that are drawn together; ``title`` is empty where there is one panel only."""
+class Facet:
+    """Rows that are drawn together; ``title`` is empty where there is one facet only."""
 
     title: str
     lines: tuple[Line, ...]
 
 
-def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
-    """Return rows with a result in panels; a line has the same look in each."""
+def facets(rows: Sequence[Row]) -> tuple[Facet, ...]:
+    """Return rows with a result in facets; a line has the same look in each."""
     asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
     done = [row for row in rows if row.result is not None]
     methods, modes = (len({_titles(row)[axis] for row in done}) for axis in (0, 1))
-    # What has a line for each; the other has the panels.
+    # What has a line for each; the other has the facets.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined
     found: dict[str, list[Line]] = {title: [] for title in asked[other]}
@@ -52,8 +52,8 @@ def panels(rows: Sequence[Row]) -> tuple[Panel, ...]:
         line = Line(titles[lined], asked[lined].index(titles[lined]), row)
         found[titles[other]].append(line)
     several = len(found) > 1
-    made = [Panel(title if several else "", tuple(lines)) for title, lines in found.items()]
-    return tuple(panel for panel in made if panel.lines)
+    made = [Facet(title if several else "", tuple(lines)) for title, lines in found.items()]
+    return tuple(facet for facet in made if facet.lines)
 
 
 def _titles(row: Row) -> tuple[str, str]:

@@ -1,0 +1,124 @@
+"""Cells drawn with matplotlib: polygons in the colours of their values, edges, light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import INVERTED_COLOUR, PAPER
+from slideviz.mesh.model import FloatArray
+from slideviz.sections.polygons import Polygons
+
+MANY = 200_000
+"""More polygons than these are pixels in SVG and PDF files too, or no viewer could open them."""
+
+THICKEST, _THINNEST, _PART = 0.45, 0.04, 0.06
+"""Mesh lines in points: a part of the thickness of their cell, within limits."""
+_HAIR = 0.15
+"""Points of a line in the cell's own colour, which hides the gap between neighbours."""
+
+_AMBIENT = 0.7
+"""What is seen along its surface has this much of its colour, in space."""
+
+
+def color_scale(colour_map: str, limits: tuple[float, float]) -> Any:
+    """Return what turns values into colours, a ScalarMappable; what is not a number is inverted."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    table = colormaps[colour_map].with_extremes(bad=INVERTED_COLOUR)
+    return ScalarMappable(Normalize(*limits), table)
+
+
+def draw_cells(
+    axes: Any,
+    cells: Polygons,
+    values: FloatArray | None,
+    scale: Any = None,
+    *,
+    edges: float = THICKEST,
+    lit: bool = False,
+    **options: Any,
+) -> Any:
+    """Draw polygons onto axes, and return them as a PolyCollection.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Laid out already, with their limits: the width of edges goes by the scale.
+    cells : Polygons
+        As they lie on paper, what is nearest last.
+    values : (q,) float64 or None
+        Of each polygon, not a number where it is inverted; without, all have one colour.
+    scale : matplotlib.cm.ScalarMappable
+        Of the values; see `color_scale`.
+    edges : float
+        Points of mesh lines, thinner around thin cells, or boundary layers would turn black; 0
+        leaves them out.
+    lit : bool
+        Darken what is seen at an angle.
+    **options
+        Of the collection.
+    """
+    from matplotlib.collections import PolyCollection
+
+    widths = np.clip(_PART * _thickness(axes, cells), min(_THINNEST, edges), edges)
+    lines = {
+        "edgecolors": PAPER.edge if edges else "face",
+        "linewidths": widths if edges else _HAIR,
+    }
+    shapes = PolyCollection(rings_of(cells), **lines | options)
+    if values is not None:
+        shapes.set(cmap=scale.cmap, norm=scale.norm, array=values)
+        shapes.update_scalarmappable()
+    if lit:
+        normal = _normals(cells)
+        length = np.linalg.norm(normal, axis=1)
+        facing = np.abs(normal[:, 2]) / np.where(length > 0, length, 1.0)
+        shaded = np.array(shapes.get_facecolor())
+        shaded[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing)[:, None]
+        shapes.set_array(None)
+        shapes.set_facecolor(shaded)
+    shapes.set_joinstyle("round")
+    # Moved to whole pixels, each by its own line's width, neighbours would not meet.
+    shapes.set_snap(False)
+    shapes.set_rasterized(len(cells) > MANY)
+    return axes.add_collection(shapes, autolim=False)
+
+
+def rings_of(cells: Polygons) -> list[FloatArray]:
+    """Return the corners of each polygon in the plane, (k, 2)."""
+    corners = cells.points[cells.connectivity, :2]
+    return np.split(corners, cells.offsets[1:-1]) if len(cells) else []
+
+
+def _thickness(axes: Any, cells: Polygons) -> FloatArray:
+    """Return area by length of each polygon as it is drawn, (q,), in points."""
+    low, high = axes.get_xlim()
+    points_per_length = 72.0 * axes.bbox.width / axes.figure.dpi / (high - low)
+    found: FloatArray = np.abs(_normals(cells)[:, 2]) / _sizes(cells) * points_per_length
+    return found
+
+
+def _normals(cells: Polygons) -> FloatArray:
+    """Return the vector area of each polygon, (q, 3)."""
+    after = np.arange(len(cells.connectivity)) + 1
+    after[cells.offsets[1:] - 1] = cells.offsets[:-1]
+    centre = np.repeat(cells.points[cells.connectivity[cells.offsets[:-1]]], cells.sizes, axis=0)
+    corner = cells.points[cells.connectivity] - centre
+    return np.add.reduceat(np.cross(corner, corner[after]), cells.offsets[:-1]) / 2.0
+
+
+def _sizes(cells: Polygons) -> FloatArray:
+    """Return the diagonal of the box around each polygon, (q,), greater than 0."""
+    low, high = boxes_of(cells)
+    return np.maximum(np.linalg.norm(high - low, axis=1), 1e-300)
+
+
+def boxes_of(cells: Polygons) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and the highest coordinates of each polygon in the plane, (q, 2) each."""
+    corner = cells.points[cells.connectivity, :2]
+    low = np.minimum.reduceat(corner, cells.offsets[:-1])
+    return low, np.maximum.reduceat(corner, cells.offsets[:-1])

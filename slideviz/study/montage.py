@@ -1,0 +1,188 @@
+"""The montage of a comparison: pictures of its meshes, one camera, one scale (Figure 5.9)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from slideviz.color_scheme import COLOUR_MAP
+from slideviz.export.encode import Pixels
+from slideviz.export.picture import WHITE, pictures_alike
+from slideviz.mesh.model import Mesh
+from slideviz.plots.bar import color_bar
+from slideviz.plots.cells import color_scale
+from slideviz.plots.style import PRINT
+from slideviz.plots.written import SMALLEST, empty_figure, fitted, trim
+from slideviz.session.state import Frame
+from slideviz.study.combinations import METHODS, MODES, Result, Row
+from slideviz.study.plots import WIDTH
+from slideviz.study.wanted import TITLES, reasons, words_for
+
+Place = tuple[int, int]
+
+DPI = 300
+NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
+_OVERSAMPLED = 2
+"""Pictures are drawn so much larger than shown, so that fine mesh lines turn grey, not black."""
+_NAME, _LOWEST = 0.3, 0.5
+"""Inches: about the width of the name of a row, and the least height, so that it stands beside."""
+_HIGHEST = 40.0
+"""Inches that a montage has room for while it is laid out."""
+
+
+def montage(rows: Sequence[Row], base: Mesh) -> Any:
+    """Return the pictures of rows as a figure: a row for each method, a column for each mode.
+
+    Of many methods and few modes it is the other way round, so that the montage is not too long.
+    A method or a mode that could not be computed at all has no place; the foot says why.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Of one number of steps. Where a row has no result or no mesh, its place says so.
+    base : Mesh
+        The undeformed mesh.
+
+    Returns
+    -------
+    matplotlib.figure.Figure or None
+        None where no row has a mesh.
+    """
+    done = [row for row in rows if row.result is not None]
+    kept = {
+        id(row.result): (row.result.mesh, row.result.quality)
+        for row in done
+        if row.result is not None and row.result.mesh is not None
+    }
+    if not kept:
+        return None
+    methods, modes = _axis(rows, done, "method"), _axis(rows, done, "periodic")
+    places = {
+        (methods[row.combination.method][0], modes[row.combination.periodic][0]): row
+        for row in rows
+        if row.combination.method in methods and row.combination.periodic in modes
+    }
+    names = [tuple(name for _, name in axis.values()) for axis in (methods, modes)]
+    if len(modes) == 1 or len(methods) > 2 * len(modes):  # the methods beside each other
+        names, places = names[::-1], {at[::-1]: row for at, row in places.items()}
+    # Those of long montages are smaller.
+    wide = (WIDTH - _NAME) / max(len(names[1]), 2 if len(names[0]) < 3 else 3)
+    side = int(wide * DPI * _OVERSAMPLED)
+    drawn = pictures_alike([Frame(*one) for one in kept.values()], base, side)
+    images = dict(zip(kept, drawn, strict=True))
+    shown = {at: images[id(row.result)] for at, row in places.items() if id(row.result) in images}
+    words, notes = _words(places, rows, shown)
+    figure, facets = _facets(names, shown, wide)
+    for at, axes in np.ndenumerate(facets):
+        row = places.get((at[0], at[1]))
+        if row is not None:
+            _fill(axes, words.get((at[0], at[1]), ""), row, wide)
+    colors = color_scale(COLOUR_MAP, (0.0, 1.0))
+    _foot(figure, facets, colors, any(found.inverted for _, found in kept.values()), notes)
+    return figure
+
+
+def _axis(rows: Sequence[Row], done: Sequence[Row], what: str) -> dict[str, tuple[int, str]]:
+    """Return place and name of each method, or mode, of which there is a result.
+
+    The name is empty where no other was asked for.
+    """
+    words = {name: title for name, (title, _) in METHODS.items()} if what == "method" else MODES
+    asked, shown = (
+        dict.fromkeys(getattr(row.combination, what) for row in group) for group in (rows, done)
+    )
+    left = [name for name in asked if name in shown]
+    return {name: (k, words[name] if len(asked) > 1 else "") for k, name in enumerate(left)}
+
+
+def _words(
+    places: Mapping[Place, Row], rows: Sequence[Row], shown: Mapping[Place, Pixels]
+) -> tuple[dict[Place, str], list[str]]:
+    """Return what stands in places without a picture, and the notes at the foot."""
+    problems = {row.combination: row.problem for row in rows if row.result is None}
+    every = [row.combination for row in rows]
+    told = list(reasons(problems).items())
+    notes = [
+        f"[{number}] {words_for(some, every, TITLES)}: not possible: {reason}"
+        for number, (reason, some) in enumerate(told, start=1)
+    ]
+    words = {}
+    for at, row in places.items():
+        if row.result is None:
+            number = next(k for k, (_, some) in enumerate(told, 1) if row.combination in some)
+            words[at] = f"not possible [{number}]"
+        elif at not in shown:
+            words[at] = f"not drawn [{len(told) + 1}]"
+    if any(text.startswith("not drawn") for text in words.values()):
+        notes.append(f"[{len(told) + 1}] {NOT_KEPT}")
+    return words, notes
+
+
+def _facets(
+    names: Sequence[Sequence[str]], shown: Mapping[Place, Pixels], wide: float
+) -> tuple[Any, Any]:
+    """Return a figure with axes for each row and column, their names, and the pictures in them."""
+    across = _drawn(list(shown.values()), 1)
+    width = across.stop - across.start
+    down = [
+        _drawn([image for at, image in shown.items() if at[0] == row] or list(shown.values()), 0)
+        for row in range(len(names[0]))
+    ]
+    # What is missing is white, so that the name of the row has room beside it.
+    heights = [max(part.stop - part.start, _LOWEST / wide * width) for part in down]
+    size = _NAME + len(names[1]) * wide, _HIGHEST
+    figure = empty_figure(size, 100.0, "compressed")
+    shape = len(names[0]), len(names[1])
+    facets = figure.subplots(*shape, squeeze=False, gridspec_kw={"height_ratios": heights})
+    for (row, column), axes in np.ndenumerate(facets):
+        axes.set(xticks=[], yticks=[])
+        axes.spines[:].set_visible(False)
+        image = shown.get((row, column))
+        if image is not None:
+            axes.imshow(image[down[row], across], interpolation="antialiased")
+        half, middle = heights[row] / 2.0, (down[row].stop - down[row].start) / 2.0
+        axes.set(aspect="equal", xlim=(0, width), ylim=(middle + half, middle - half))
+        if row == 0:
+            axes.set_title(fitted(names[1][column], wide, PRINT.size)[0], fontsize=PRINT.size)
+        if column == 0:
+            high = wide * heights[row] / width
+            axes.set_ylabel(fitted(names[0][row], high, SMALLEST)[0], fontsize=PRINT.size)
+    return figure, facets
+
+
+def _drawn(images: Sequence[Pixels], axis: int) -> slice:
+    """Return where any of the images is not white: rows for axis 0, columns for axis 1."""
+    some = np.zeros(images[0].shape[axis], bool)
+    for image in images:
+        some |= (image < WHITE).any(axis=(1 - axis, 2))
+    found = np.flatnonzero(some)
+    return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, len(some))
+
+
+def _fill(axes: Any, words: str, row: Row, wide: float) -> None:
+    """Write the numbers below a facet, and into it why there is no picture."""
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALLEST, "color": "0.35"}
+    axes.text(0.5, 0.5, fitted(words, wide, SMALLEST)[0], transform=axes.transAxes, **style)
+    if row.result is not None:
+        axes.set_xlabel(fitted(_numbers(row.result), wide, SMALLEST)[0], fontsize=SMALLEST)
+
+
+def _numbers(result: Result) -> str:
+    found = result.quality
+    text = f"min {found.min:.3f}, mean {found.mean:.3f}"
+    return f"{text}\n{found.inverted} inverted" if found.inverted else text
+
+
+def _foot(figure: Any, facets: Any, colors: Any, inverted: bool, notes: Sequence[str]) -> None:
+    """Draw one colour bar for all facets and write the notes below it; trim the figure."""
+    from matplotlib.colorbar import make_axes
+
+    if notes:
+        width = figure.get_size_inches()[0]
+        said = fitted("\n".join(notes), width - 0.2, SMALLEST)[0]
+        figure.supxlabel(said, x=0.1 / width, ha="left", fontsize=SMALLEST)
+    place, _ = make_axes(facets.ravel().tolist(), location="bottom", shrink=0.6, aspect=30)
+    color_bar(place, colors, "size-skew quality [-]", SMALLEST, inverted=inverted, upright=False)
+    trim(figure, [*facets, [place]])
