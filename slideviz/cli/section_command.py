@@ -78,6 +78,8 @@ def add_section(calls: argparse._SubParsersAction) -> None:
         help="pixels (default: 1600 wide, and as high as the section needs)",
     )
     add("--no-edges", action="store_false", dest="edges", help="leave out the mesh lines")
+    add("--no-title", action="store_false", dest="title", help="leave out the title")
+    add("--no-axes", action="store_false", dest="axes", help="leave out axes and their numbers")
     add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
     add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
     add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
@@ -131,6 +133,7 @@ def section(arguments: argparse.Namespace) -> int:
     note = "" if base is not None or painted.label == "skew" else NONE
     size, trimmed = arguments.size or SectionStyle.size, arguments.size is None
     style = SectionStyle(size, trimmed, arguments.edges, arguments.in_space, name)
+    style = replace(style, title=arguments.title, axes=arguments.axes)
     shown = Shown(pieces, painted, surroundings(cutter, mesh.points, matrices), note=note)
     section_picture([shown], chosen, arguments.output, style)
     summary = painted.summary(ids)

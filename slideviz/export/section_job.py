@@ -33,10 +33,15 @@ _SHOWN = "shown: "
 
 @dataclass(frozen=True)
 class Paper:
-    """Width and most height of a picture in pixels, and pixels per inch where it is for paper."""
+    """Width and most height of a picture in pixels, and pixels per inch where it is for paper.
+
+    Also whether it has a title, and numbers along its axes.
+    """
 
     size: tuple[int, int]
     dpi: float | None = None
+    title: bool = True
+    axes: bool = True
 
     @classmethod
     def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
@@ -78,6 +83,7 @@ def save_section(
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
     style = SectionStyle(paper.size, True, session.view.edges, name=name, dpi=paper.dpi)
+    style = replace(style, title=paper.title, axes=paper.axes)
     if len(shown) == 1:
         shown = [replace(shown[0], name=state_words(session), place="")]
     section_picture(shown, section, path, style)

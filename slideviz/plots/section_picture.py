@@ -67,6 +67,8 @@ class SectionStyle:
         Pixels per inch; left out, letters can be read when the picture is as wide as a page.
     title : bool
         Say above it what was cut, where, and with which quality.
+    axes : bool
+        Have axes with numbers, where it is flat.
     """
 
     size: tuple[int, int] = (1600, 1000)
@@ -76,6 +78,7 @@ class SectionStyle:
     name: str = ""
     dpi: float | None = None
     title: bool = True
+    axes: bool = True
 
     @property
     def inches(self) -> tuple[float, float]:
@@ -225,6 +228,7 @@ def _curves(figure: Any, shown: Sequence[Shown], section: Section) -> None:
 def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: SectionStyle) -> None:
     """Draw polygons, with one colour bar."""
     flats, labels = _laid_beside(shown, section, style)
+    labels = labels if style.axes else None
     corners = np.concatenate([flat.points[flat.connectivity, :2] for flat in flats if len(flat)])
     box = corners.min(axis=0), corners.max(axis=0)
     width, height = figure.get_size_inches()
@@ -254,7 +258,7 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
         place = beside(every[-1])
     else:  # it has room for its numbers also where the axes are narrow
         long = max(0.6 * scale * (high - low)[0], min(2.0, width - 1.5))
-        place = below(every[-1], long, GAP if style.in_space else BELOW)
+        place = below(every[-1], long, BELOW if labels else GAP)
     of = paint.label, LETTERS - 1.0
     color_bar(place, colors, *of, inverted=any(folded), upright=upright)
     figure.draw_without_rendering()

@@ -1,6 +1,7 @@
 """The sections panel, the handle in the view, and the flat view, by mouse and keyboard."""
 
 import gc
+import re
 import weakref
 
 import numpy as np
@@ -719,10 +720,38 @@ def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_p
     assert b'width="240.9' in (tmp_path / "cut.svg").read_bytes()
 
 
+def test_size_title_and_axes_of_the_picture_of_a_section_can_be_chosen(
+    window, driver, panel, answers, tmp_path
+):
+    driver.click(panel.add_plane)
+    answers("ask_save", tmp_path / "cut.svg")
+    asked = answers("ask_paper", (10.0, 4.0))
+    (other,) = [one for one in panel.sizes.actions() if one.text() == "Other size…"]
+    for parts in ((), (panel.titled, panel.with_axes)):
+        for part in parts:
+            part.trigger()
+        other.trigger()
+        driver.settle()
+        text = (tmp_path / "cut.svg").read_text()
+        # 10 and 4 cm are 283 and 113 points.
+        assert 'width="283.' in text
+        height = float(re.search(r'height="([\d.]+)pt"', text)[1])
+        assert height <= 113.5
+        assert (": undeformed, plane " in text) == (not parts)
+        assert ("<!-- z -->" in text or "<!-- y -->" in text) == (not parts)
+    assert len(asked) == 2
+    asked = answers("ask_paper", None)
+    (tmp_path / "cut.svg").unlink()
+    other.trigger()
+    driver.settle()
+    assert asked
+    assert not (tmp_path / "cut.svg").exists()
+
+
 def test_a_picture_that_cannot_be_written_is_told(window, driver, panel, answers, tmp_path):
     driver.click(panel.add["plane"])
     answers("ask_save", tmp_path / "cut.bmp")
-    panel.sizes.actions()[-1].trigger()
+    panel.sizes.actions()[3].trigger()
     driver.settle()
     assert window.banner.isVisible()
     assert not (tmp_path / "cut.bmp").exists()

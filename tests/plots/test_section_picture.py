@@ -370,3 +370,16 @@ def test_a_thin_strip_has_two_numbers_on_its_short_side():
         axes = figure.axes[0]
         low, high = axes.get_ylim()
         assert sum(low <= tick <= high for tick in axes.get_yticks()) >= 2
+
+
+def test_without_title_and_axes_the_section_has_the_room():
+    mesh = cube(4, block=False)
+    section, sizes = Section("plane", (0, 0, 0.4)), []
+    for shown in (True, False):
+        figure, _, _ = drawn(mesh, section, size=(1004, 756), dpi=300.0, title=shown, axes=shown)
+        figure.canvas.draw()
+        sizes.append(figure.axes[0].bbox.width)
+        assert bool(words_of(figure)) is shown
+        assert figure.axes[0].axison is shown
+        assert bar_of(figure).get_ylabel() == "size-skew", "the colours are always explained"
+    assert sizes[1] > 1.4 * sizes[0]

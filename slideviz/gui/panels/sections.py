@@ -70,6 +70,7 @@ class SectionsPanel(QWidget):
         self.setObjectName("sections")
         self.cutting, self.store = cutting, cutting.store
         self._period = Period()
+        self._size = 8.5, 12.0  # cm
         self._icons: list[tuple[Any, str]] = []
         self._listed: tuple[object, ...] = ()
         self._make_list()
@@ -116,7 +117,15 @@ class SectionsPanel(QWidget):
         self.sizes = QMenu(self.picture)
         for words, paper in SIZES.items():
             choice = self.sizes.addAction(words)
-            choice.triggered.connect(lambda _=False, paper=paper: self.picture_wanted.emit(paper))
+            choice.triggered.connect(lambda _=False, paper=paper: self._want_picture(paper))
+        self.sizes.addAction("Other size…").triggered.connect(self._want_other_size)
+        self.sizes.addSeparator()
+        self.titled, self.with_axes = (
+            self.sizes.addAction(words) for words in ("With title", "With axes")
+        )
+        for part in (self.titled, self.with_axes):
+            part.setCheckable(True)
+            part.setChecked(True)
         self.picture.setMenu(self.sizes)
         self._icons += [(self.look, "along"), (self.picture, "picture")]
         column = QVBoxLayout(self)
@@ -220,6 +229,16 @@ class SectionsPanel(QWidget):
 
     def _want_handle(self, shown: bool) -> None:
         self.store.change(changes.show_handle, shown)
+
+    def _want_picture(self, paper: Paper) -> None:
+        parts = {"title": self.titled.isChecked(), "axes": self.with_axes.isChecked()}
+        self.picture_wanted.emit(replace(paper, **parts))
+
+    def _want_other_size(self) -> None:
+        size = questions.ask_paper(self, *self._size)
+        if size is not None:
+            self._size = size
+            self._want_picture(Paper.of_cm(*size))
 
     def _remove(self) -> None:
         view = self.store.session.view

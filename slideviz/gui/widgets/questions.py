@@ -11,6 +11,7 @@ from qtpy.QtWidgets import (
     QApplication,
     QDialog,
     QDialogButtonBox,
+    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QFrame,
@@ -148,6 +149,28 @@ def ask_sample(
     dialog.setMinimumWidth(420)
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
     return (name.currentData(), size.value()) if accepted else None
+
+
+def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, float] | None:
+    """Return how wide and at most how high a picture is on paper, in cm, or None."""
+    dialog = QDialog(parent)
+    dialog.setWindowTitle("Size of the picture")
+    form = QFormLayout(dialog)
+    boxes = QDoubleSpinBox(), QDoubleSpinBox()
+    for box, words, value in zip(boxes, ("Width", "Height, at most"), (width, height), strict=True):
+        box.setRange(4.0, 100.0)
+        box.setDecimals(1)
+        box.setSuffix(" cm")
+        box.setValue(value)
+        form.addRow(words, box)
+    buttons = QDialogButtonBox(
+        QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
+    )
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    form.addRow(buttons)
+    accepted = dialog.exec() == QDialog.DialogCode.Accepted
+    return (boxes[0].value(), boxes[1].value()) if accepted else None
 
 
 def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
