@@ -316,6 +316,8 @@ def sections(desk: Desk) -> None:
     cut("cylinder", "stator", "--cylinder", "0.275", "--copies", "1", "--json", "cut.json")
     cut("cylinder_space", "stator", "--cylinder", "0.275", "--3d", "--map", "plasma")
     cut("cylinder_wheel", "stator", "--cylinder", "0.275,z", "--3d", "--copies", "wheel")
+    cut("cone", "stator", "--cone", "10,z,0,0,-1.5", "--copies", "1")
+    cut("cone_space", "stator", "--cone", "10,z,0,0,-1.5", "--3d", "--copies", "2", "--whole")
     cut("cylinder_range", "stator", "--cylinder", "0.26", "--range", "0.75,0.95", "--no-edges",
         "--color", "skew", "--map", "gray")  # fmt: skip
     desk.file("cut.json")
