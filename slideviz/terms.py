@@ -311,16 +311,59 @@ POINTS_SHOWN: dict[PointsShown, Term] = {
 }
 
 Shown = Literal["edges", "undeformed", "motion_ghost", "legend", "triad", "perspective"]
-SHOWN: dict[Shown, Term] = {
-    "edges": Term("Mesh edges", "Draw the edges of the cells."),
-    "undeformed": Term(
+
+
+@dataclass(frozen=True)
+class ShownTerm(Term):
+    """Something that is drawn or not.
+
+    Attributes
+    ----------
+    shortcut : str
+        The key of the keyboard that switches it.
+    at_first : bool
+        Whether it is drawn until somebody chooses.
+    not_in_2d : str
+        Why it cannot be chosen for a 2D mesh; empty where it can.
+    in_bar : bool
+        Whether the tool bar has a button for it; there is little room.
+    """
+
+    shortcut: str = ""
+    at_first: bool = False
+    not_in_2d: str = ""
+    in_bar: bool = True
+
+
+SHOWN: dict[Shown, ShownTerm] = {
+    "edges": ShownTerm("Mesh edges", "Draw the edges of the cells.", shortcut="E", at_first=True),
+    "undeformed": ShownTerm(
         "Undeformed",
         "Draw the undeformed boundaries as a ghost.",
         alone="Undeformed boundaries",
+        shortcut="U",
     ),
-    "motion_ghost": Term("Motion ghost", "Draw where the motions take the moving boundaries."),
-    "legend": Term("Legend", "Draw the legend of roles or the colour bar."),
-    "triad": Term("Axes", "Draw the directions of the axes in a corner."),
-    "perspective": Term("Perspective", "Perspective instead of parallel projection (3D meshes)."),
+    "motion_ghost": ShownTerm(
+        "Motion ghost",
+        "Draw where the motions take the moving boundaries.",
+        shortcut="G",
+        at_first=True,
+    ),
+    "legend": ShownTerm(
+        "Legend", "Draw the legend of roles or the colour bar.", shortcut="L", at_first=True
+    ),
+    "triad": ShownTerm(
+        "Axes",
+        "Draw the directions of the axes in a corner.",
+        shortcut="T",
+        at_first=True,
+        in_bar=False,
+    ),
+    "perspective": ShownTerm(
+        "Perspective",
+        "Perspective instead of parallel projection (3D meshes).",
+        shortcut="P",
+        not_in_2d="A 2D mesh is always shown in parallel projection.",
+    ),
 }
 """What is drawn or not; a case file writes them with hyphens."""

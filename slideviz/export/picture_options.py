@@ -17,6 +17,7 @@ from slideviz.export.titles import (
 )
 from slideviz.scene.color_legend import STRIP
 from slideviz.session.state import Frame, Session
+from slideviz.terms import Shown
 
 Background = Literal["white", "shown", "transparent"]
 BACKGROUNDS: dict[Background, str] = {
@@ -115,17 +116,13 @@ class PictureOptions:
 
     def showing(self, session: Session) -> Session:
         """Return the session as the picture shows it: nothing selected, no clutter."""
-        view = replace(
-            session.view,
-            legend=self.legend,
-            edges=self.edges,
-            triad=self.triad,
-            # Of a result, it would hide what is to be seen.
-            motion_ghost=session.view.motion_ghost and session.view.colour_by == "role",
-            selected=(),
-            marked=session.view.marked if self.marked else None,
-        )
-        return replace(session, view=view)
+        view = session.view
+        drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
+        if view.colour_by != "role":
+            drawn["motion_ghost"] = False  # of a result, it would hide what is to be seen
+        view = view.with_drawn(drawn)
+        marked = view.marked if self.marked else None
+        return replace(session, view=replace(view, selected=(), marked=marked))
 
 
 def panes(figure: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:

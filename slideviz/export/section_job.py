@@ -82,7 +82,7 @@ def save_section(
     require_going(stopped)
     report(Doing(f"Drawing {path.name}"))
     name = session.path.name if session.path is not None else ""
-    style = SectionStyle(paper.size, True, session.view.edges, name=name, dpi=paper.dpi)
+    style = SectionStyle(paper.size, True, "edges" in session.view.drawn, name=name, dpi=paper.dpi)
     style = replace(style, title=paper.title, axes=paper.axes)
     if len(shown) == 1:
         shown = [replace(shown[0], name=state_words(session), place="")]

@@ -162,7 +162,7 @@ def _draw_mesh(axes: Any, session: Session, figure: PictureOptions, point: float
         order = _ORDER[NAME] + 0.05 if section.whole else _ORDER[RIM] - 0.05
         line: dict[str, Any] = {"colors": PAPER.text, "linewidths": _CUT * point, "zorder": order}
         axes.add_collection(LineCollection(trace(section, box), **line), autolim=False)
-    if view.undeformed:
+    if "undeformed" in view.drawn:
         parts = [part for name in mesh.marker_names for part in _lines(session.mesh, name)]
         style = {"colors": PAPER.ghost, "linestyles": "dashed", "linewidths": 0.7 * point}
         axes.add_collection(LineCollection(parts, **style))

@@ -230,7 +230,7 @@ class Actions:
         self.panels.addAction(restore)
 
     def _toggle(self, name: str, checked: bool) -> None:
-        if getattr(self.window.store.session.view, name) != checked:
+        if (name in self.window.store.session.view.drawn) != checked:
             self.window.store.change(changes.set_view, **{name: checked})
 
     def _sync_colours(self, session: Session) -> None:
@@ -272,7 +272,7 @@ class Actions:
         for name in TOGGLES:
             act = self.by_name[name]
             act.blockSignals(True)
-            act.setChecked(getattr(session.view, name))
+            act.setChecked(name in session.view.drawn)
             act.blockSignals(False)
             act.setEnabled(opened)
         flat = opened and session.mesh.dim == 2

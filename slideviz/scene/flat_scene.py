@@ -133,7 +133,7 @@ class FlatScene:
         prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
         prop.line_width = 1.0
         view = self.session.view
-        self.stage.edges(prop, view.edges, view.colour_by == "role")
+        self.stage.edges(prop, "edges" in view.drawn, view.colour_by == "role")
 
     def _draw_neighbours(self, section: Section) -> None:
         found: dict[int, FloatArray] = {}

@@ -78,7 +78,7 @@ class GhostLayer:
         if session.mesh is None:
             return
         view = session.view
-        shown = view.motion_ghost and is_planned(session)
+        shown = "motion_ghost" in view.drawn and is_planned(session)
         for name, points in self.moved.items():
             surface = self._surfaces.get(name)
             if surface is None:
@@ -106,7 +106,7 @@ class GhostLayer:
     def _draw_undeformed(self, session: Session) -> None:
         view = session.view
         # The undeformed mesh itself needs no ghost.
-        shown = view.undeformed and session.mesh is not None and view.frame > 0
+        shown = "undeformed" in view.drawn and session.mesh is not None and view.frame > 0
         for name, surface in self._surfaces.items():
             key = f"undeformed:{name}"
             if not shown and key not in self._actors:

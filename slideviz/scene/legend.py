@@ -58,7 +58,7 @@ class LegendLayer:
             self._drawn = key
             clear_legend(self.stage.plotter)
             self._bar = self._plate = None
-            if new.view.legend and self.stage.has_legend and new.mesh is not None:
+            if "legend" in new.view.drawn and self.stage.has_legend and new.mesh is not None:
                 self._make(new)
         self._place()
 
@@ -103,7 +103,7 @@ class LegendLayer:
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         colours = (view.colour_by, view.colour_map, session.colour_range)
         points, style = self.stage.point_words, (self.stage.look, self.stage.font_scale)
-        shown = view.legend and self.stage.has_legend, self.stage.has_plate
+        shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
         return (id(mesh), shown, colours, said, points, style)
 
 
@@ -143,7 +143,7 @@ class TriadLayer:
     def update(self, _old: Session | None, new: Session) -> None:
         """Show another state."""
         plotter = self.stage.plotter
-        shown = new.view.triad and new.mesh is not None
+        shown = "triad" in new.view.drawn and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
         style = (self.stage.look, self.stage.font_scale, self.stage.has_plate)
         key = (shown, flat, style, tuple(plotter.window_size))

@@ -104,7 +104,7 @@ class CellLayer:
             see_through(self.actor, 0.12 if inside else 1.0)
         else:
             self.actor.prop.opacity = FADED if is_faded(new) else 1.0
-        self.stage.edges(self.actor.prop, new.view.edges and not inside, not by_value)
+        self.stage.edges(self.actor.prop, "edges" in new.view.drawn and not inside, not by_value)
 
 
 class BoundaryLayer:
@@ -221,7 +221,7 @@ class BoundaryLayer:
         if one.surface.flat:
             one.actor.prop.line_width = 4.5 if view.colour_by == "role" else 3.0
         else:
-            self.stage.edges(one.actor.prop, view.edges)
+            self.stage.edges(one.actor.prop, "edges" in view.drawn)
             inside, glass = looks_inside(session), name in self.glass
             opacity = 0.12 if inside else GLASS if glass else SEE_THROUGH if self._buried else 1.0
             see_through(one.actor, opacity)
@@ -247,7 +247,7 @@ def is_faded(session: Session) -> bool:
 def seen_from_outside(session: Session) -> bool:
     """Tell whether boundaries that enclose a 3D mesh show nothing but their outside."""
     view = session.view
-    glass = view.hidden or view.perspective or looks_inside(session)
+    glass = view.hidden or "perspective" in view.drawn or looks_inside(session)
     # The outside of a folded cell is inside.
     return not glass and session.frame is not None and session.frame.quality.inverted == 0
 

@@ -132,7 +132,7 @@ class Scene:
             return
         self.stage.set_colours(session)
         tell_all((layer.update for layer in self.layers), old, session)
-        if old.view.perspective != session.view.perspective:
+        if "perspective" in old.view.drawn ^ session.view.drawn:
             self.plotter.camera.parallel_projection = self._parallel()
 
     def set_look(self, look: Look) -> None:
@@ -188,7 +188,7 @@ class Scene:
 
     def _parallel(self) -> bool:
         mesh = self.session.mesh
-        return mesh is None or mesh.dim == 2 or not self.session.view.perspective
+        return mesh is None or mesh.dim == 2 or "perspective" not in self.session.view.drawn
 
     def _shapes(self) -> list[Any]:
         return [shape for layer in self.layers for shape in layer.shapes()]

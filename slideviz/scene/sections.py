@@ -191,7 +191,7 @@ class SectionLayer:
         # A cut has the very colours of the bar; whole cells need shades to be told apart.
         prop.lighting = solid
         prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
-        self.stage.edges(prop, session.view.edges, session.view.colour_by == "role")
+        self.stage.edges(prop, "edges" in session.view.drawn, session.view.colour_by == "role")
         if session.mesh is not None and session.mesh.dim == 2:
             prop.line_width = 1.0 if section.whole else WIDTHS.get(kind, WIDTHS[BAND])
 

@@ -85,7 +85,7 @@ class ChosenLayer:
         if self.actor is not None:
             self.actor.visibility = self.shape.n_cells > 0
             self.actor.mapper.scalar_visibility = True
-            self.stage.edges(self.actor.prop, new.view.edges)
+            self.stage.edges(self.actor.prop, "edges" in new.view.drawn)
 
     def _fade(self, session: Session, chosen: bool) -> None:
         """Make the cells that are not chosen faint, or let them be as they were."""

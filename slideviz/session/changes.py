@@ -28,7 +28,6 @@ from slideviz.session.changes_runs import (
     take_settings,
 )
 from slideviz.session.changes_view import (
-    TASTE,
     add_section,
     choose_section,
     flat_one,
@@ -49,7 +48,6 @@ from slideviz.session.opening import open_mesh, suggested_reduction
 from slideviz.session.run_requirements import Missing, is_missing
 
 __all__ = [
-    "TASTE",
     "UNDEFORMED",
     "Missing",
     "add_frames",

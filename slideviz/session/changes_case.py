@@ -11,9 +11,11 @@ from slideviz.case.model import Case, FromFile, Motion, named
 from slideviz.session.guess import with_periodicity
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Place, Session
+from slideviz.session.undoable import undoable
 from slideviz.terms import Role
 
 
+@undoable("role")
 def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     """Return the session with these boundaries in that role, which confirms it for them."""
     changed = tuple(names)
@@ -39,6 +41,7 @@ def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:
     return replace(motion, marker=moving if len(moving) > 1 else moving[0]) if moving else None
 
 
+@undoable("confirming guesses")
 def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
     """Return the session with the guesses for these boundaries (default: all) taken as right."""
     gone = set(session.guesses if names is None else names)
@@ -46,6 +49,7 @@ def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
     return replace(session, guesses=kept)
 
 
+@undoable("settings")
 def set_case(session: Session, **values: Any) -> Session:
     """Return the session with other settings of the case."""
     guess = "" if "reduction" in values else session.reduction_guess
@@ -59,6 +63,7 @@ def set_invalid(session: Session, place: Place, sentences: tuple[str, ...]) -> S
     return session if found == session.invalid else replace(session, invalid=found)
 
 
+@undoable("new motion")
 def add_motion(session: Session, motion: Motion, index: int | None = None) -> Session:
     """Return the session with one more motion, performed last or as the one of that index."""
     motions = list(session.case.motions)
@@ -66,16 +71,19 @@ def add_motion(session: Session, motion: Motion, index: int | None = None) -> Se
     return set_case(session, motions=tuple(motions))
 
 
+@undoable("motion")
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
     """Return the session with another motion at that place."""
     return set_case(session, motions=replaced(session.case.motions, index, motion))
 
 
+@undoable("removing a motion")
 def remove_motion(session: Session, index: int) -> Session:
     """Return the session without the motion at that place."""
     return set_case(session, motions=without(session.case.motions, index))
 
 
+@undoable("order of motions")
 def move_motion(session: Session, index: int, by: int) -> Session:
     """Return the session with a motion performed earlier (negative) or later."""
     motions = list(session.case.motions)

@@ -8,6 +8,7 @@ from typing import Literal
 
 from slideviz.session.changes_view import set_view, show_frame
 from slideviz.session.state import Frame, Run, Session
+from slideviz.session.undoable import undoable
 
 UNDEFORMED = 0
 """Stands for the undeformed mesh among the numbers of runs, which begin with 1."""
@@ -66,6 +67,7 @@ def show_beside(session: Session, number: int | None) -> Session:
     return set_view(session, beside=number, swapped=False)
 
 
+@undoable("removing a run")
 def remove_run(session: Session, number: int) -> Session:
     """Return the session without a run, which is kept for undo; one that goes on stays."""
     run = session.run(number)
@@ -105,6 +107,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
     return replace(session, runs=runs)
 
 
+@undoable("settings of a run")
 def take_settings(session: Session, number: int) -> Session:
     """Return the session with the settings of a run put back: roles, motions, method."""
     run = session.run(number)

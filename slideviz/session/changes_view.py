@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Session, ViewState
-from slideviz.terms import ColourBy
+from slideviz.session.undoable import undoable
+from slideviz.terms import SHOWN, ColourBy
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
-TASTE = (
-    "edges",
-    "undeformed",
-    "motion_ghost",
-    "legend",
-    "triad",
-    "perspective",
-    "colour_map",
-)
-"""Settings of the view that suit any mesh, so that they stay when another is opened."""
+UNDO_WORDS: dict[str, str] = {
+    "colour_by": "colour by",
+    "colour_range": "colour range",
+    "colour_map": "colours",
+    "threshold": "range of cells",
+    "points": "points",
+    "sections": "sections",
+    "copies": "neighbours",
+    "hidden": "hidden boundaries",
+    **{name: term.name.lower() for name, term in SHOWN.items()},
+}
+"""What the menu calls a change of one thing in the view; it says "view" of several at once."""
 
 
+def _undo_words(values: Mapping[str, Any]) -> str:
+    return UNDO_WORDS.get(next(iter(values)), "view") if len(values) == 1 else "view"
+
+
+@undoable(_undo_words)
 def set_view(session: Session, **values: Any) -> Session:
-    """Return the session looked at in another way.
+    """Return the session looked at in another way: fields of `ViewState`, and names of `SHOWN`.
 
     What the colours say has a range of its own, which is there again when it is coloured by again.
     """
@@ -45,7 +53,8 @@ def set_view(session: Session, **values: Any) -> Session:
     if "sections" in values:
         chosen = followed(old.chosen, old.sections, values["sections"])
         values.setdefault("chosen", chosen)
-    return replace(session, view=replace(old, **values))
+    drawn = {name: values.pop(name) for name in SHOWN if name in values}
+    return replace(session, view=replace(old.with_drawn(drawn), **values))
 
 
 def select(session: Session, names: Iterable[str]) -> Session:
@@ -53,6 +62,7 @@ def select(session: Session, names: Iterable[str]) -> Session:
     return set_view(session, selected=tuple(names))
 
 
+@undoable("hidden boundaries")
 def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
     """Return the session with these boundaries shown or hidden."""
     hidden = session.view.hidden
@@ -60,6 +70,7 @@ def show(session: Session, names: Iterable[str], shown: bool = True) -> Session:
     return set_view(session, hidden=hidden - change if shown else hidden | change)
 
 
+@undoable("hidden boundaries")
 def isolate(session: Session, names: Iterable[str]) -> Session:
     """Return the session with only these boundaries shown."""
     every = session.mesh.marker_names if session.mesh else ()
@@ -71,32 +82,38 @@ def show_frame(session: Session, index: int) -> Session:
     return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
 
 
+@undoable("new section")
 def add_section(session: Session, section: Section) -> Session:
     """Return the session with one more section."""
     return set_view(session, sections=(*session.view.sections, section))
 
 
+@undoable("section")
 def replace_section(session: Session, index: int, section: Section) -> Session:
     """Return the session with another section at that place."""
     return set_view(session, sections=replaced(session.view.sections, index, section))
 
 
+@undoable("removing a section")
 def remove_section(session: Session, index: int) -> Session:
     """Return the session without the section at that place."""
     return set_view(session, sections=without(session.view.sections, index))
 
 
+@undoable("flat view")
 def lay_flat(session: Session, index: int | None) -> Session:
     """Return the session with the section at that place laid flat beside the view; None: none."""
     laid = (replace(one, flat=i == index) for i, one in enumerate(session.view.sections))
     return set_view(session, sections=tuple(laid))
 
 
+@undoable("choice of a section")
 def choose_section(session: Session, index: int | None) -> Session:
     """Return the session with the section at that place chosen; None: none."""
     return set_view(session, chosen=index)
 
 
+@undoable("handle")
 def show_handle(session: Session, shown: bool) -> Session:
     """Return the session with the handle of the section that is chosen shown, or not."""
     return set_view(session, handle=shown)
@@ -131,6 +148,5 @@ def mark(session: Session, cell: int | None) -> Session:
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened with the taste of the one before: edges, legend, colours."""
-    kept = {name: getattr(old, name) for name in TASTE}
-    return set_view(session, **kept)
+    """Return a session just opened with what suits any mesh from before: what is drawn, colours."""
+    return set_view(session, drawn=old.drawn, colour_map=old.colour_map)

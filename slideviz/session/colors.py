@@ -9,11 +9,13 @@ from slideviz.session.changes_runs import seen_beside
 from slideviz.session.changes_view import set_view
 from slideviz.session.results import Frame
 from slideviz.session.state import Session
+from slideviz.session.undoable import undoable
 
 _PARTS = 100.0
 """The range is rounded outwards to about so many parts of it."""
 
 
+@undoable("colour range")
 def fit_colours(session: Session, every: bool = True) -> Session:
     """Return the session with colours from the lowest to the highest value.
 

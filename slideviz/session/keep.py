@@ -53,7 +53,7 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
         if key in kept:
             values[field] = kept[key]
     if "VIEW_SHOW" in kept:
-        values |= {name: hyphened(name) in kept["VIEW_SHOW"] for name in SHOWN}
+        values["drawn"] = frozenset(name for name in SHOWN if hyphened(name) in kept["VIEW_SHOW"])
     if "VIEW_HIDDEN" in kept:
         values["hidden"] = frozenset(kept["VIEW_HIDDEN"]) & frozenset(names)
     if "VIEW_SECTIONS" in kept:
@@ -78,7 +78,7 @@ def _plain(view: ViewState) -> dict[str, Any]:
         "VIEW_COLOR": view.colour_by,
         "VIEW_MAP": view.colour_map,
         "VIEW_POINTS": view.points,
-        "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if getattr(view, name)),
+        "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if name in view.drawn),
         "VIEW_COPIES": view.copies,
     }
 

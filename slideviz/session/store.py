@@ -10,6 +10,7 @@ from typing import Any
 from slideviz.case.model import Case
 from slideviz.session.changes_runs import bring_back, remove_run, show_run
 from slideviz.session.state import Guess, Session, ViewState
+from slideviz.session.undoable import undo_words
 
 Listener = Callable[[Session, Session], None]
 Failed = Callable[[Exception], None]
@@ -18,47 +19,6 @@ TOGETHER_S = 1.0
 """Changes of one kind that follow each other so closely are undone as one."""
 DEEPEST = 200
 """Changes that can be undone."""
-
-WORDS: dict[str, str] = {
-    "set_role": "role",
-    "confirm": "confirming guesses",
-    "add_motion": "new motion",
-    "replace_motion": "motion",
-    "remove_motion": "removing a motion",
-    "move_motion": "order of motions",
-    "add_section": "new section",
-    "replace_section": "section",
-    "remove_section": "removing a section",
-    "lay_flat": "flat view",
-    "choose_section": "choice of a section",
-    "show_handle": "handle",
-    "show": "hidden boundaries",
-    "isolate": "hidden boundaries",
-    "remove_run": "removing a run",
-    "take_settings": "settings of a run",
-    "set_case": "settings",
-    "fit_colours": "colour range",
-    "set_view": "view",
-}
-"""What the menu calls a change, by the name of its function; others cannot be undone."""
-
-VIEW_WORDS: dict[str, str] = {
-    "colour_by": "colour by",
-    "colour_range": "colour range",
-    "colour_map": "colours",
-    "threshold": "range of cells",
-    "points": "points",
-    "edges": "mesh edges",
-    "undeformed": "undeformed boundaries",
-    "motion_ghost": "motion ghost",
-    "legend": "legend",
-    "triad": "axes",
-    "perspective": "perspective",
-    "sections": "sections",
-    "copies": "neighbours",
-    "hidden": "hidden boundaries",
-}
-"""What the menu calls a change of the view, by the field; it says "view" of several at once."""
 
 
 def tell_all(
@@ -191,14 +151,11 @@ class Store:
         """Replace the session by ``function(session, ...)`` and tell the listeners."""
         old = self.session
         new = function(old, *values, **named)
-        name = getattr(function, "__name__", "")
-        if name in WORDS:
+        words = undo_words(function, named)
+        if words is not None:
             # The first value says which boundary or motion it is, where there are several.
             which = values[0] if values and isinstance(values[0], (int, str, tuple)) else None
-            words = WORDS[name]
-            if name == "set_view" and len(named) == 1:
-                words = VIEW_WORDS.get(next(iter(named)), words)
-            self._remember(old, new, words, (name, which, *sorted(named)))
+            self._remember(old, new, words, (function, which, *sorted(named)))
         self.put(new)
 
     def hold(self, held: bool) -> None:
@@ -285,5 +242,5 @@ class Store:
         self._undo.append(_Done(before, words, kind, at_s))
         # A run that is no longer kept cannot be brought back.
         there = {run.number for run in new.removed}
-        self._undo = [d for d in self._undo if d.kind[0] != "remove_run" or d.kind[1] in there]
+        self._undo = [d for d in self._undo if d.kind[0] is not remove_run or d.kind[1] in there]
         del self._undo[:-DEEPEST]

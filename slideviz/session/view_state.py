@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from slideviz.terms import ColourBy, PointsShown
+from slideviz.terms import SHOWN, ColourBy, PointsShown, Shown
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
@@ -28,18 +29,8 @@ class ViewState:
         Draw only the cells whose value is in this range; None draws all.
     points : PointsShown
         Nodes drawn as points.
-    edges : bool
-        Draw the edges of the cells.
-    undeformed : bool
-        Draw the undeformed boundaries as a ghost.
-    motion_ghost : bool
-        Draw where the motions take the moving boundaries.
-    legend : bool
-        Draw the legend or the colour bar.
-    triad : bool
-        Draw the directions of the axes in a corner.
-    perspective : bool
-        Perspective instead of parallel projection (3D only).
+    drawn : frozenset of Shown
+        What is drawn of that which can be left out.
     sections : tuple of Section
         What cuts the mesh.
     copies : int
@@ -69,12 +60,7 @@ class ViewState:
     colour_map: str = "viridis"
     threshold: tuple[float, float] | None = None
     points: PointsShown = "none"
-    edges: bool = True
-    undeformed: bool = False
-    motion_ghost: bool = True
-    legend: bool = True
-    triad: bool = True
-    perspective: bool = False
+    drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
     sections: tuple[Section, ...] = ()
     copies: int = 0
     hidden: frozenset[str] = frozenset()
@@ -91,6 +77,11 @@ class ViewState:
     def style(self) -> ViewState:
         """Return it without what passes: the step, what is selected or marked, the second view."""
         return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
+
+    def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
+        """Return it with that drawn, or not."""
+        on = frozenset(name for name, wanted in drawn.items() if wanted)
+        return replace(self, drawn=self.drawn - drawn.keys() | on)
 
     @property
     def section(self) -> Section | None:

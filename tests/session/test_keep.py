@@ -15,7 +15,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.keep import keep_view, kept_camera, kept_view
 from slideviz.session.state import ViewState
-from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN
+from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN
 
 number = st.floats(-1e3, 1e3)
 triple = st.tuples(number, number, number)
@@ -40,7 +40,7 @@ views = st.builds(
     st.sampled_from(list(COLOUR_MAPS)),
     rising,
     st.sampled_from(list(POINTS_SHOWN)),
-    *[st.booleans()] * 6,
+    st.sets(st.sampled_from(list(SHOWN))).map(frozenset),
     st.lists(sections, max_size=3).map(tuple),
     st.integers(-1, 5),
     st.sets(st.sampled_from(["left", "top"])).map(frozenset),

@@ -205,9 +205,10 @@ def test_store_works_again_after_a_listener_failed():
 
 
 def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
-    old = replace(session.view, edges=False, hidden=frozenset({"gone"}), selected=("gone",))
+    gone = {"hidden": frozenset({"gone"}), "selected": ("gone",)}
+    old = replace(session.view, drawn=frozenset({"triad"}), **gone)
     new = changes.fresh_view(session, old)
-    assert not new.view.edges
+    assert new.view.drawn == {"triad"}
     assert new.view.hidden == frozenset()
     assert new.view.selected == ()
     assert np.array_equal(new.mesh.points, session.mesh.points)

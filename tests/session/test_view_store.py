@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from slideviz.case.model import Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
+from slideviz.session.changes_view import UNDO_WORDS
 from slideviz.session.state import Frame, Session, ViewState
-from slideviz.session.store import TOGETHER_S, VIEW_WORDS, WORDS, Memento, Store
-from slideviz.terms import COLOUR_BY, ROLES
+from slideviz.session.store import TOGETHER_S, Memento, Store
+from slideviz.session.undoable import undo_words
+from slideviz.terms import COLOUR_BY, ROLES, SHOWN
 
 
 class Clock:
@@ -88,7 +90,7 @@ def test_what_passes_is_not_undone(store, clock):
     store.change(changes.mark, 3)
     assert store.can_undo == "mesh edges"
     store.undo()
-    assert store.session.view.edges
+    assert "edges" in store.session.view.drawn
     assert store.session.view.selected == ("left",)
     assert store.session.view.marked == 3
 
@@ -109,14 +111,36 @@ def test_another_mesh_cannot_be_undone(store, cube):
     assert not store.can_undo
 
 
-def test_every_word_belongs_to_a_change():
-    for name in WORDS:
-        assert callable(getattr(changes, name))
+def test_each_change_that_can_be_undone_has_words():
+    every = {name: undo_words(getattr(changes, name), {}) for name in changes.__all__}
+    assert {name: words for name, words in every.items() if words} == {
+        "add_motion": "new motion",
+        "add_section": "new section",
+        "choose_section": "choice of a section",
+        "confirm": "confirming guesses",
+        "fit_colours": "colour range",
+        "isolate": "hidden boundaries",
+        "lay_flat": "flat view",
+        "move_motion": "order of motions",
+        "remove_motion": "removing a motion",
+        "remove_run": "removing a run",
+        "remove_section": "removing a section",
+        "replace_motion": "motion",
+        "replace_section": "section",
+        "set_case": "settings",
+        "set_role": "role",
+        "set_view": "view",
+        "show": "hidden boundaries",
+        "show_handle": "handle",
+        "take_settings": "settings of a run",
+    }
 
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
     passing = {"selected", "frame", "marked", "beside", "swapped", "ranges"}
-    assert set(VIEW_WORDS) == {field.name for field in fields(ViewState)} - passing
+    other_changes = {"chosen", "handle"}
+    those = {field.name for field in fields(ViewState)} - passing - other_changes
+    assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
 
 
 def test_undo_says_what_of_the_view_it_brings_back(store, clock):

@@ -86,8 +86,8 @@ class Exports(QObject):
         with self._renderer() as renderer, wait_cursor():
             figure = PictureOptions(
                 size,
-                legend=shown.legend,
-                edges=shown.edges,
+                legend="legend" in shown.drawn,
+                edges="edges" in shown.drawn,
                 fill=renderer.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
             )

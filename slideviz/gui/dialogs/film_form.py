@@ -128,9 +128,9 @@ class FilmForm(QWidget):
         return PictureOptions(
             size,
             "white" if self.white.isChecked() else "shown",
-            legend=view.legend,
-            edges=view.edges,
-            triad=view.triad,
+            legend="legend" in view.drawn,
+            edges="edges" in view.drawn,
+            triad="triad" in view.drawn,
             title=True,
             fill=self.fill.isChecked(),
             both=False,

@@ -119,7 +119,6 @@ class DisplayPanel(QWidget):
         for index, (name, term) in enumerate(SHOWN.items()):
             box = QCheckBox(term.label)
             box.setObjectName(f"show_{name}")
-            box.setToolTip(wrapped(term.tip))
             box.toggled.connect(lambda on, name=name: self._set(**{name: on}))
             grid.addWidget(box, index // 2, index % 2)
             self.shown[name] = box
@@ -182,12 +181,10 @@ class DisplayPanel(QWidget):
         self.points.show_value(view.points)
         self._sync_copies(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():
-            box.setChecked(getattr(view, name))
-        flat = opened and session.mesh.dim == 2
-        self.shown["perspective"].setEnabled(not flat)
-        tip = "A 2D mesh is always shown in parallel projection."
-        tip = tip if flat else SHOWN["perspective"].tip
-        self.shown["perspective"].setToolTip(wrapped(tip))
+            box.setChecked(name in view.drawn)
+            hindrance = SHOWN[name].not_in_2d if opened and session.mesh.dim == 2 else ""
+            box.setEnabled(not hindrance)
+            box.setToolTip(wrapped(hindrance or SHOWN[name].tip))
 
     def _sync_copies(self, session: Session, pair: Pair | None) -> None:
         self.copies.setEnabled(pair is not None)

@@ -1,0 +1,33 @@
+"""Marks changes of the session that can be undone, with what the menu calls them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+Change = TypeVar("Change", bound=Callable[..., Any])
+Words = str | Callable[[Mapping[str, Any]], str]
+
+_WORDS: dict[Callable[..., Any], Words] = {}
+
+
+def undoable(words: Words) -> Callable[[Change], Change]:
+    """Return a decorator of changes that `slideviz.session.store.Store` undoes.
+
+    Parameters
+    ----------
+    words : str or callable
+        What stands after "Undo" in the menu, or what returns it for the named values.
+    """
+
+    def mark(change: Change) -> Change:
+        _WORDS[change] = words
+        return change
+
+    return mark
+
+
+def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | None:
+    """Return what the menu calls a change made with these named values; None: is not undone."""
+    words = _WORDS.get(change)
+    return words if words is None or isinstance(words, str) else words(named)
