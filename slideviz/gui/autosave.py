@@ -18,19 +18,19 @@ from datetime import datetime
 from itertools import count
 from pathlib import Path
 
-from qtpy.QtCore import QLockFile, QObject, QTimer
+from qtpy.QtCore import QLockFile, QObject
 
 from slideviz.case.cfg import write_case
 from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
+from slideviz.gui.responsiveness.settings import AUTOSAVE_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.mesh.io.private import private_file, private_folder
 from slideviz.session.keep import Camera, keep_view
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
-DELAY_MS = 5000
-"""The session is written so long after the first change that is not in the file yet."""
 HALF_WRITTEN_S = 60.0
 """A temporary file older than this is not being written any more."""
 SOURCE = "saved as: "
@@ -68,10 +68,7 @@ class Autosave(QObject):
         self._runner = JobRunner(self)
         self._runner.finished.connect(self._done)
         self._runner.failed.connect(self._failed)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(DELAY_MS)
-        self._timer.timeout.connect(self.save)
+        self._timer = later(self, self.save, AUTOSAVE_MS)
         store.listen(self._changed)
 
     def save(self) -> None:

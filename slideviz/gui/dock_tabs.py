@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from qtpy.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+from qtpy.QtCore import QEvent, QObject, QPoint, Qt
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QMenu, QTabBar, QWidget
+
+from slideviz.gui.responsiveness.timers import later
 
 TIP = "Double click: a window of its own. Drag it away to put the panel elsewhere."
 _DOWN = 24
@@ -36,10 +38,7 @@ class DockTabs(QObject):
         for dock in self._docks.values():
             for told in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
                 told.connect(self._soon)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(0)
-        self._timer.timeout.connect(self.watch)
+        self._timer = later(self, self.watch)
         self.watch()
 
     def _soon(self, _: object = None) -> None:

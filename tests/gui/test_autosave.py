@@ -93,7 +93,7 @@ def test_nobody_else_may_read_what_is_kept(make, qtbot, folder, case_file, tmp_p
 
 
 def test_a_change_is_written_some_seconds_later(make, qtbot, case_file, monkeypatch):
-    monkeypatch.setattr(autosave, "DELAY_MS", 20)
+    monkeypatch.setattr(autosave, "AUTOSAVE_MS", 20)
     window = make()
     open_in(window, case_file, qtbot)
     qtbot.waitUntil(window.autosave.path.exists)

@@ -1,17 +1,25 @@
 """What keeps the window answering: priorities, garbage, and painting once instead of twice."""
 
+import ast
 import gc
+import re
 import subprocess
 import sys
 import weakref
+from pathlib import Path
 
 import pytest
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from slideviz.gui.responsiveness.garbage import YOUNG, Tidy
+from slideviz.gui.responsiveness import jit_warmup, settings, threads
+from slideviz.gui.responsiveness.garbage import GarbageCollector
+from slideviz.gui.responsiveness.settings import GARBAGE_OBJECTS
+from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.widgets import plot_image
 from slideviz.gui.widgets.bar import QuietBar
+from slideviz.plots.style import PRINT
 
 
 class Painted(QObject):
@@ -131,7 +139,7 @@ class Ring:
 
 @pytest.fixture
 def tidy(qtbot):
-    made = Tidy()
+    made = GarbageCollector()
     made.start()
     yield made
     made.end()
@@ -144,10 +152,10 @@ def test_garbage_is_looked_for_in_the_windows_thread_only(tidy, qtbot):
     gone = weakref.ref(Ring())
     tidy.look()
     assert gone() is not None, "for little, nobody looks"
-    much = [[] for _ in range(2 * YOUNG)]
+    much = [[] for _ in range(2 * GARBAGE_OBJECTS)]
     assert gone() is not None
     qtbot.waitUntil(lambda: gone() is None)
-    assert len(much) == 2 * YOUNG
+    assert len(much) == 2 * GARBAGE_OBJECTS
 
 
 def test_old_garbage_is_found_too(tidy):
@@ -156,7 +164,7 @@ def test_old_garbage_is_found_too(tidy):
     for _ in range(3):
         gc.collect()
     del ring
-    much = [[] for _ in range(2 * YOUNG)]
+    much = [[] for _ in range(2 * GARBAGE_OBJECTS)]
     tidy.look()
     assert gone() is None
     assert much
@@ -164,7 +172,7 @@ def test_old_garbage_is_found_too(tidy):
 
 BACK = """
 import _thread, os, threading, time
-from slideviz.gui.responsiveness import worker
+from slideviz.gui.responsiveness import settings, threads
 
 numbers = {}
 
@@ -180,8 +188,8 @@ def read():
     mine = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
     return [os.getpriority(os.PRIO_PROCESS, numbers[name]) - mine for name in ("library", "python")]
 before = read()
-worker.hold_libraries_back()
-print(before, read(), worker.NICENESS)
+threads.hold_libraries_back()
+print(before, read(), settings.NICENESS)
 os._exit(0)
 """
 
@@ -195,9 +203,9 @@ def test_the_window_goes_before_threads_of_libraries():
 
 
 NUMERICS = """
-from slideviz.gui import app
+from slideviz.gui.responsiveness.threads import ready_numerics
 
-app.ready_numerics()
+ready_numerics()
 from threadpoolctl import threadpool_info
 blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
 numpys = [one["num_threads"] for one in blas if "numpy.libs" in one["filepath"]]
@@ -215,13 +223,69 @@ def test_numpy_multiplies_in_the_thread_that_asks():
     assert set(threads.strip("[]").split(", ")) == {"1"}
 
 
-def test_the_warm_up_stands_back(window, qtbot, monkeypatch):
-    from slideviz.gui.responsiveness import jit_warmup
-
+def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     order = []
-    monkeypatch.setattr(jit_warmup, "stand_back", lambda: order.append("back"))
+    monkeypatch.setattr(threads, "stand_back", lambda: order.append("back"))
     monkeypatch.setattr(jit_warmup.jit_warmup, "warm_up", lambda *_: order.append("warm"))
     window.warm_up.start()
     qtbot.waitUntil(lambda: len(order) == 2)
     assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"
     gc.unfreeze()
+    order.clear()
+    runner = JobRunner()
+    runner.start(lambda report, stopped: order.append("job"))
+    qtbot.waitUntil(lambda: not runner.busy)
+    plot_image.draw_beside(
+        lambda *_: order.append("plot"), plot_image.Paper(50, 50, 1.0, PRINT), plot_image.Place()
+    ).result()
+    assert order == ["back", "job", "back", "plot"]
+
+
+def test_python_is_set_up_for_a_window(qapp):
+    before = sys.getswitchinterval()
+    try:
+        collector = threads.be_quick()
+        assert sys.getswitchinterval() == pytest.approx(settings.SWITCH_S)
+        assert not gc.isenabled()
+        assert gc.get_freeze_count() > 1000
+        assert collector.parent() is qapp
+        collector.end()
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)
+
+
+# One place for what steers them ------------------------------------------------------------
+
+GUI = Path(settings.__file__).parents[1]
+STEERING = re.compile(
+    r"\bgc\.\w|setswitchinterval\(|setpriority\(|\bnice\(|\bThread\(|Executor\(|QThread|"
+    r"set_num_threads\(|ThreadpoolController|(?:setInterval|singleShot)\([1-9]|^[A-Z_]+_MS\b *="
+)
+OF_THE_FILM = {"viewport/player.py": ("FILM_MS", "STEP_MS")}
+"""What is seen how long is no matter of the window's answering."""
+
+
+def test_nothing_else_in_the_window_steers_threads_timers_and_garbage():
+    strays = []
+    for path in sorted(GUI.rglob("*.py")):
+        place = path.relative_to(GUI).as_posix()
+        if place.startswith("responsiveness/"):
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            if STEERING.search(line) and not line.startswith(OF_THE_FILM.get(place, ("#",))):
+                strays.append(f"{place}:{number}: {line.strip()}")
+    assert not strays, "it belongs to gui/responsiveness/"
+
+
+def test_every_setting_has_its_reason_and_is_used():
+    tree = ast.parse(Path(settings.__file__).read_text())
+    text = "".join(p.read_text() for p in GUI.rglob("*.py") if p != Path(settings.__file__))
+    for node, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+        if isinstance(node, ast.Assign):
+            reason = getattr(getattr(after, "value", None), "value", "")
+            assert isinstance(reason, str), ast.unparse(node)
+            assert len(reason) > 40, ast.unparse(node)
+            for name in ast.walk(node.targets[0]):
+                if isinstance(name, ast.Name):
+                    assert re.search(rf"\b{name.id}\b", text), name.id

@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
-from qtpy.QtCore import QSize, Qt, QTimer, Signal
+from qtpy.QtCore import QSize, Qt, Signal
 from qtpy.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -20,6 +20,8 @@ from slideviz.export.exposure import Drawn
 from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.gui.dialogs.film_form import FilmForm
+from slideviz.gui.responsiveness.settings import PREVIEW_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.bar import QuietBar
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, to_image
@@ -73,10 +75,7 @@ class FilmDialog(QDialog):
         self.bar = QuietBar()
         outer.addWidget(self.bar)
         outer.addWidget(self._make_buttons())
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(120)
-        self._soon.timeout.connect(self._draw)
+        self._soon = later(self, self._draw, PREVIEW_MS)
         self._changed()
         self._show_filming(False)
 

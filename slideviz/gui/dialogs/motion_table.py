@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qtpy.QtCore import QTimer
 from qtpy.QtGui import QFontDatabase
 from qtpy.QtWidgets import (
     QDialog,
@@ -16,11 +15,12 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.errors import SlidevizError
+from slideviz.gui.responsiveness.settings import TABLE_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.session.motion_table import Rows, table_text, write_table
 
 FILTERS = "Displacements (*.txt)"
-CHECK_MS = 150
 ABOUT = (
     "A row for each node: its number, counted from 0 as in the mesh file, and its displacement in "
     "the mesh's length unit. Columns are separated by tabs, spaces, commas or semicolons, so that "
@@ -68,11 +68,7 @@ class TableDialog(QDialog):
         self.fill.clicked.connect(self._fill)
         self.buttons.accepted.connect(self.accept)
         self.buttons.rejected.connect(self.reject)
-        # Not with each key: a long table takes a while.
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(CHECK_MS)
-        self._soon.timeout.connect(self.check)
+        self._soon = later(self, self.check, TABLE_MS)
         self.edit.textChanged.connect(self._soon.start)
         self.edit.setFocus()
         self.check()

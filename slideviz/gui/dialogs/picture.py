@@ -9,7 +9,7 @@ from collections.abc import Generator
 from dataclasses import asdict, replace
 from typing import Any
 
-from qtpy.QtCore import QSize, Qt, QTimer
+from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -27,6 +27,8 @@ from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
 from slideviz.export.vector import MOST_CELLS
+from slideviz.gui.responsiveness.settings import PREVIEW_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import (
@@ -39,8 +41,6 @@ from slideviz.gui.widgets.pixmaps import (
 )
 
 PREVIEW = (470, 330)
-PREVIEW_MS = 120
-"""The preview waits for the end of what is typed."""
 SIZES = {
     "view": "as the view",
     "1600x1000": "1600 × 1000, for a report",
@@ -105,10 +105,7 @@ class PictureDialog(QDialog):
         outer = QVBoxLayout(self)
         outer.addLayout(row)
         outer.addWidget(self._make_buttons())
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(PREVIEW_MS)
-        self._timer.timeout.connect(self._draw)
+        self._timer = later(self, self._draw, PREVIEW_MS)
         self._turns = Turns(self)
         self._turns.failed.connect(raise_again)
         self._take(kept)

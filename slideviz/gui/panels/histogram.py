@@ -12,6 +12,8 @@ from qtpy.QtGui import QKeySequence, QShortcut
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from slideviz.gui.panels.brush import BrushCanvas, Range
+from slideviz.gui.responsiveness.settings import SELECTING_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets.plot_canvas import (
     PLOT_FILTERS,
     PlotArea,
@@ -59,11 +61,7 @@ class HistogramPanel(QWidget):
         column.addWidget(self.numbers)
         column.addWidget(self.range_text)
         column.addLayout(self._make_buttons())
-        # Cells are chosen while the mouse moves, but not with each of its pixels.
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(120)
-        self._soon.timeout.connect(self._choose)
+        self._soon = later(self, self._choose, SELECTING_MS)
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         escape.activated.connect(self.clear_range)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import logging
 
-from qtpy.QtCore import QObject, QTimer
+from qtpy.QtCore import QObject
 
+from slideviz.gui.responsiveness.settings import INTERSECTION_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.session import intersections
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
-DELAY_MS = 200
 log = logging.getLogger("slideviz")
 
 
@@ -26,10 +27,7 @@ class ClashWatch(QObject):
         self._runner.finished.connect(self._found)
         self._runner.cancelled.connect(self._again)
         self._runner.failed.connect(self._failed)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(DELAY_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer = later(self, self._look, INTERSECTION_MS)
         self._asked: tuple[object, ...] = ()
         self._known: tuple[object, ...] = ()
         store.listen(self._changed)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from qtpy.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from qtpy.QtCore import QSignalBlocker, Qt, Signal
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QSlider, QWidget
 
 from slideviz.errors import CaseError
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.mesh.model import FloatArray, Mesh
@@ -44,10 +45,7 @@ class SectionEditor(QWidget):
         self._place: int | None = None
         self._make_fields()
         self._place_fields()
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(0)
-        self._soon.timeout.connect(self._slid)
+        self._soon = later(self, self._slid)
 
     def _make_fields(self) -> None:
         self.axis = Choice({**{word: word for word in AXES}, FREE: "free"})

@@ -20,7 +20,9 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
-from slideviz.gui.widgets.plot_canvas import REST_MS, ask_and_write, folder_of, is_seen, words_label
+from slideviz.gui.responsiveness.settings import REST_MS
+from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.widgets.plot_canvas import ask_and_write, folder_of, is_seen, words_label
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session import changes
@@ -75,9 +77,7 @@ class WorstPanel(QWidget):
         column.addWidget(self.stack, 1)
         column.addWidget(self.info)
         column.addLayout(self._make_buttons())
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.timeout.connect(lambda: self._fill(self.store.session))
+        self._soon = later(self, lambda: self._fill(self.store.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
             (QKeySequence(QKeySequence.StandardKey.Copy), self.copy_rows),

@@ -7,14 +7,10 @@ import time
 
 from qtpy.QtCore import QObject, QTimer
 
-EVERY_MS = 200
-YOUNG = 2000
-"""Objects made since the last look that are worth another one."""
-REST_TIMES = 20
-"""The next look is not before so many times as long as one took."""
+from slideviz.gui.responsiveness.settings import GARBAGE_MS, GARBAGE_OBJECTS, GARBAGE_REST_TIMES
 
 
-class Tidy(QObject):
+class GarbageCollector(QObject):
     """Takes over from Python, which looks for garbage in whatever thread makes many objects.
 
     That thread keeps the interpreter to itself meanwhile: one that computes, and stands back
@@ -25,7 +21,7 @@ class Tidy(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._timer = QTimer(self)
-        self._timer.setInterval(EVERY_MS)
+        self._timer.setInterval(GARBAGE_MS)
         self._timer.timeout.connect(self.look)
 
     def start(self) -> None:
@@ -40,11 +36,11 @@ class Tidy(QObject):
 
     def look(self) -> None:
         """Look for garbage, if much was made since the last time."""
-        if gc.get_count()[0] < YOUNG:
+        if gc.get_count()[0] < GARBAGE_OBJECTS:
             return
         began = time.perf_counter()
         # All of it: what survives is little where the modules are left out (`gc.freeze`), and the
         # longer garbage waits, the longer it takes.
         gc.collect()
         took_ms = 1000.0 * (time.perf_counter() - began)
-        self._timer.setInterval(max(EVERY_MS, round(REST_TIMES * took_ms)))
+        self._timer.setInterval(max(GARBAGE_MS, round(GARBAGE_REST_TIMES * took_ms)))

@@ -10,7 +10,7 @@ from typing import Any
 import pyvista as pv
 from qtpy.QtCore import QObject, QTimer, Signal
 
-from slideviz.gui.responsiveness.worker import stand_back
+from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
 from slideviz.session import jit_warmup
@@ -62,8 +62,7 @@ class WarmUp(QObject):
     def start(self) -> None:
         """Start, unless it was started before."""
         if self.thread_ is None:
-            self.thread_ = Thread(target=self._run, name="slideviz-warm-up", daemon=True)
-            self.thread_.start()
+            self.thread_ = start_thread(self._run, "slideviz-warm-up")
 
     def close(self) -> None:
         """Ask it to end, without waiting."""
@@ -72,7 +71,6 @@ class WarmUp(QObject):
 
     def _run(self) -> None:
         # Numba's threads begin here, and stay as far back as this one.
-        stand_back()
         jit_warmup.warm_up(self._begun, self._stop.is_set)
         # What was imported stays: to look through all of it for garbage takes 100 ms each time.
         gc.freeze()

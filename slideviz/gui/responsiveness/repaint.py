@@ -1,17 +1,17 @@
-"""One picture of the window for all that changed in it."""
+"""Coalesces the repaints of a view and of the widgets around it."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
-from qtpy.QtCore import QCoreApplication, QEvent, QObject, QTimer
+from qtpy.QtCore import QCoreApplication, QEvent, QObject
 from qtpy.QtWidgets import QWidget
 
-SOON_MS = 1
-"""Not 0: that would wait for every other timer that is due, one that plays for example."""
+from slideviz.gui.responsiveness.settings import REPAINT_MS
+from slideviz.gui.responsiveness.timers import later
 
 
-class OnePaint(QObject):
+class RepaintCoalescer(QObject):
     """Paints a view in the next turn of the event loop, and the widgets around it together with it.
 
     Clicks and timers come between what changed a scene and the drawing of it, which takes as long
@@ -25,10 +25,7 @@ class OnePaint(QObject):
         self._view = view
         self._window: QWidget | None = None
         self._held = False
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(SOON_MS)
-        self._timer.timeout.connect(self._paint)
+        self._timer = later(self, self._paint, REPAINT_MS)
 
     def ask(self) -> None:
         """Paint soon."""

@@ -6,14 +6,13 @@ from collections.abc import Callable, Generator
 from functools import partial
 from typing import Any
 
-from qtpy.QtCore import QObject, QTimer, Signal
+from qtpy.QtCore import QObject, Signal
 
+from slideviz.gui.responsiveness.settings import TURN_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.session.jobs import require_going
 from slideviz.session.pieces import Beside
-
-TURN_MS = 1
-"""Between two pieces; not 0, so that other timers and clicks come between them."""
 
 
 class Turns(QObject):
@@ -37,10 +36,7 @@ class Turns(QObject):
         super().__init__(parent)
         self._pieces: Generator[object, Any, Any] | None = None
         self._runner = self._make_runner()
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(TURN_MS)
-        self._timer.timeout.connect(lambda: self._go_on(next))
+        self._timer = later(self, lambda: self._go_on(next), TURN_MS)
 
     def _make_runner(self) -> JobRunner:
         runner = JobRunner(self)

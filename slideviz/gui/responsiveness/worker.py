@@ -9,30 +9,19 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-from threading import Event, Lock, Thread, get_native_id
-from threading import enumerate as enumerate_threads
+from functools import partial
+from threading import Event, Lock, Thread
 from typing import Any
 
 from qtpy.QtCore import QObject, Qt, QTimer, Signal
 
 from slideviz.errors import Cancelled
+from slideviz.gui.responsiveness.settings import CLOSING_S, NEWS_S
+from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.session.jobs import Doing
 
-NEWS_S = 0.1
-"""News are not shown more often: each time the whole window goes to the screen again."""
-CLOSING_S = 1.0
-"""How long a window that closes waits for its job."""
-NICENESS = 5
-"""How far a job stands back behind the window where both want the processor.
-
-Not further: while it keeps the interpreter, the window waits for it, and where other programs are
-busy, too, it would hardly go on.
-"""
 log = logging.getLogger("slideviz")
 
 
@@ -80,11 +69,8 @@ class JobRunner(QObject):
         assert not self.busy, "a job is running"
         self.busy = True
         self._stop = Event()
-        # A daemon: the program must be able to end while a library keeps its thread.
-        self._thread = Thread(
-            target=self._run, args=(self._stop, function, *values), name="slideviz", daemon=True
-        )
-        self._thread.start()
+        work = partial(self._run, self._stop, function, *values)
+        self._thread = start_thread(work, "slideviz")
 
     def cancel(self) -> None:
         """Ask the job to end; it does within a second, with ``cancelled``."""
@@ -100,7 +86,6 @@ class JobRunner(QObject):
         return not self.alive
 
     def _run(self, stop: Event, function: Callable[..., Any], *values: Any) -> None:
-        stand_back()
         try:
             end = ("finished", function(*values, self._report, stop.is_set))
         except Cancelled:
@@ -155,38 +140,3 @@ class JobRunner(QObject):
         else:
             log.debug("a job failed", exc_info=value)
             self.failed.emit(value)
-
-
-def stand_back(thread: int | None = None) -> None:
-    """Let the window go before a thread (default: this one), and before those that it starts.
-
-    Without a graphics card the picture is drawn by the same processor that computes.
-
-    Parameters
-    ----------
-    thread : int, optional
-        Its number in the system.
-    """
-    if sys.platform == "linux":  # only there it is for one thread, not for the whole program
-        thread = get_native_id() if thread is None else thread
-        with contextlib.suppress(OSError):
-            before = os.getpriority(os.PRIO_PROCESS, thread)
-            os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
-
-
-def hold_libraries_back() -> None:
-    """Let the window go before the threads in which libraries compute, BLAS for example.
-
-    They are as many as there are processors, begin when the library is imported, and bear the name
-    of the program, unlike those of Qt and of the graphics. Called once.
-    """
-    tasks = Path("/proc/self/task")
-    if not tasks.is_dir():
-        return
-    pythons = {thread.native_id for thread in enumerate_threads()}
-    name = (tasks / str(get_native_id()) / "comm").read_text()
-    for task in tasks.iterdir():
-        # A thread may have ended meanwhile.
-        with contextlib.suppress(OSError):
-            if int(task.name) not in pythons and (task / "comm").read_text() == name:
-                stand_back(int(task.name))

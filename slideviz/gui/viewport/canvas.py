@@ -14,7 +14,7 @@ from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
 from qtpy.QtWidgets import QApplication
 from vtkmodules.vtkRenderingCore import vtkProp
 
-from slideviz.gui.responsiveness.repaint import OnePaint
+from slideviz.gui.responsiveness.repaint import RepaintCoalescer
 from slideviz.session.pieces import PART_CELLS, portions
 
 ONE_LIGHT = 0.95
@@ -52,7 +52,7 @@ class View3D(QtInteractor):
         self.told = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
-        self._one_paint = OnePaint(self)
+        self._one_paint = RepaintCoalescer(self)
         self._veiled: list[list[vtkProp]] = []
         self._resizing = False
 

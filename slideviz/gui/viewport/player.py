@@ -8,6 +8,7 @@ from qtpy.QtCore import QElapsedTimer, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
+from slideviz.gui.responsiveness.settings import TICK_MS
 from slideviz.gui.viewport.step_numbers import Results, result_parts
 from slideviz.gui.widgets.icons import icon
 from slideviz.session import changes
@@ -18,8 +19,6 @@ FILM_MS = 3000
 """What all steps take together at the usual speed, where no limit for one step is reached."""
 STEP_MS = (50, 500)
 """The shortest and the longest time that a step is seen at the usual speed."""
-TICK_MS = 33
-"""Shortest time between two pictures; where drawing takes longer too, steps are left out."""
 SPEEDS = (0.5, 1.0, 2.0, 4.0)
 NARROW = 540
 """Pixels; a player with less leaves out speed and loop, and words."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QPoint, QTimer, Signal
+from qtpy.QtCore import QPoint, Signal
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
 from slideviz.color_scheme import Look
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.hover import CellHover
@@ -79,10 +80,7 @@ class FlatView(QWidget):
     def _connect(self, store: Store) -> None:
         self.view.told.zoomed.connect(self._zoomed)
         self.view.told.resized.connect(self._resized)
-        self._refit = QTimer(self)
-        self._refit.setSingleShot(True)
-        self._refit.setInterval(0)
-        self._refit.timeout.connect(self.fit)
+        self._refit = later(self, self.fit)
         CellHover(self.view, self.scene, store)
         # The camera moves by the mouse too: the rulers follow whatever moves it.
         self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())

@@ -18,15 +18,16 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from qtpy.QtCore import QObject, QTimer, QtMsgType, Signal, qInstallMessageHandler, qVersion
+from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
 
+from slideviz.gui.responsiveness.settings import COUNTING_MS
+from slideviz.gui.responsiveness.timers import later
 from slideviz.mesh.io.cleanup import is_alive
 from slideviz.mesh.io.private import private_file, private_folder
 
 REST_S = 5.0
 """An error that was told is told again when it has not come for so long."""
-COUNTING_MS = 300
 PACKAGES = (
     "slideviz",
     "numpy",
@@ -70,10 +71,7 @@ class Faults(QObject):
         self._clock = clock
         self._known: dict[tuple[object, ...], tuple[int, float]] = {}
         self._shown: tuple[object, ...] = ()
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(COUNTING_MS)
-        self._timer.timeout.connect(self._count_again)
+        self._timer = later(self, self._count_again, COUNTING_MS)
         self._came.connect(self._take)
 
     def tell(self, error: BaseException) -> None:

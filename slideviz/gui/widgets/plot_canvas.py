@@ -17,18 +17,13 @@ from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
 from slideviz.color_scheme import LIGHT, Look
 from slideviz.errors import SlidevizError
+from slideviz.gui.responsiveness.settings import LOOK_MS, MOST_REST, REST_MS, REST_TIMES
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.written import figure_bytes
-
-REST_MS = 200
-"""Between two drawings while steps are played, at least."""
-REST_TIMES, MOST_REST = 4.0, 4
-"""So many times as long as a drawing took, but not more than so many ``REST_MS``."""
-LOOK_MS = 8
-"""How often it is looked whether a drawing is there."""
 
 FIGURE_INCHES = (4.2, 3.1)
 PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
@@ -64,9 +59,7 @@ class PlotCanvas(QWidget):
         self._last = 0.0
         self._picture = Picture()
         self._coming: Future[Picture] | None = None
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self.fill)
+        self._timer = later(self, self.fill)
         # Asked for rather than told: the thread need not know of a widget that may be gone.
         self._look_after = QTimer(self)
         self._look_after.setInterval(LOOK_MS)

@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from threading import Lock, Thread
+from threading import Lock
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slideviz.gui.responsiveness.worker import stand_back
+from slideviz.gui.responsiveness.threads import start_thread
 from slideviz.plots.style import Style
 
 DPI = 100
@@ -101,7 +101,6 @@ def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:
     coming: Future[Picture] = Future()
 
     def work() -> None:
-        stand_back()
         try:
             with _ONE:
                 coming.set_result(picture(draw_on, paper, place))
@@ -110,5 +109,5 @@ def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:
             coming.set_exception(error)
 
     # Ended with each plot: a thread that waits for the next would keep what it drew.
-    Thread(target=work, name=THREAD).start()
+    start_thread(work, THREAD, daemon=False)
     return coming

@@ -1,0 +1,99 @@
+"""Threads beside the window, which goes before all of them, and the interpreter they share."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from threading import Thread, get_native_id
+from threading import enumerate as enumerate_threads
+
+from qtpy.QtCore import QCoreApplication
+from threadpoolctl import ThreadpoolController
+
+from slideviz.gui.responsiveness.garbage import GarbageCollector
+from slideviz.gui.responsiveness.settings import NICENESS, NUMPY_THREADS, SWITCH_S
+
+
+def ready_numerics() -> None:
+    """Import what computes, before there is any other thread, and let the window go before it."""
+    # Here, once: two threads that import Numba at the same time (the warm-up and a run) find it
+    # half-made.
+    import_module("slideviz.deformation.solver")
+    hold_libraries_back()
+    blas = ThreadpoolController().select(user_api="blas").lib_controllers
+    numpys = [one for one in blas if "numpy.libs" in one.filepath]
+    if len(numpys) < len(blas):
+        for one in numpys:
+            one.set_num_threads(NUMPY_THREADS)
+
+
+def be_quick() -> GarbageCollector:
+    """Set Python up for a window that must answer while other threads compute.
+
+    Returns
+    -------
+    GarbageCollector
+        Looks for garbage from now on; it belongs to the application.
+    """
+    # The modules live as long as the window, and need not be searched for garbage.
+    gc.collect()
+    gc.freeze()
+    sys.setswitchinterval(SWITCH_S)
+    collector = GarbageCollector(QCoreApplication.instance())
+    collector.start()
+    return collector
+
+
+def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> Thread:
+    """Return a thread that stands back behind the window, as do those that it starts.
+
+    A daemon: the program must be able to end while a library keeps its thread.
+    """
+
+    def run() -> None:
+        stand_back()
+        work()
+
+    thread = Thread(target=run, name=name, daemon=daemon)
+    thread.start()
+    return thread
+
+
+def stand_back(thread: int | None = None) -> None:
+    """Let the window go before a thread (default: this one), and before those that it starts.
+
+    Without a graphics card the picture is drawn by the same processor that computes.
+
+    Parameters
+    ----------
+    thread : int, optional
+        Its number in the system.
+    """
+    if sys.platform == "linux":  # only there it is for one thread, not for the whole program
+        thread = get_native_id() if thread is None else thread
+        with contextlib.suppress(OSError):
+            before = os.getpriority(os.PRIO_PROCESS, thread)
+            os.setpriority(os.PRIO_PROCESS, thread, before + NICENESS)
+
+
+def hold_libraries_back() -> None:
+    """Let the window go before the threads in which libraries compute, BLAS for example.
+
+    They are as many as there are processors, begin when the library is imported, and bear the name
+    of the program, unlike those of Qt and of the graphics. Called once.
+    """
+    tasks = Path("/proc/self/task")
+    if not tasks.is_dir():
+        return
+    pythons = {thread.native_id for thread in enumerate_threads()}
+    name = (tasks / str(get_native_id()) / "comm").read_text()
+    for task in tasks.iterdir():
+        # A thread may have ended meanwhile.
+        with contextlib.suppress(OSError):
+            if int(task.name) not in pythons and (task / "comm").read_text() == name:
+                stand_back(int(task.name))
