@@ -22,6 +22,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.cards import SIZE, card
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.tips import rich_label, wrapped
@@ -39,7 +40,6 @@ TRIED = "passage"
 class StartPage(QScrollArea):
     """Try it, open, the files used last, and the sample cases."""
 
-    open_wanted = Signal()
     try_wanted = Signal(str)
     file_wanted = Signal(object)
     sample_wanted = Signal(str)
@@ -105,8 +105,8 @@ class StartPage(QScrollArea):
         self.attempt.setVisible(can_try)
         self.open = QPushButton("Open a mesh or case…")
         self.open.setObjectName("open_page")
-        self.open.setToolTip("Open a mesh, or a case with its mesh.")
-        self.open.clicked.connect(self.open_wanted)
+        self.open.setToolTip(COMMANDS["open"].tip)
+        self.open.clicked.connect(lambda _=False: COMMANDS["open"].do(self.window()))
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
             button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)

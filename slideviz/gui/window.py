@@ -14,6 +14,7 @@ from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidge
 from slideviz.case.motion_words import box_words
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
+from slideviz.gui.commands import Now
 from slideviz.gui.dialogs.exporter import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks
@@ -81,7 +82,6 @@ class MainWindow(QMainWindow):
         self.docks_ = Docks(self)
         self._make_status()
         self.actions_ = Actions(self)
-        self.actions_.add_panels(self.docks.values())
         self._connect()
         self.set_theme(str(self.settings.value("theme", "system")))
         self._restore()
@@ -180,10 +180,7 @@ class MainWindow(QMainWindow):
         running.doing.connect(panel.show_doing)
         running.ended.connect(self._job_ended)
         running.said.connect(self.say)
-        panel.run_wanted.connect(self.start_run)
-        panel.cancel_wanted.connect(self.cancel)
         panel.place_wanted.connect(self.lead_to)
-        self.start.open_wanted.connect(self.files.ask_and_open)
         self.start.file_wanted.connect(self.files.open_path)
         self.start.sample_wanted.connect(self.files.open_sample)
         self.start.try_wanted.connect(self.files.try_sample)
@@ -226,8 +223,16 @@ class MainWindow(QMainWindow):
     def sync_actions(self) -> None:
         """Show in menus, tool bar and title what is and what can be done."""
         session = self.store.session
-        ready = self.run_panel.run.isEnabled()
-        self.actions_.sync(session, self.runner.busy, ready)
+        self.actions_.sync(
+            Now(
+                session,
+                busy=self.runner.busy,
+                ready=self.run_panel.run.isEnabled(),
+                undo=self.store.can_undo,
+                redo=self.store.can_redo,
+                theme=str(self.settings.value("theme")),
+            )
+        )
         name = session.case.source or session.path
         # The mesh of a run that the case on disk repeats is not what is unsaved of it.
         lost = session.unsaved_mesh and not session.repeatable
@@ -296,20 +301,6 @@ class MainWindow(QMainWindow):
 
     # The view --------------------------------------------------------------------------
 
-    def fit(self) -> None:
-        """Make everything fill the view."""
-        self.viewing.fit()
-
-    def look_from(self, side: str) -> None:
-        """Look from a side."""
-        self.viewing.look_from(side)
-
-    def show_all(self) -> None:
-        """Show every boundary."""
-        mesh = self.store.session.mesh
-        if mesh is not None:
-            self.store.change(changes.show, mesh.marker_names)
-
     def lead_to(self, missing: Missing) -> None:
         """Bring the panel to the front where something is put right, and the field."""
         if missing.place == "open":
@@ -327,7 +318,7 @@ class MainWindow(QMainWindow):
         look = theme.apply(name)
         colour = theme.icon_colour(look)
         self.actions_.set_icon_colour(colour)
-        self.actions_.by_name[f"theme_{name}"].setChecked(True)
+        self.sync_actions()
         self.player.set_icon_colour(colour)
         for panel in self.docks_.panels.values():
             if hasattr(panel, "take_theme"):

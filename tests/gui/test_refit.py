@@ -13,7 +13,7 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
     driver.open(passage_file)
     window.store.change(changes.set_role, ("airfoil",), "moving")
     window.store.change(changes.set_case, motions=(Translate("airfoil", (0.0, 1.8)),))
-    window.fit()
+    window.viewing.fit()
     if zoomed:
         window.scene.zoom_at(50, 50, 1.7)
     before = window.scene.eye.place

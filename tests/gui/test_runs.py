@@ -226,7 +226,7 @@ def test_the_button_compares_with_the_undeformed_mesh_or_a_run(ran):
     assert title(ran, 2) not in texts, "a run is not compared with itself"
     open_and_choose(ran, button, "End the comparison")
     assert ran.session.view.beside is None
-    compare = ran.window.actions_.compare
+    compare = ran.window.actions_.menus["compare"]
     assert compare.isEnabled()
     compare.aboutToShow.emit()
     assert [act.text() for act in compare.actions()] == texts
@@ -437,7 +437,7 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
 @pytest.mark.parametrize("two", [False, True])
 def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved(ran, two):
     viewing = compare(ran) if two else ran.window.viewing
-    ran.window.fit()
+    ran.window.viewing.fit()
     lead = viewing._scenes()[-1]
     before = lead.eye.place
     ran.window.docks["runs"].hide()
@@ -447,7 +447,7 @@ def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved
     QApplication.processEvents()
     place = lead.eye.place
     assert lead.eye.fitted
-    ran.window.fit()
+    ran.window.viewing.fit()
     assert lead.eye.place == pytest.approx(place)
     lead.zoom_at(100, 100, 1.5)
     place = lead.eye.place
@@ -562,7 +562,7 @@ def test_the_window_closes_during_a_comparison(ran, answers):
 
 def test_the_camera_moves_after_a_run_only_if_some_of_the_mesh_has_left_the_view(ran):
     window, eye = ran.window, ran.window.scene.eye
-    window.fit()
+    window.viewing.fit()
     before = eye.place
     assert eye.fitted
     shapes = [np.asarray(shape.points) for shape in window.scene._shapes()]

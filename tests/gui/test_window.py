@@ -201,7 +201,7 @@ def test_a_click_in_the_view_selects_the_row_and_a_drag_does_not(opened):
 
 def test_a_click_in_a_3d_view_selects_the_face_in_front(driver, sample_folder):
     driver.open(sample_folder / "hexahedron" / "mesh.su2")
-    driver.window.look_from("+x")
+    driver.window.viewing.look_from("+x")
     driver.click_view((1.0, 0.5, 0.5))
     assert driver.window.boundaries.selected() == ("RIGHT",)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 
 from qtpy.QtCore import QObject, QSize, Qt
-from qtpy.QtGui import QAction, QFontDatabase, QTextCursor, QTextDocument
+from qtpy.QtGui import QFontDatabase, QKeySequence, QTextCursor, QTextDocument
 from qtpy.QtWidgets import (
     QApplication,
     QDialog,
@@ -14,7 +14,6 @@ from qtpy.QtWidgets import (
     QHeaderView,
     QLabel,
     QLineEdit,
-    QMenu,
     QPlainTextEdit,
     QTreeWidget,
     QTreeWidgetItem,
@@ -22,6 +21,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.gui.commands import MENUS, Now
 from slideviz.gui.widgets.faults import versions
 from slideviz.gui.widgets.icons import logo
 
@@ -211,39 +211,22 @@ class AboutDialog(QDialog):
 
 
 def shortcut_rows(window) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """Return for each menu the actions that have keys: text, keys, what they do."""
-    found = []
-    for top in window.menuBar().actions():
-        rows = [
-            (_name(action), _keys(action), action.statusTip())
-            for action in _leaves(top.menu())
-            if _keys(action)
+    """Return for each menu the commands that have keys: title, keys, what they do."""
+    # What would be undone just now is not told.
+    now, native = Now(window.store.session), QKeySequence.SequenceFormat.NativeText
+    rows = {
+        menu.title: [
+            (_plain(one.called(now)), QKeySequence(one.keys[0]).toString(native), one.tip)
+            for one in menu.commands()
+            if one.keys
         ]
-        if rows:
-            found.append((top.text().replace("&", ""), rows))
-    return found
+        for menu in MENUS
+    }
+    return [(_plain(title), found) for title, found in rows.items() if found]
 
 
-def _name(action: QAction) -> str:
-    # That of undo and redo says what would be undone just now.
-    changing = action.objectName() in ("undo", "redo")
-    text = action.objectName().capitalize() if changing else action.text()
-    return text.replace("&", "").rstrip("…")
-
-
-def _keys(action: QAction) -> str:
-    return action.shortcut().toString(action.shortcut().SequenceFormat.NativeText)
-
-
-def _leaves(menu: QMenu | None) -> list[QAction]:
-    """Return the actions of a menu and of the menus in it."""
-    found = []
-    for action in menu.actions() if menu is not None else ():
-        if action.menu() is not None:
-            found += _leaves(action.menu())
-        elif not action.isSeparator():
-            found.append(action)
-    return found
+def _plain(title: str) -> str:
+    return title.replace("&", "").rstrip("…")
 
 
 def details(window) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 from qtpy.QtCore import QSize, Qt
@@ -19,8 +18,10 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.gui.commands import COMMANDS, Now
 from slideviz.gui.panels.display_fields import Copies, Span, map_icon
 from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.plot_canvas import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.periodic import Pair
 from slideviz.scene.passages import Period
@@ -34,7 +35,7 @@ from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, labels
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
     "range": "The values at the ends of the colour bar.",
-    "fit": "From the lowest to the highest value of what is shown now (R); of all steps: Shift+R.",
+    "fit": COMMANDS["fit_colours"].button,
 }
 ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
@@ -83,9 +84,8 @@ class DisplayPanel(QWidget):
         row = QHBoxLayout()
         row.setSpacing(3)
         row.addWidget(self.range, 1)
-        fit = partial(self.store.change, changes.fit_colours, every=False)
-        self.fit_range = self._button("fit_range", "Fit", fit)
-        self.reset_range = self._button("reset_range", "Reset", self._reset_range)
+        self.fit_range = self._button("fit_range", "Fit", "fit_colours")
+        self.reset_range = self._button("reset_range", "Reset", "usual_colours")
         row.addWidget(self.fit_range)
         row.addWidget(self.reset_range)
         self.form.addRow("Range", row)
@@ -119,7 +119,7 @@ class DisplayPanel(QWidget):
         for index, (name, term) in enumerate(SHOWN.items()):
             box = QCheckBox(term.label)
             box.setObjectName(f"show_{name}")
-            box.toggled.connect(lambda on, name=name: self._set(**{name: on}))
+            box.clicked.connect(lambda _=False, name=name: COMMANDS[name].do(main_window(self)))
             grid.addWidget(box, index // 2, index % 2)
             self.shown[name] = box
         self.form.addRow("Show", grid)
@@ -130,11 +130,11 @@ class DisplayPanel(QWidget):
         choice.chosen.connect(lambda value: self._set(**{field: value}))
         return choice
 
-    def _button(self, name: str, text: str, function) -> QPushButton:
+    def _button(self, name: str, text: str, command: str) -> QPushButton:
         button = QPushButton(text)
         button.setObjectName(name)
         button.setFixedWidth(button.fontMetrics().horizontalAdvance(text) + 16)
-        button.clicked.connect(lambda _=False: function())
+        button.clicked.connect(lambda _=False: COMMANDS[command].do(main_window(self)))
         return button
 
     # State to widgets ------------------------------------------------------------------
@@ -148,7 +148,7 @@ class DisplayPanel(QWidget):
         if key == self._key:
             return
         self._key = key
-        widgets = (self.only, self.copies, *self.shown.values())
+        widgets = (self.only, self.copies)
         for widget in widgets:
             widget.blockSignals(True)
         try:
@@ -182,9 +182,9 @@ class DisplayPanel(QWidget):
         self._sync_copies(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
-            hindrance = SHOWN[name].not_in_2d if opened and session.mesh.dim == 2 else ""
-            box.setEnabled(not hindrance)
-            box.setToolTip(wrapped(hindrance or SHOWN[name].tip))
+            able, term = COMMANDS[name].enabled(Now(session)), SHOWN[name]
+            box.setEnabled(able)
+            box.setToolTip(wrapped(term.not_in_2d if opened and not able else term.tip))
 
     def _sync_copies(self, session: Session, pair: Pair | None) -> None:
         self.copies.setEnabled(pair is not None)
@@ -208,9 +208,6 @@ class DisplayPanel(QWidget):
 
     def _set(self, **values: Any) -> None:
         self.store.change(changes.set_view, **values)
-
-    def _reset_range(self) -> None:
-        self._set(colour_range=None)
 
     def _only(self, on: bool) -> None:
         self._set(threshold=_worse_half(self.store.session) if on else None)

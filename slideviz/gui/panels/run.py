@@ -15,8 +15,10 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.color_scheme import Look
+from slideviz.gui.commands import COMMANDS, Command
 from slideviz.gui.widgets.bar import QuietBar
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.plot_canvas import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.changes import is_missing
@@ -35,12 +37,10 @@ class RunPanel(QWidget):
 
     Signals
     -------
-    run_wanted(), cancel_wanted(), place_wanted(Missing)
-        The buttons; and the link to where what is missing is put right.
+    place_wanted(Missing)
+        The link to where what is missing is put right.
     """
 
-    run_wanted = Signal()
-    cancel_wanted = Signal()
     place_wanted = Signal(object)
 
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
@@ -53,15 +53,8 @@ class RunPanel(QWidget):
         layout.setContentsMargins(6, 6, 6, 6)
         layout.setSpacing(5)
         row = QHBoxLayout()
-        self.run = QPushButton(icon("run", "#ffffff"), "Run")
-        self.run.setObjectName("run")
-        self.run.setShortcut("Ctrl+R")
-        self.run.clicked.connect(self.run_wanted)
-        self.cancel = QPushButton(icon("cancel"), "Cancel")
-        self.cancel.setObjectName("cancel")
-        self.cancel.setShortcut("Esc")
-        self.cancel.setToolTip("Stop within a second (Esc); the steps that are done stay.")
-        self.cancel.clicked.connect(self.cancel_wanted)
+        self.run = self._button(COMMANDS["run"], "#ffffff")
+        self.cancel = self._button(COMMANDS["cancel"])
         self.text = QLabel()
         self.text.setWordWrap(True)
         self.text.setMinimumHeight(34)
@@ -83,6 +76,14 @@ class RunPanel(QWidget):
         layout.addWidget(self.bar)
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
+
+    def _button(self, command: Command, *colour: str) -> QPushButton:
+        button = QPushButton(icon(command.image, *colour), command.title.replace("&", ""))
+        button.setObjectName(command.name)
+        button.setShortcut(command.button_key)
+        button.setToolTip(command.button)
+        button.clicked.connect(lambda _=False: command.do(main_window(self)))
+        return button
 
     def sync(self, session: Session) -> None:
         """Show whether a run can start, and if not what it needs."""
@@ -112,7 +113,7 @@ class RunPanel(QWidget):
             self.text.setToolTip(wrapped(tip))
             self.run.setToolTip(wrapped(tip))
             return
-        self.run.setToolTip("Deform the mesh with these settings (Ctrl+R).")
+        self.run.setToolTip(COMMANDS["run"].button)
         self.text.setToolTip("")
         self._tell_run(session)
 

@@ -9,6 +9,7 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import QApplication, QHBoxLayout, QMenu, QToolButton, QWidget
 
 from slideviz.errors import SlidevizError
+from slideviz.gui.commands import COMPARE, Command
 from slideviz.gui.panels.runs_tree import RunTree
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.icons import icon
@@ -20,10 +21,6 @@ from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
-TIP_COMPARE = (
-    "Show the undeformed mesh or another run beside the run that is shown. "
-    "Ctrl+click on a run does so too."
-)
 TABLE_FILTERS = "Table (*.csv)"
 
 Tell = tuple[Callable[[BaseException], None], Callable[[str], None]]
@@ -54,19 +51,14 @@ class RunActions:
         self.row.setSpacing(2)
         self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
         self.row.addWidget(self.buttons["compare"])
-        for name, image, tip, function in (
-            ("settings", "settings", "Put its settings back into the panels", self.take_settings),
-            ("save", "save", "Save the mesh of this run", self.save_mesh),
-            ("remove", "remove", "Remove this run from the list", self.remove),
-            ("copy", "copy", "Copy the table of all runs", self.copy_table),
-            ("export", "table", "Export the table of all runs as CSV", self.export_table),
-        ):
-            button = self._make_button(name, image, tip)
-            button.clicked.connect(lambda _=False, function=function: function())
-            if name == "copy":
+        for command in RUN_COMMANDS:
+            if command is None:
                 self.row.addStretch(1)
+                continue
+            button = self._make_button(command.name, command.image, command.tip)
+            button.clicked.connect(lambda _=False, command=command: command.do(self))
             self.row.addWidget(button)
-            self.buttons[name] = button
+            self.buttons[command.name] = button
 
     def _make_button(self, name: str, image: str, tip: str) -> QToolButton:
         button = QToolButton()
@@ -77,7 +69,9 @@ class RunActions:
         return button
 
     def _make_compare(self) -> QToolButton:
-        button = self._make_button("compare", "beside", TIP_COMPARE)
+        button = self._make_button(
+            "compare", "beside", f"{COMPARE.tip} Ctrl+click on a run does so too."
+        )
         button.setText("Compare")
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
@@ -94,16 +88,10 @@ class RunActions:
     def sync(self, session: Session) -> None:
         """Show what can be done."""
         run = session.run_shown
-        done = run is not None and run.last is not None
-        for name, can in (
-            ("compare", done),
-            ("settings", run is not None),
-            ("save", done and bool(run.end)),
-            ("remove", run is not None and bool(run.end)),
-            ("copy", bool(session.runs)),
-            ("export", bool(session.runs)),
-        ):
-            self.buttons[name].setEnabled(can)
+        self.buttons["compare"].setEnabled(run is not None and run.last is not None)
+        for command in filter(None, RUN_COMMANDS):
+            able = run is not None and command.enabled(run)
+            self.buttons[command.name].setEnabled(able)
 
     def menu(self, number: int) -> QMenu:
         """Return what can be done with a run."""
@@ -122,19 +110,17 @@ class RunActions:
                 lambda: self.show_beside(number),
             ),
             ("Rename\tF2", True, lambda: self.tree.edit_name(number)),
-            ("Put its settings back into the panels", True, lambda: self.take_settings(number)),
-            ("Save its mesh…", bool(run.frames and run.end), lambda: self.save_mesh(number)),
-            ("Remove", bool(run.end), lambda: self.remove(number)),
-            ("", True, None),
-            ("Copy the table", True, self.copy_table),
-            ("Export the table…", True, self.export_table),
         ):
-            if not text:
-                menu.addSeparator()
-                continue
             act = menu.addAction(text)
             act.setEnabled(can)
             act.triggered.connect(lambda _=False, function=function: function())
+        for command in RUN_COMMANDS:
+            if command is None:
+                menu.addSeparator()
+                continue
+            act = menu.addAction(command.title)
+            act.setEnabled(command.enabled(run))
+            act.triggered.connect(lambda _=False, do=command.do: do(self, number))
         return menu
 
     def show_beside(self, number: int) -> None:
@@ -161,12 +147,12 @@ class RunActions:
         self.store.change(changes.remove_run, number)
         self._say(f"Run {number} removed (Ctrl+Z brings it back)")
 
-    def copy_table(self) -> None:
+    def copy_table(self, _number: int | None = None) -> None:
         """Put the table into the clipboard, for a spreadsheet."""
         QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
         self._say("Copied the table of runs")
 
-    def export_table(self) -> None:
+    def export_table(self, _number: int | None = None) -> None:
         """Ask for a name and write the table."""
         session = self.store.session
         folder = session.path.parent if session.path is not None else Path.home()
@@ -181,3 +167,22 @@ class RunActions:
             self._tell_error(error)
             return
         self._say(f"Saved {path}")
+
+
+# fmt: off
+RUN_COMMANDS: tuple[Command | None, ...] = (
+    Command("settings", "Put its settings back into the panels",
+            "Put its settings back into the panels", RunActions.take_settings, image="settings"),
+    Command("save", "Save its mesh…", "Save the mesh of this run", RunActions.save_mesh,
+            image="save", enabled=lambda run: bool(run.frames and run.end)),
+    Command("remove", "Remove", "Remove this run from the list", RunActions.remove,
+            image="remove", enabled=lambda run: bool(run.end)),
+    None,
+    Command("copy", "Copy the table", "Copy the table of all runs", RunActions.copy_table,
+            image="copy"),
+    Command("export", "Export the table…", "Export the table of all runs as CSV",
+            RunActions.export_table, image="table"),
+)
+# fmt: on
+"""What the buttons and the menu of a row offer: done, given `RunActions` and maybe the number of
+a run, to that or to the chosen one; enabled by a `Run`."""

@@ -8,6 +8,7 @@ from qtpy.QtCore import QElapsedTimer, Qt, QTimer
 from qtpy.QtGui import QAction, QActionGroup
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
+from slideviz.gui.commands import STEPS
 from slideviz.gui.responsiveness.settings import TICK_MS
 from slideviz.gui.viewport.step_numbers import Results, result_parts
 from slideviz.gui.widgets.icons import icon
@@ -41,18 +42,13 @@ class Player(QWidget):
         row.setContentsMargins(6, 3, 8, 3)
         row.setSpacing(1)
         self.buttons: dict[str, QToolButton] = {}
-        for name, tip, function in (
-            ("first", "Undeformed mesh (Home)", lambda: self.go(0)),
-            ("previous", "One step back (←)", lambda: self.step(-1)),
-            ("play", "Play the steps (Space)", self.toggle),
-            ("next", "One step on (→)", lambda: self.step(1)),
-            ("last", "Last step (End)", lambda: self.go(10**9)),
-        ):
+        for command in STEPS.commands():
+            name = command.name.removeprefix("step_")
             button = QToolButton()
             button.setObjectName(f"player_{name}")
             button.setIcon(icon(name))
-            button.setToolTip(tip)
-            button.clicked.connect(function)
+            button.setToolTip(command.button)
+            button.clicked.connect(lambda _=False, do=command.do: do(self.window()))
             self.buttons[name] = button
             row.addWidget(button)
         self._add_speed(row)

@@ -10,7 +10,7 @@ from qtpy.QtSvg import QSvgRenderer
 
 from slideviz.terms import ROLES
 
-_STROKES = {
+STROKES = {
     "open": '<path d="M3 19V5h6l2 3h8v3"/><path d="M3 19l3-8h16l-3 8z"/>',
     "save": '<path d="M4 4h12l4 4v12H4z"/><path d="M8 4v5h7V4M7 20v-7h10v7"/>',
     "undo": '<path d="M8 5L4 9l4 4"/><path d="M4 9h10a5.5 5.5 0 0 1 0 11h-4"/>',
@@ -34,7 +34,7 @@ _STROKES = {
     "edges": '<path d="M4 4h16v16H4zM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16"/>',
     "undeformed": '<path d="M5 16c2-9 8-11 14-11" stroke-dasharray="2.5 2.5"/>'
     '<path d="M5 20c5-2 12-2 14-9"/>',
-    "ghost": '<path d="M4 17c3-8 9-10 15-10"/><path d="M15 3.5L19 7l-4 3.5"/>',
+    "motion_ghost": '<path d="M4 17c3-8 9-10 15-10"/><path d="M15 3.5L19 7l-4 3.5"/>',
     "legend": '<rect x="4" y="5" width="4" height="4" fill="{c}"/><path d="M11 7h9"/>'
     '<rect x="4" y="14" width="4" height="4" fill="{c}"/><path d="M11 16h9"/>',
     "perspective": '<path d="M4 8l6-3 10 2v10l-10 2-6-3z"/><path d="M10 5v14M4 8v8"/>',
@@ -104,7 +104,7 @@ def _faded(pixmap: QPixmap) -> QPixmap:
 @lru_cache(maxsize=256)
 def icon(name: str, colour: str = "#3b4652") -> QIcon:
     """Return an icon of that name in a colour."""
-    svg = _SVG.format(c=colour, w=1.8, body=_STROKES[name].format(c=colour))
+    svg = _SVG.format(c=colour, w=1.8, body=STROKES[name].format(c=colour))
     found = QIcon()
     for size in (20, 40):
         pixmap = _pixmap(svg, size)

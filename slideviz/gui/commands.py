@@ -1,0 +1,456 @@
+"""Every action and toggle of the window, once: menus, tool bar, help and panels read it here.
+
+`MENUS` has them as the menu bar shows them, `COMMANDS` by name. A toggle of the view is a row of
+`slideviz.terms.SHOWN`, a shape of sections one of `slideviz.case.section_shapes.SECTION_SHAPES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from qtpy.QtGui import QAction, QKeySequence
+from qtpy.QtWidgets import QMenu
+
+from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
+from slideviz.gui.widgets.icons import STROKES
+from slideviz.gui.widgets.runs_menu import fill_compare
+from slideviz.gui.widgets.tips import wrapped
+from slideviz.session import changes
+from slideviz.session.colors import usual_range
+from slideviz.session.state import Session
+from slideviz.terms import SHOWN, Shown, ShownTerm
+
+KEY = QKeySequence.StandardKey
+Keys = str | QKeySequence.StandardKey
+
+
+def always(_: Any) -> bool:
+    """Return True."""
+    return True
+
+
+@dataclass(frozen=True)
+class Command:
+    """Something that can be done, with all its words, for whatever offers it.
+
+    Attributes
+    ----------
+    name : str
+    title : str
+        In a menu, with the letter marked that chooses it there.
+    tip : str
+        What it does, in a sentence.
+    do : callable
+        Does it, given the window.
+    keys : tuple of str or standard keys
+    image : str
+        The name of its icon.
+    enabled, checked : callable
+        Whether it can be done and, of a toggle, whether it is on, given the `Now` of the window.
+    title_now : callable, optional
+        Its title where that changes; an empty one takes it out of the menu.
+    tip_now : callable, optional
+        What its tooltip says instead, if anything; where it cannot be done, why.
+    button, button_key : str
+        What the tooltip of its button in a panel says, and the key of that.
+    short : str
+        Its word on the tool bar, if it has no icon.
+    """
+
+    name: str
+    title: str
+    tip: str
+    do: Callable[..., object]
+    keys: tuple[Keys, ...] = ()
+    image: str = ""
+    enabled: Callable[[Any], bool] = always
+    checked: Callable[[Now], bool] | None = None
+    title_now: Callable[[Now], str] | None = None
+    tip_now: Callable[[Now], str] | None = None
+    button: str = ""
+    button_key: str = ""
+    short: str = ""
+
+    def called(self, now: Now) -> str:
+        """Return its title, as it is now if it is offered now."""
+        return (self.title_now(now) if self.title_now else "") or self.title
+
+    def action(self, window: Any) -> QAction:
+        """Return an action that does it; `show` keeps it up to date."""
+        act = QAction(self.title, window)
+        act.setObjectName(self.name)
+        act.setShortcuts([QKeySequence(keys) for keys in self.keys])
+        act.setCheckable(self.checked is not None)
+        act.triggered.connect(lambda _=False: self.do(window))
+        if self.short:
+            act.setIconText(self.short)
+        self._explain(act, self.tip, self.tip)
+        return act
+
+    def _explain(self, act: QAction, status: str, tip: str) -> None:
+        act.setStatusTip(status)
+        keys = act.shortcut().toString()
+        act.setToolTip(wrapped(f"{tip} ({keys})" if keys else tip))
+
+    def show(self, act: QAction, now: Now) -> None:
+        """Let its action show what can be done now."""
+        able = self.enabled(now)
+        if self.title_now is not None:
+            title = self.title_now(now)
+            act.setVisible(bool(title))
+            able = able and bool(title)
+            act.setText(title or act.text())
+        act.setEnabled(able)
+        if self.checked is not None:
+            act.setChecked(self.checked(now))
+        if self.tip_now is not None:
+            tip = self.tip_now(now) or self.tip
+            self._explain(act, self.tip if able else tip, tip)
+
+
+@dataclass(frozen=True)
+class Menu:
+    """A menu: what is in it, by lines and menus in it.
+
+    Attributes
+    ----------
+    fill : callable, optional
+        Puts in what no table knows, given the window and the menu: once, above the entries, or,
+        where there are none, each time that it opens.
+    one_of : bool
+        Whether one of its commands is on at a time.
+    tooltips : bool
+        Whether it shows tooltips: they say why something cannot be done.
+    """
+
+    name: str
+    title: str
+    tip: str = ""
+    entries: tuple[Command | Menu | None, ...] = ()
+    enabled: Callable[[Now], bool] = always
+    fill: Callable[[Any, QMenu], object] | None = None
+    one_of: bool = False
+    tooltips: bool = False
+
+    def commands(self) -> Iterator[Command]:
+        """Yield the commands in it and in the menus in it."""
+        for entry in self.entries:
+            if isinstance(entry, Menu):
+                yield from entry.commands()
+            elif entry is not None:
+                yield entry
+
+
+@dataclass(frozen=True)
+class Now:
+    """What decides which commands of the window can be done.
+
+    Attributes
+    ----------
+    busy : bool
+        Whether a job runs.
+    ready : bool
+        Whether a run could start if none did.
+    undo, redo : str
+        What would be undone or done again, in words.
+    theme : str
+    """
+
+    session: Session
+    busy: bool = False
+    ready: bool = False
+    undo: str = ""
+    redo: str = ""
+    theme: str = ""
+
+
+def opened(now: Now) -> bool:
+    """Tell whether a mesh is open."""
+    return now.session.mesh is not None
+
+
+def flat(now: Now) -> bool:
+    """Tell whether a mesh of two dimensions is open."""
+    return now.session.mesh is not None and now.session.mesh.dim == 2
+
+
+def solid(now: Now) -> bool:
+    """Tell whether a mesh of three dimensions is open."""
+    return opened(now) and not flat(now)
+
+
+def valued(now: Now) -> bool:
+    """Tell whether the colours say a value of cells."""
+    return opened(now) and now.session.view.colour_by != "role"
+
+
+def stepped(now: Now) -> bool:
+    """Tell whether there are steps."""
+    return len(now.session.frames) > 1
+
+
+def idle(now: Now) -> bool:
+    """Tell whether a mesh is open and no job runs."""
+    return opened(now) and not now.busy
+
+
+def _stepped_and_idle(now: Now) -> bool:
+    return stepped(now) and idle(now)
+
+
+def _why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
+    """Return what says why something cannot be done, if it cannot."""
+    wait = "Wait for the end of what runs, or cancel it."
+    return lambda now: "" if able(now) else wait if opened(now) and now.busy else why
+
+
+# What they do ------------------------------------------------------------------------------
+
+
+def _again(window: Any, step: Callable[[], None], words: str, done: str) -> None:
+    """Undo or redo, and say in the status bar what that was."""
+    step()
+    if words:
+        window.say(f"{done}: {words}")
+
+
+def _switch(name: Shown, window: Any) -> None:
+    drawn = window.store.session.view.drawn
+    window.store.change(changes.set_view, **{name: name not in drawn})
+
+
+def _show_all(window: Any) -> None:
+    window.store.change(changes.show, window.store.session.mesh.marker_names)
+
+
+def _add_section(kind: str, window: Any) -> None:
+    window.docks_.lead_to("sections")
+    window.docks_.panels["sections"].add[kind].click()
+
+
+def _fill_recent(window: Any, menu: QMenu) -> None:
+    menu.clear()
+    for path in window.files.recent():
+        act = menu.addAction(str(path))
+        act.triggered.connect(lambda _=False, path=path: window.files.open_path(path))
+    if menu.isEmpty():
+        menu.addAction("(none yet)").setEnabled(False)
+
+
+def _fill_samples(window: Any, menu: QMenu) -> None:
+    for name, text in window.files.samples.items():
+        act = menu.addAction(f"{name}: {text}")
+        act.setStatusTip(menu.menuAction().statusTip())
+        act.triggered.connect(lambda _=False, name=name: window.files.open_sample(name))
+    menu.addSeparator()
+
+
+def _fill_panels(window: Any, menu: QMenu) -> None:
+    for dock in window.docks.values():
+        act = dock.toggleViewAction()
+        act.setStatusTip(f"Show or hide the panel {dock.windowTitle()}.")
+        menu.addAction(act)
+    menu.addSeparator()
+
+
+# The tables --------------------------------------------------------------------------------
+# fmt: off
+
+_NO_STEPS = "There are no steps yet: run the case first."
+_EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshes.", (
+    Command("save_picture", "&Picture…", "Make a picture of the view for a paper or a slide.",
+            lambda window: window.exports.picture(), ("Ctrl+P",), "picture", opened),
+    Command("copy_picture", "&Copy picture",
+            "Copy a picture of the view, with a white background, to the clipboard.",
+            lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=opened),
+    Command("export_film", "&Film of the steps…", "Make a film of the steps.",
+            lambda window: window.exports.make_film(),
+            enabled=stepped, tip_now=_why_not(stepped, _NO_STEPS)),
+    Command("export_quality", "&Quality as CSV…",
+            "Save the quality of every cell of the step that is shown as a CSV table.",
+            lambda window: window.exports.quality(),
+            enabled=idle, tip_now=_why_not(idle, "There is no mesh yet: open one first.")),
+    Command("export_steps", "&Meshes of all steps…",
+            "Save the mesh of every step, each in a file of its own.",
+            lambda window: window.exports.steps(),
+            enabled=_stepped_and_idle, tip_now=_why_not(_stepped_and_idle, _NO_STEPS)),
+), tooltips=True)
+
+_FILE = Menu("file", "&File", entries=(
+    Command("open", "&Open…", "Open a mesh, or a case with its mesh.",
+            lambda window: window.files.ask_and_open(), (KEY.Open,), "open"),
+    Menu("open_recent", "Open &recent", "Open one of the files used last.", fill=_fill_recent),
+    Menu("open_sample", "Open sa&mple", "Open a case that comes with the program.", (
+        Command("sample_of_size", "Of another &size…", "Open a sample with fewer or more cells.",
+                lambda window: window.files.ask_and_open_sample()),
+    ), fill=_fill_samples),
+    None,
+    Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
+            lambda window: window.files.save_mesh(), (KEY.Save,), "save", idle),
+    Command("save_case", "Save &case as…",
+            "Save roles, motions, method and view as a case that gives the same result again.",
+            lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", opened),
+    _EXPORT,
+    None,
+    Command("quit", "&Quit", "Close the window; unsaved changes are asked about.",
+            lambda window: window.close(), (KEY.Quit,)),
+))
+
+_EDIT = Menu("edit", "&Edit", entries=(
+    Command("undo", "Undo", "Take back the last change.",
+            lambda w: _again(w, w.store.undo, w.store.can_undo, "Undone"),
+            (KEY.Undo,), "undo", lambda now: bool(now.undo),
+            title_now=lambda now: f"Undo {now.undo}".rstrip(),
+            tip_now=lambda now: now.undo and f"Undo {now.undo}"),
+    Command("redo", "Redo", "Make the change again that was taken back.",
+            lambda w: _again(w, w.store.redo, w.store.can_redo, "Done again"),
+            (KEY.Redo, "Ctrl+Y"), "redo", lambda now: bool(now.redo),
+            title_now=lambda now: f"Redo {now.redo}".rstrip(),
+            tip_now=lambda now: now.redo and f"Redo {now.redo}"),
+))
+
+_RUN = Menu("run", "&Run", entries=(
+    Command("run", "&Run", "Deform the mesh with these settings.",
+            lambda window: window.start_run(), ("F5",), "run",
+            lambda now: now.ready and not now.busy,
+            button="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
+    Command("cancel", "&Cancel", "Stop what runs; the steps that are done are kept.",
+            lambda window: window.cancel(), image="cancel", enabled=lambda now: now.busy,
+            button="Stop within a second (Esc); the steps that are done stay.", button_key="Esc"),
+))
+
+_COLOURS = Menu("colours", "&Colours", "From which value to which the colours range.", (
+    Command("fit_colours", "Fit to this step",
+            "Let the colours range over the values of the step that is shown, and of the other "
+            "one in a comparison.",
+            lambda window: window.store.change(changes.fit_colours, every=False),
+            ("R",), enabled=valued,
+            button="From the lowest to the highest value of what is shown now (R); of all steps: "
+            "Shift+R."),
+    Command("fit_all_colours", "Fit to all steps",
+            "Let the colours range over the values of all steps, so that they say the same in a "
+            "film.",
+            lambda window: window.store.change(changes.fit_colours, every=True),
+            ("Shift+R",), enabled=valued),
+    Command("usual_colours", "As ever", "Let the colours range as they do at first.",
+            lambda window: window.store.change(changes.set_view, colour_range=None),
+            enabled=lambda now: valued(now) and now.session.view.colour_range is not None,
+            title_now=lambda now: usual_range(now.session)),
+))
+
+
+def _side(side: str, keys: str, short: str = "") -> Command:
+    place = "a corner" if side == "iso" else side
+    return Command(f"side{side}", "isometric" if side == "iso" else side,
+                   f"Look at the mesh from {place}.", lambda window: window.viewing.look_from(side),
+                   (keys,), enabled=solid, short=short)
+
+
+_SIDES = Menu("look_from", "Look &from", "Look at the mesh from a side.", (
+    _side("+x", "1", "X"), _side("-x", "Shift+1"),
+    _side("+y", "2", "Y"), _side("-y", "Shift+2"),
+    _side("+z", "3", "Z"), _side("-z", "Shift+3"),
+    _side("iso", "0", "Iso"),
+))
+
+# Where there is nothing to play, Space belongs to the button that has the focus.
+STEPS = Menu("steps", "&Steps", "Show another step of the deformation.", (
+    Command("step_first", "Undeformed mesh", "Show the mesh before it is deformed.",
+            lambda window: window.player.go(0), ("Home",), enabled=stepped,
+            button="Undeformed mesh (Home)"),
+    Command("step_previous", "Step back", "Show the step before this one.",
+            lambda window: window.player.step(-1), ("Alt+Left",), enabled=stepped,
+            button="One step back (←)"),
+    Command("step_play", "Play or pause", "Show the steps one after the other, or stop that.",
+            lambda window: window.player.toggle(), ("Space",), enabled=stepped,
+            button="Play the steps (Space)"),
+    Command("step_next", "Step on", "Show the step after this one.",
+            lambda window: window.player.step(1), ("Alt+Right",), enabled=stepped,
+            button="One step on (→)"),
+    Command("step_last", "Last step", "Show the deformed mesh.",
+            lambda window: window.player.go(10**9), ("End",), enabled=stepped,
+            button="Last step (End)"),
+))
+
+
+def _theme(theme: str, tip: str) -> Command:
+    return Command(f"theme_{theme}", theme.capitalize(), tip,
+                   lambda window: window.set_theme(theme), checked=lambda now: now.theme == theme)
+
+
+_THEMES = Menu("theme", "&Theme", "Light or dark colours.", (
+    _theme("system", "Take light or dark colours as the desktop does."),
+    _theme("light", "Take light colours."),
+    _theme("dark", "Take dark colours."),
+), one_of=True)
+
+
+def _keys(keys: str) -> tuple[str, ...]:
+    return (keys,) if keys else ()
+
+
+def _toggle(name: Shown, term: ShownTerm) -> Command:
+    return Command(name, term.name, term.tip, partial(_switch, name), _keys(term.shortcut),
+                   name if name in STROKES else "", solid if term.not_in_2d else opened,
+                   checked=lambda now: name in now.session.view.drawn)
+
+
+def _section(kind: str, row: ShapeTerms) -> Command:
+    def title(now: Now) -> str:
+        words = row.words.get(2 if flat(now) else 3)
+        return "" if words is None else words.action
+
+    return Command(f"add_{kind}", row.words[3].action, row.tip_to_add, partial(_add_section, kind),
+                   _keys(row.key), enabled=opened, title_now=title)
+
+
+COMPARE = Menu("compare", "Co&mpare with",
+               "Show the undeformed mesh or another run beside the run that is shown.",
+               enabled=lambda now: now.session.deformed is not None,
+               fill=lambda window, menu: fill_compare(menu, window.store))
+
+_VIEW = Menu("view", "&View", entries=(
+    *(_toggle(name, term) for name, term in SHOWN.items()),
+    None,
+    _COLOURS,
+    Command("fit", "&Fit all", "Make the whole mesh fill the view.",
+            lambda window: window.viewing.fit(), ("F",), "fit", opened),
+    _SIDES,
+    COMPARE,
+    Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
+            _show_all, ("Shift+A",), enabled=opened),
+    *(_section(kind, row) for kind, row in SECTION_SHAPES.items()),
+    None,
+    STEPS,
+    None,
+    _THEMES,
+    Command("full_screen", "F&ull screen", "Fill the screen with the window, or end that.",
+            lambda window: window.toggle_full_screen(), ("F11",)),
+    Menu("panels", "&Panels", "Show and hide the panels around the view.", (
+        Command("hide_panels", "&Hide or show all",
+                "Hide every panel, so that the view has all the room, or show them again.",
+                lambda window: window.docks_.toggle_all(), ("F9",)),
+        Command("restore_layout", "&Restore layout",
+                "Put every panel back to where it was at first.",
+                lambda window: window.restore_layout()),
+    ), fill=_fill_panels),
+))
+
+_HELP = Menu("help", "&Help", entries=(
+    Command("shortcuts", "&Keyboard and mouse", "Show all keys and what the mouse does.",
+            lambda window: window.help.shortcuts(), ("F1",)),
+    Command("case_keys", "Case &keys", "Show and search the keys of a case file.",
+            lambda window: window.help.case_keys()),
+    Command("copy_details", "&Copy details for a bug report",
+            "Copy versions, graphics, mesh and the last messages, for a bug report.",
+            lambda window: window.help.copy_details()),
+    Command("about", "&About slideviz", "Show version and licence.",
+            lambda window: window.help.about()),
+))
+# fmt: on
+
+MENUS = (_FILE, _EDIT, _RUN, _VIEW, _HELP)
+COMMANDS: dict[str, Command] = {one.name: one for menu in MENUS for one in menu.commands()}
