@@ -62,10 +62,10 @@ def _wait(read: int) -> None:
     while number not in _ENDS:
         number = os.read(read, 1)[0]
     try:
-        # Nothing is to be undone as long as this is not loaded.
-        undo = getattr(sys.modules.get("slideviz.mesh.io.cleanup"), "undo", None)
-        if undo is not None:
-            undo()
+        # Nothing is to be cleaned up as long as this is not loaded.
+        clean_up = getattr(sys.modules.get("slideviz.mesh.io.cleanup"), "clean_up", None)
+        if clean_up is not None:
+            clean_up()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
         words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; nothing half-written is left\n"
         # Past Python's streams, which another thread may hold.

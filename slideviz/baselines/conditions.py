@@ -1,4 +1,4 @@
-"""What every node of the elastic body may do, as projections, turns and known displacements."""
+"""Conditions of the elastic body: projections, rotations and known displacements of its nodes."""
 
 from __future__ import annotations
 

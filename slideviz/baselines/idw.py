@@ -33,7 +33,7 @@ weight is so large that no other node counts."""
 
 @dataclass(frozen=True)
 class Weights:
-    """The settings.
+    """Settings of inverse distance weighting.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The stiffness of the mesh as an elastic body, with its conditions, as SU2 has it.
+"""Stiffness matrix of the mesh as an elastic body, with its conditions, as in SU2.
 
 Young's modulus of a cell is the inverse of its volume, Poisson's ratio 0.3, plane strain in two
 dimensions (SU2's DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME and DEFORM_POISSONS_RATIO). Conditions
@@ -36,7 +36,7 @@ OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """What the nodes may do.
+    """Conditions of all nodes, u_i = T_i z_k + g_i.
 
     Attributes
     ----------

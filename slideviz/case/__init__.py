@@ -1,1 +1,1 @@
-"""What is asked: case files, roles, motions and displacement files."""
+"""The case: roles, motions and settings; case files and displacement files."""

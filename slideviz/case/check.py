@@ -1,4 +1,4 @@
-"""What a case contradicts: itself, or the mesh it is meant for."""
+"""Checks of a case: against itself, and against the mesh that it is meant for."""
 
 from __future__ import annotations
 

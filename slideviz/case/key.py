@@ -1,4 +1,4 @@
-"""A row of the table of keys: what it is, and the ways to put a value into a case and back."""
+"""A row of the table of keys, and the ways to put its value into a case and to get it back."""
 
 from __future__ import annotations
 

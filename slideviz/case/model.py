@@ -1,4 +1,4 @@
-"""What is asked: roles of the boundaries, motions, and the settings of the method."""
+"""The case: roles of the boundaries, motions, and the settings of the method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which files a command reads and writes: compared before the work, so that none is done in vain.
+"""Checks, before the work, of the files that a command reads and writes.
 
 No file that is read is written over, and no two results go to one file.
 """
@@ -145,7 +145,7 @@ def _meet(one: Output, other: Output) -> bool:
 
 def _require_mesh_ending(file: Path) -> None:
     if file.suffix.lower() not in (".su2", ".vtu"):
-        from slideviz.mesh.io.quiet_meshio import formats_of
+        from slideviz.mesh.io.meshio_calls import formats_of
 
         formats_of(file)
 

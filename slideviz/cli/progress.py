@@ -1,4 +1,4 @@
-"""What is said while one waits: a progress bar on a terminal, and that loops are compiled."""
+"""Progress on the terminal: a bar, and a line when loops are compiled."""
 
 from __future__ import annotations
 

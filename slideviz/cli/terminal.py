@@ -1,4 +1,4 @@
-"""The one place that writes to the terminal: what is printed there is text, and nothing else.
+"""Output to the terminal, with control characters shown as text.
 
 Names of boundaries and files, and what libraries say, may hold control characters, which would
 clear the screen, change its colours or pretend to be another line.
@@ -96,7 +96,7 @@ def _encodable(text: str, encoding: str) -> str:
 
 @contextmanager
 def terminal() -> Iterator[None]:
-    """Let all that is printed go through here."""
+    """Return a context in which all that is printed goes through `Terminal`."""
     out, err = Terminal(sys.stdout, needed=True), Terminal(sys.stderr, needed=False)
     with redirect_stdout(out), redirect_stderr(err):
         yield

@@ -1,4 +1,4 @@
-"""Results that cannot be right: nodes that go far beyond the motion, systems that were not solved.
+"""Bounds of results: nodes that go far beyond the motion, and systems that were not solved.
 
 A smooth function that has to turn from one displacement to another within a thin layer overshoots
 behind it: a wall that moves along itself beside a wall that stays, with cells of 1e-6 between them.

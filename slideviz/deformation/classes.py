@@ -1,4 +1,4 @@
-"""Which nodes of a mesh may do what, by the roles of a case: period, frame and classes."""
+"""Period, frame and classes of the nodes of a mesh, from the roles of a case."""
 
 from __future__ import annotations
 

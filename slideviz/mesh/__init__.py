@@ -1,1 +1,1 @@
-"""What is given: meshes, their files, topology and quality."""
+"""Meshes: points, cells and boundaries; their files, topology, periodic pairs and quality."""

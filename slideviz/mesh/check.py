@@ -1,4 +1,4 @@
-"""What makes a mesh unusable, whatever file it comes from."""
+"""Checks that a mesh can be used: node numbers, element types, names and coordinates."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def unused_nodes(mesh: Mesh) -> IntArray:
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Do nothing for a sound mesh.
+    """Raise when a mesh cannot be used.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def check_mesh(mesh: Mesh) -> None:
 
 
 def check_points(mesh: Mesh) -> None:
-    """Do nothing when all coordinates are finite.
+    """Raise when a coordinate is not finite.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def check_points(mesh: Mesh) -> None:
 
 
 def check_size(mesh: Mesh) -> None:
-    """Do nothing when all coordinates are small enough to be computed with.
+    """Raise when a coordinate is too large to be computed with.
 
     Raises
     ------

@@ -39,7 +39,7 @@ Hit = tuple["FloatArray", int, int]
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """Where the moved boundary goes through another.
+    """A place where the moved boundary goes through another.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ FITS = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class RigidMotion:
     """A rigid motion ``x -> rotation x + shift``: rotation (d, d) and shift (d,)."""
 
     rotation: FloatArray
@@ -34,7 +34,7 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Halo:
-    """Which nodes of a mesh are copies of which others, and which lie beyond its sides.
+    """The halo of a mesh: which nodes are copies of which others, and which lie beyond its sides.
 
     Attributes
     ----------
@@ -89,7 +89,11 @@ class Halo:
 
 
 def make_halo(
-    mesh: Mesh, receivers: IntArray, donors: IntArray, turns: Sequence[Turn], which: IntArray
+    mesh: Mesh,
+    receivers: IntArray,
+    donors: IntArray,
+    motions: Sequence[RigidMotion],
+    which: IntArray,
 ) -> Halo:
     """Return the halo of a mesh.
 
@@ -97,10 +101,10 @@ def make_halo(
     ----------
     receivers, donors : (h,)
         Each receiver once; donors may be receivers of another side (a mesh with two periods).
-    turns, which
+    motions, which
         The motions from donors to receivers, and the one of each pair, (h,).
     """
-    rotations = np.stack([turn.rotation for turn in turns])[which]
+    rotations = np.stack([motion.rotation for motion in motions])[which]
     sides = _sides(mesh, receivers, donors)
     inner = [mesh.marker(copy).nodes for copy, _ in sides]
     outer = np.setdiff1d(receivers, np.concatenate([*inner, np.empty(0, np.int64)]))
@@ -185,11 +189,11 @@ def _taken(cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
     return Cells.from_types(cells.types[chosen], cells.connectivity[np.repeat(chosen, size)])
 
 
-def fit_turn(before: FloatArray, after: FloatArray) -> Turn:
+def fit_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
     """Return the rigid motion that brings points (k, d) nearest to others (Kabsch 1976)."""
     here, there = before.mean(axis=0), after.mean(axis=0)
     u, _, vt = np.linalg.svd((before - here).T @ (after - there))
     flip = np.ones(before.shape[1])
     flip[-1] = np.sign(np.linalg.det(vt.T @ u.T)) or 1.0
     rotation = vt.T @ np.diag(flip) @ u.T
-    return Turn(rotation, there - rotation @ here)
+    return RigidMotion(rotation, there - rotation @ here)

@@ -1,4 +1,4 @@
-"""f_skew of each element type: how far its corners are from ideal ones, whatever the size.
+"""Skew metrics: f_skew of each element type, how far its corners are from ideal ones.
 
 Triangle, quadrilateral, tetrahedron and hexahedron are Knupp's (thesis Eq. 2.45 to 2.48). For
 the prism and the pyramid no such metric was published that we know of: theirs are our own.

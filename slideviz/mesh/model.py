@@ -1,4 +1,4 @@
-"""What is given: points, cells and named boundaries, as frozen values with read-only arrays."""
+"""The mesh: points, cells and named boundaries, as frozen values with read-only arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which way round each cell is numbered: told by its neighbours, not by its shape.
+"""Orientation of cells: which way round each is numbered, found from its neighbours.
 
 A cell that is numbered clockwise has a negative volume as a folded cell has. What tells them
 apart is the facet it shares with a neighbour: two cells numbered alike traverse it in opposite

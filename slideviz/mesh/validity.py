@@ -1,4 +1,4 @@
-"""Is the Jacobian determinant positive in the whole cell? A proof, not a sample.
+"""Validity of cells: a proof that the Jacobian determinant is positive in the whole cell.
 
 ======== =============================================================================
 triangle one determinant, which is constant: exact; likewise the tetrahedron

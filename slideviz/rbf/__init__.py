@@ -1,1 +1,1 @@
-"""The mathematics: arrays in, arrays out."""
+"""Interpolation with radial basis functions: arrays in, arrays out."""

@@ -1,4 +1,4 @@
-"""The axis of a cylindrical frame, where the angle means nothing.
+"""Nodes on the axis of a cylindrical frame, where the angle is not defined.
 
 A facet with a node on the axis has, in (r, rho theta[, z]), no corner there but all angles of
 its other nodes: a corner on the axis takes the angle of the node beside it, and a triangle with

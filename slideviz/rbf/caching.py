@@ -1,4 +1,4 @@
-"""``njit`` whose cache on disk mends itself: what is damaged there is compiled again.
+"""``njit`` with a checked cache on disk: damaged entries are compiled again.
 
 Numba trusts its cache: an index that was cut off (by a full disk, a killed process) ends the
 program, and so does machine code that is not what it was. Here both are sealed with a checksum,

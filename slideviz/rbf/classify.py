@@ -1,4 +1,4 @@
-"""Which node carries which constraints, from topology and roles (thesis sections 2.4 and 4).
+"""Classes of nodes: the constraints of each, from topology and roles (thesis 2.4 and 4).
 
 Every boundary node collects the normals of its fans. Their rank decides: 1, it slides on the
 surface (3D) or the curve (2D); 2, it slides along an edge (3D) or is fixed (2D); 3, it is fixed.
@@ -32,7 +32,7 @@ IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
 
 @dataclass(frozen=True, eq=False)
 class Classes:
-    """Nodes by what they may do.
+    """The nodes of a mesh by class: moving, fixed, sliding on edges or on surfaces, internal.
 
     Attributes
     ----------

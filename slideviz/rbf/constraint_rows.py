@@ -1,4 +1,4 @@
-"""The conditions of a step as scalar constraints, with coinciding nodes taken once."""
+"""Constraint rows: the conditions of a step as scalar constraints, coinciding nodes once."""
 
 from __future__ import annotations
 

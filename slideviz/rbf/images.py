@@ -1,4 +1,4 @@
-"""Periodic images: one node each, classified, projected and evaluated once.
+"""Periodic images: one node stands for all of them, and all move alike.
 
 Whatever a node one period away would find for itself differs by rounding at least, and by more
 where only one of them sees a corner, a normal or the end of a curve. So one of them stands for

@@ -144,7 +144,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What one step found.
+    """The result of one step: displacements, control nodes and errors.
 
     Attributes
     ----------

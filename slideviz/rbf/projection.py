@@ -1,4 +1,4 @@
-"""Closest points on the boundary: where a freely displaced node slides to.
+"""Projection: the closest points on the boundary, to which freely displaced nodes slide.
 
 The exact closest point on the node's own piece, not the thesis's nearest-midpoint iteration
 (section 2.4.3), which approximates it and can cycle for ever. Pieces are taken at the

@@ -1,7 +1,7 @@
 """Parts of the greedy selection: its pool of candidates, picking in the pool, Cholesky factors.
 
 `pool` says which candidates a cycle looks at and how many of them it picks, `newton` picks them,
-`GrowingFactor` takes them into the system, and `Patience` ends levels that lower no error.
+`GrowingFactor` takes them into the system, and `StoppingRule` ends levels that lower no error.
 """
 
 from __future__ import annotations
@@ -217,13 +217,13 @@ def _double(
     return 2, np.sort([worst, second])
 
 
-class Patience:
-    """Ends the waiting for an error that does not fall, or that costs too much to lower.
+class StoppingRule:
+    """Rule that stops cycles once the error no longer falls, or costs too much to lower.
 
     Attributes
     ----------
     budget : float
-        What the waiting may cost in all, in the caller's unit.
+        What all cycles may cost, in the caller's unit.
     """
 
     def __init__(self, error: float, budget: float) -> None:
@@ -231,12 +231,12 @@ class Patience:
         self._lowest, self._losses, self._spent = error, 0, 0.0
 
     def ends(self, error: float, cost: float) -> bool:
-        """Tell, after one more turn, whether there should be no other of its kind.
+        """Tell, after one more cycle, whether it should be the last.
 
         Parameters
         ----------
         error, cost
-            The error after this turn, and what the turn cost.
+            The error after this cycle, and what the cycle cost.
         """
         fell = error < FALL * self._lowest
         self._lowest = error if fell else self._lowest

@@ -122,7 +122,7 @@ def straight_points(grid: Grid, section: Section) -> FloatArray:
 
 
 def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatArray:
-    """Return the points (m, 2) smoothed as ``sample_smooth.smooth`` does it."""
+    """Return the points (m, 2) smoothed as `smooth` does it."""
     heights = np.diff(layer_parts(grid.n))
     heights /= heights[-1]
     n_channel = len(grid.quads) - grid.ring[1:].size

@@ -46,7 +46,7 @@ AUTO = 0
 
 @dataclass(frozen=True)
 class Combination:
-    """What is tried.
+    """A method, a periodic mode and a number of steps.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a combination came to.
+    """The result of a combination: quality, errors and time.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Which combinations a comparison makes, which of them cannot be, and the words for both."""
+"""The combinations of a comparison, those that the case or mesh rules out, and words for both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Deform, within a limit of time, and tell what came of it."""
+"""One deformation within a limit of time: its steps, or the error that ended it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What grids are made of, at random: sizes, kinds of cells, spacings, names of sides."""
+"""Random parts of grids: sizes, kinds of cells, spacings and names of sides."""
 
 from __future__ import annotations
 

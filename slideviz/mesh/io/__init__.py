@@ -1,1 +1,1 @@
-"""Mesh files: SU2 text, formats of meshio, VTU; writing whole or not at all."""
+"""Mesh files: SU2, VTU and the formats of meshio; atomic writing and checks of files."""

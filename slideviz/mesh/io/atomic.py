@@ -1,4 +1,4 @@
-"""Files that are either written whole or not at all.
+"""Atomic writing: files are written whole or not at all.
 
 The bytes go to a temporary file in the same folder, which then takes the place of the target in
 one step of the file system. So a full disk, a cancel or a crash never leaves half a mesh, and an

@@ -1,4 +1,4 @@
-"""What must not outlive the program: drafts of files, and programs that it started.
+"""Clean-up of what must not outlive the program: drafts of files, and programs it started.
 
 A draft is a temporary file or folder beside what it is to become. Its name tells the machine and
 the process that it belongs to, so that the next one that writes to the same folder can remove
@@ -74,7 +74,7 @@ def ended(process: Process) -> Iterator[None]:
         _processes.discard(process)
 
 
-def undo() -> None:
+def clean_up() -> None:
     """Kill the programs that were started and remove all drafts, before the end of the process."""
     for process in list(_processes):
         with suppress(OSError):

@@ -1,4 +1,6 @@
-"""What is read must not be written over unasked: the one place that knows and compares both.
+"""Checks of files: only ordinary ones are read, and no input is written over unasked.
+
+A pipe may never come to an end, and a device gives bytes without end.
 
 Whoever runs the work (a command, a window) says which files are its inputs; whatever writes asks
 here first. The same file may have many names: by links, by ``./``, by another folder.
@@ -34,7 +36,7 @@ def protected(inputs: Callable[[], Inputs]) -> Iterator[None]:
 def require_no_input(
     path: Path, error: type[SlidevizError], replaces: Path | None = None, remedy: str = ""
 ) -> None:
-    """Do nothing for a file that is no input.
+    """Raise when a file that is to be written is an input.
 
     Parameters
     ----------
@@ -72,7 +74,7 @@ def same_file(path: Path, other: Path) -> bool:
 
 
 def require_ordinary(path: Path, error: type[SlidevizError]) -> int:
-    """Return how many bytes a file has; before it is opened, for some devices act on that.
+    """Return how many bytes an ordinary file has, without opening it: some devices act on that.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Meshes in other formats, read through meshio.
+"""Reading meshes of other formats through meshio.
 
 A mesh that was sent by somebody must not make the program read whatever it names on this disk:
 other files that it names are followed into its own folder only, links of HDF5 not at all.
@@ -18,8 +18,8 @@ import numpy as np
 
 from slideviz.mesh.check import check_mesh, first_fault, path_error, printable
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
 from slideviz.mesh.io.meshio_markers import Block, find_markers
-from slideviz.mesh.io.quiet_meshio import formats_of, load, quiet
 from slideviz.mesh.io.su2_scan import Progress
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 
@@ -60,11 +60,11 @@ def read_with_meshio(path: Path, progress: Progress) -> Mesh:
         meshio cannot read the file, it names files elsewhere, or slideviz cannot use the mesh.
     """
     progress(0.0)
-    with quiet(path, "read"):
+    with meshio_errors(path, "read"):
         require_own(path)
     data = load(path, formats_of(path))
     progress(0.5)
-    with quiet(path, "understood"):
+    with meshio_errors(path, "understood"):
         mesh = _mesh(path, data)
     progress(1.0)
     return mesh
@@ -141,7 +141,7 @@ def _flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
 
 
 def require_own(path: Path) -> None:
-    """Do nothing for a file that names no other, or only those that lie beside it.
+    """Raise when a file names others that do not lie beside it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The named boundaries of a mesh that meshio read, whatever way its format names them."""
+"""Named boundaries of a mesh that meshio read, in whatever way its format names them."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
-from slideviz.mesh.io.quiet_meshio import formats_of, load, quiet
+from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
 from slideviz.mesh.model import IntArray, Mesh
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def _write(path: Path, trial: Path, data: meshio.Mesh, name: str) -> None:
 
     # Without this XDMF puts the numbers in a second file.
     options = {"data_format": "XML"} if name == "xdmf" else {}
-    with quiet(path, f"written as {name}"):
+    with meshio_errors(path, f"written as {name}"):
         meshio.write(trial, data, file_format=_WRITTEN_AS.get(name, name), **options)
     if len(list(trial.parent.iterdir())) != 1:
         raise path_error(

@@ -1,4 +1,4 @@
-"""Files that the program keeps for one user: nobody else may read what he works on."""
+"""Folders and files that only their owner may read."""
 
 from __future__ import annotations
 

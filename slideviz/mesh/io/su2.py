@@ -1,4 +1,4 @@
-"""SU2 meshes: reading, and what of the file is kept for writing it again."""
+"""Reading SU2 meshes, and what of the file is kept for writing it again."""
 
 from __future__ import annotations
 

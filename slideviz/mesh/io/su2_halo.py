@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from slideviz.mesh.halo import FITS, Halo, Turn, fit_turn, make_halo
+from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
 from slideviz.mesh.io.su2_scan import Lines
 from slideviz.mesh.io.su2_zone import SendRows, Zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
@@ -47,57 +47,57 @@ def _unused(why: str) -> str:
 def _tied(mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]) -> Found:
     """Return the halo of pairs whose motion is found, and what is odd."""
     remarks: list[str] = []
-    turns: list[Turn] = []
+    motions: list[RigidMotion] = []
     which = np.full(len(donors), -1)
     for index in np.unique(receivers[:, 1]).tolist():
         mine = receivers[:, 1] == index
         nodes = receivers[mine, 0]
         tries = list(_readings(given[index], mesh.dim)) if index in given else []
-        turn, remark = _best(mesh, index, (donors[mine], nodes), tries)
+        motion, remark = _best(mesh, index, donors[mine], nodes, tries)
         remarks += [remark] if remark else []
-        if turn is not None:
-            which[mine] = len(turns)
-            turns.append(turn)
+        if motion is not None:
+            which[mine] = len(motions)
+            motions.append(motion)
     used = which >= 0
     if not used.any():
         return None, tuple(remarks)
-    return make_halo(mesh, receivers[used, 0], donors[used], turns, which[used]), tuple(remarks)
+    return make_halo(mesh, receivers[used, 0], donors[used], motions, which[used]), tuple(remarks)
 
 
 def _best(
-    mesh: Mesh, index: int, pairs: tuple[IntArray, IntArray], tries: Sequence[Turn]
-) -> tuple[Turn | None, str]:
+    mesh: Mesh, index: int, donors: IntArray, receivers: IntArray, tries: Sequence[RigidMotion]
+) -> tuple[RigidMotion | None, str]:
     """Return the motion that fits donors and receivers best, and what is odd about it."""
-    before, after = (mesh.points[nodes] for nodes in pairs)
+    before, after = mesh.points[donors], mesh.points[receivers]
     allowed = FITS * float(np.ptp(mesh.points, axis=0).max())
 
-    def misfit(turn: Turn) -> FloatArray:
-        return np.asarray(np.linalg.norm(turn.at(before) - after, axis=1))
+    def misfit(motion: RigidMotion) -> FloatArray:
+        return np.asarray(np.linalg.norm(motion.at(before) - after, axis=1))
 
-    def rank(turn: Turn) -> tuple[int, float]:
-        far = misfit(turn)
+    def rank(motion: RigidMotion) -> tuple[int, float]:
+        far = misfit(motion)
         return int(np.count_nonzero(far > allowed)), float(far.max())
 
-    fitted = fit_turn(before, after)
+    fitted = fit_motion(before, after)
     # What the file says goes before what is fitted, as long as it fits.
-    turn = min(tries, key=rank, default=fitted)
-    if rank(turn)[0]:
-        turn = min(turn, fitted, key=rank)
-    far, name = misfit(turn), f"PERIODIC_INDEX= {index}"
+    motion = min(tries, key=rank, default=fitted)
+    if rank(motion)[0]:
+        motion = min(motion, fitted, key=rank)
+    far, name = misfit(motion), f"PERIODIC_INDEX= {index}"
     wrong = int(np.count_nonzero(far > allowed))
     if 2 * wrong > len(far):
         return None, _unused(f"no motion brings the donors of {name} onto their receivers")
     if wrong:
         worst = int(np.argmax(far))
-        return turn, (
+        return motion, (
             f"{wrong} of {len(far)} halo nodes are not where {name} puts them (node "
-            f"{pairs[1][worst]} is {far[worst]:.3g} off); they follow their donors from where they "
-            "are, so make the halo anew if the solver needs it exact"
+            f"{receivers[worst]} is {far[worst]:.3g} off); they follow their donors from where "
+            "they are, so make the halo anew if the solver needs it exact"
         )
-    if turn is fitted:
+    if motion is fitted:
         what = "does not fit its halo" if tries else "is missing"
-        return turn, f"{name} {what}; the motion found by matching the nodes is used"
-    return turn, ""
+        return motion, f"{name} {what}; the motion found by matching the nodes is used"
+    return motion, ""
 
 
 def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
@@ -124,7 +124,7 @@ def _transforms(lines: Lines, zone: Zone) -> dict[int, FloatArray]:
     return found
 
 
-def _readings(transform: FloatArray, dim: int) -> Iterator[Turn]:
+def _readings(transform: FloatArray, dim: int) -> Iterator[RigidMotion]:
     """Yield the motions that centre, angles and translation (3, 3) may mean."""
     centre, angles, shift = transform[0], transform[1], transform[2]
     for unit, order in product((1.0, np.pi / 180.0), ((2, 1, 0), (0, 1, 2))):
@@ -133,9 +133,9 @@ def _readings(transform: FloatArray, dim: int) -> Iterator[Turn]:
             rotation = rotation @ _about(axis, unit * float(angles[axis]))
         for before in (0.0, 1.0):  # is the translation made after, or before the rotation
             moved = rotation @ (before * shift - centre) + centre + (1.0 - before) * shift
-            yield Turn(rotation[:dim, :dim], moved[:dim])
+            yield RigidMotion(rotation[:dim, :dim], moved[:dim])
             back = rotation.T
-            yield Turn(back[:dim, :dim], (-back @ moved)[:dim])
+            yield RigidMotion(back[:dim, :dim], (-back @ moved)[:dim])
 
 
 def _about(axis: int, angle: float) -> FloatArray:

@@ -19,8 +19,8 @@ _NAME_IT = "; name the marker"
 _COUNT_THEM = "; add it with the number of elements"
 
 
-class Rows:
-    """Finds the lines of numbers, and of other text, in each section of a file."""
+class SectionRows:
+    """The lines of numbers, and of other text, of each section of a file."""
 
     def __init__(self, lines: Lines) -> None:
         self.lines = lines
@@ -33,7 +33,7 @@ class Rows:
         return self.data_lines[i:j]
 
     def none(self, section: Section) -> None:
-        """Do nothing when a section has no numbers, as it should.
+        """Raise when a section that should have no numbers has some.
 
         Raises
         ------
@@ -156,13 +156,13 @@ def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
 
 
 class _Walk:
-    """Walks through the sections of one zone."""
+    """A walk through the sections of one zone, which notes where its parts stand."""
 
     def __init__(self, lines: Lines, sections: list[Section], bounds: Bounds) -> None:
         self.lines = lines
         self.sections = sections
         self.bounds = bounds
-        self.rows = Rows(lines)
+        self.rows = SectionRows(lines)
 
     def zone(self) -> Zone:
         """Return where the parts stand."""

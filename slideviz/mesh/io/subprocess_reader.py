@@ -1,4 +1,4 @@
-"""Reading other formats in a process of its own.
+"""Subprocess reader: meshes of other formats are read in a process of their own.
 
 Some readers of meshio run for hours on a wrong count, ask for all memory, or crash with the
 library below them. In a process of its own that costs nobody anything: it has limits of time and

@@ -1,6 +1,6 @@
-"""meshio, made quiet: it prints, ends the process on some errors and raises whatever it meets.
+"""Calls of meshio whose failures are one ``MeshError``.
 
-Here all of that becomes one ``MeshError``.
+meshio itself prints, ends the process on some errors and raises whatever it meets.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def formats_of(path: Path) -> list[str]:
 
 
 @contextmanager
-def quiet(path: Path, what: str) -> Iterator[None]:
+def meshio_errors(path: Path, what: str) -> Iterator[None]:
     """Return a context in which meshio neither prints nor ends the process.
 
     Raises
@@ -94,7 +94,7 @@ def load(path: Path, formats: list[str]) -> meshio.Mesh:
     problems = []
     for name in formats:
         try:
-            with quiet(path, f"read as {name}"):
+            with meshio_errors(path, f"read as {name}"):
                 return meshio.read(path, file_format=name)
         except MeshError as problem:
             problems.append(problem)
