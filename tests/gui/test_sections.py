@@ -723,7 +723,7 @@ def test_a_picture_of_the_section_is_saved(window, driver, panel, answers, tmp_p
 def test_size_title_and_axes_of_the_picture_of_a_section_can_be_chosen(
     window, driver, panel, answers, tmp_path
 ):
-    driver.click(panel.add_plane)
+    driver.click(panel.add["plane"])
     answers("ask_save", tmp_path / "cut.svg")
     asked = answers("ask_paper", (10.0, 4.0))
     (other,) = [one for one in panel.sizes.actions() if one.text() == "Other size…"]
