@@ -10,7 +10,7 @@ from pathlib import Path
 def window(arguments: argparse.Namespace) -> int:
     """Open the window, with a file if one is given."""
     from slideviz.errors import CaseError
-    from slideviz.export.screen import missing_screen
+    from slideviz.export.offscreen import missing_screen
 
     if arguments.file is not None and not arguments.file.exists():
         raise CaseError(

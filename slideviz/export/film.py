@@ -14,11 +14,10 @@ from typing import Any
 
 from slideviz.errors import SlidevizError
 from slideviz.export.encode import Pixels
-from slideviz.export.exposure import Drawn, exposing, told
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
-from slideviz.export.reel import USUAL, Reel, check_film
+from slideviz.export.reel import USUAL, Drawn, Reel, check_film, exposing, told
 from slideviz.export.titles import (
     DETAIL,
     LETTER_WIDTH,

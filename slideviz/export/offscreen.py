@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,6 @@ from numpy.typing import NDArray
 
 from slideviz.color_scheme import Look
 from slideviz.errors import SlidevizError
-from slideviz.export.screen import x_answers
 from slideviz.scene.color_legend import set_letters
 
 SMALLEST, LARGEST = 64, 8192
@@ -114,3 +115,48 @@ def check_png(file: Path) -> None:
     """Raise SlidevizError when the name of a picture does not end with .png."""
     if file.suffix.lower() != ".png":
         raise SlidevizError(f"{file}: pictures are PNG; end the name with .png")
+
+
+def x_answers() -> bool:
+    """Tell whether the X server that ``DISPLAY`` names is there and lets us in."""
+    if not os.environ.get("DISPLAY"):
+        return False
+    try:
+        library = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return True  # nobody to ask
+    library.XOpenDisplay.restype = ctypes.c_void_p
+    library.XOpenDisplay.argtypes = [ctypes.c_char_p]
+    library.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    server = library.XOpenDisplay(None)
+    if server:
+        library.XCloseDisplay(server)
+    return bool(server)
+
+
+def wayland_answers() -> bool:
+    """Tell whether the compositor that ``WAYLAND_DISPLAY`` names is there."""
+    name = os.environ.get("WAYLAND_DISPLAY")
+    if not name:
+        return False
+    place = Path(os.environ.get("XDG_RUNTIME_DIR", "/"), name)
+    try:
+        with closing(socket.socket(socket.AF_UNIX)) as line:
+            line.connect(str(place))
+    except OSError:
+        return False
+    return True
+
+
+def missing_screen() -> str:
+    """Return why no window can be shown, in words, or nothing."""
+    if x_answers() or wayland_answers():
+        return ""
+    named = [
+        f"{name}={os.environ[name]}"
+        for name in ("DISPLAY", "WAYLAND_DISPLAY")
+        if os.environ.get(name)
+    ]
+    if not named:
+        return "neither DISPLAY nor WAYLAND_DISPLAY is set"
+    return f"{' and '.join(named)}: no server answers there, or it does not let you in"

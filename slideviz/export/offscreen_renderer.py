@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.color_scheme import PAPER
-from slideviz.export.mark_words import name_mark
 from slideviz.export.offscreen import (
     LETTERS,
     TITLE,
@@ -24,6 +23,7 @@ from slideviz.export.offscreen import (
     write_title,
 )
 from slideviz.export.picture_options import PictureOptions, headings, panes
+from slideviz.export.titles import name_mark
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces

@@ -10,17 +10,16 @@ import numpy as np
 
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
-from slideviz.export.mark_words import draw_mark
 from slideviz.export.offscreen import CAPTION_AT, TITLE
 from slideviz.export.offscreen_renderer import OffscreenRenderer, ordered
 from slideviz.export.picture_options import GAP, PictureOptions, panes, title_of, titles_of
+from slideviz.export.titles import draw_mark
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.bar import color_bar
 from slideviz.plots.cells import color_scale, draw_cells
 from slideviz.plots.written import empty_figure, write_figure
-from slideviz.scene.color_legend import STRIP
+from slideviz.scene.color_legend import OPACITY, STRIP
 from slideviz.scene.mesh import FADED, is_faded
-from slideviz.scene.plate import OPACITY
 from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
 from slideviz.sections.cut import Cutter
 from slideviz.sections.line import box_around, trace

@@ -16,7 +16,7 @@ from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.session import changes, jobs, jobs_sample
+from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
 from slideviz.session.keep import keep_view
 
@@ -90,7 +90,7 @@ class Files(QObject):
         """Ask for a sample and its size, and open it."""
         from slideviz.samples.table import DEFAULT_SIZES
 
-        sizes = {name: jobs_sample.SIZES.get(name, DEFAULT_SIZES[name]) for name in self.samples}
+        sizes = {name: jobs.SIZES.get(name, DEFAULT_SIZES[name]) for name in self.samples}
         found = questions.ask_sample(self.window, self.samples, sizes)
         if found is not None:
             self.open_sample(found[0], size=found[1])
@@ -102,7 +102,7 @@ class Files(QObject):
         self.window.start_job(
             f"Opening the sample {name}",
             self._opened_to_run if run else self._opened,
-            partial(jobs_sample.open_sample, size=size),
+            partial(jobs.open_sample, size=size),
             name,
             sample_folder(),
         )

@@ -14,10 +14,15 @@ from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.questions import Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import Doing
-from slideviz.session.run_messages import help_for, inverted_words, notes_of, warnings_of
+from slideviz.session.run_messages import (
+    help_for,
+    in_window_words,
+    inverted_words,
+    notes_of,
+    warnings_of,
+)
 from slideviz.session.state import Frame, Run
 from slideviz.session.store import Store
-from slideviz.session.window_words import in_window_words
 
 log = logging.getLogger("slideviz")
 

@@ -33,7 +33,7 @@ from slideviz.gui.widgets.questions import Banner
 from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.io.file_checks import protected
 from slideviz.session import changes, jobs
-from slideviz.session.run_requirements import Missing
+from slideviz.session.run_messages import Missing
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")

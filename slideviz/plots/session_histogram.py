@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.case.motion_words import deformation
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.curves import look_of
-from slideviz.plots.distribution import distribution, spread
 from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.style import Style
@@ -20,6 +20,7 @@ from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 LEAST_SPREAD = 0.05
 """Part of the quality's 0 to 1 that is shown at least."""
@@ -134,3 +135,32 @@ def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
     middle = (shown.edges[1:] + shown.edges[:-1]) / 2.0
     part = np.clip((middle - low) / max(high - low, 1e-300), 0.0, 1.0)
     return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]
+
+
+BINS = 25
+"""So many that a step of an outline is wide enough for its dashes in a panel of the window."""
+
+
+def distribution(
+    frame: Frame,
+    what: ColourBy,
+    limits: tuple[float, float] = (0.0, 1.0),
+    undeformed: Mesh | None = None,
+) -> Distribution:
+    """Return the counts of the cells of a frame in `BINS` equal intervals between limits."""
+    edges = np.linspace(*limits, BINS + 1)
+    return Distribution.of(_values(frame, what, undeformed), edges)
+
+
+def spread(
+    frame: Frame, what: ColourBy, undeformed: Mesh | None = None
+) -> tuple[float, float] | None:
+    """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
+    values = _values(frame, what, undeformed)
+    right = values[np.isfinite(values)]
+    return (float(right.min()), float(right.max())) if len(right) else None
+
+
+def _values(frame: Frame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
+    """Return the values of the cells of a frame without those of a halo."""
+    return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])

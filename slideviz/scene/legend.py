@@ -9,6 +9,8 @@ import pyvista as pv
 
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.color_legend import (
+    OPACITY,
+    Plate,
     add_colour_bar,
     add_point_legend,
     add_role_legend,
@@ -17,7 +19,6 @@ from slideviz.scene.color_legend import (
     place_bar,
     set_letters,
 )
-from slideviz.scene.plate import OPACITY, Plate
 from slideviz.scene.stage import Stage
 from slideviz.session.state import Session
 from slideviz.terms import COLOUR_BY, ROLES

@@ -11,8 +11,7 @@ from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn
-from slideviz.scene.shaders import see_through
+from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn, see_through
 from slideviz.scene.stage import Stage
 from slideviz.session.state import Session
 from slideviz.terms import ROLES

@@ -8,9 +8,8 @@ from typing import Any, Protocol
 from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface
-from slideviz.scene.actors import LIFT, VALUES, lookup_table
+from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
-from slideviz.scene.shaders import draw_fine_edges
 from slideviz.sections.threshold import Choice
 from slideviz.session.state import Session
 

@@ -10,9 +10,8 @@ import numpy as np
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import CELL, POINT, VALUES, part_shape
+from slideviz.scene.actors import CELL, POINT, VALUES, part_shape, see_through
 from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
-from slideviz.scene.shaders import see_through
 from slideviz.scene.stage import Stage
 from slideviz.sections.threshold import chosen_cells
 from slideviz.session.state import Session

@@ -45,7 +45,7 @@ from slideviz.session.changes_view import (
 )
 from slideviz.session.colors import fit_colours
 from slideviz.session.opening import open_mesh, suggested_reduction
-from slideviz.session.run_requirements import Missing, is_missing
+from slideviz.session.run_messages import Missing, is_missing
 
 __all__ = [
     "UNDEFORMED",

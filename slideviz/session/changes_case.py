@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Case, FromFile, Motion, named
-from slideviz.session.guess import with_periodicity
+from slideviz.session.opening import with_periodicity
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Place, Session
 from slideviz.session.undoable import undoable

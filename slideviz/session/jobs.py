@@ -7,11 +7,13 @@ Each gets ``report(item)``, which may be called from any thread, and ``stopped()
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.model import Case
 from slideviz.errors import Cancelled, CaseError
+from slideviz.mesh.io.private import private_folder
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -19,7 +21,7 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.changes import open_mesh
 from slideviz.session.formats import holds_quality
 from slideviz.session.keep import Camera, kept_camera
-from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.motions import Ghosts
 from slideviz.session.state import Frame, Session
 
 Report = Callable[[object], None]
@@ -199,3 +201,31 @@ def require_going(stopped: Stopped) -> None:
     """
     if stopped():
         raise Cancelled("stopped, as you asked")
+
+
+SIZES = {"turbine-row": 20_000, "stator": 20_000}
+"""Cells of the samples that are large unless asked for: the first look should be quick."""
+
+
+def open_sample(
+    name: str, folder: Path, report: Report, stopped: Stopped, size: int | None = None
+) -> Opened:
+    """Return a sample case, written into a folder of its own and ready to be shown.
+
+    ``size`` as of ``slideviz.samples.table.sample``; without one, not larger than ``SIZES``.
+
+    Raises
+    ------
+    SlidevizError
+        There is no such sample, or it cannot be written.
+    """
+    from slideviz.samples.table import write_sample
+
+    report(Doing(f"Making the sample {name}"))
+    with suppress(OSError):  # writing says why
+        private_folder(folder)
+    own = folder / (name if size is None else f"{name}-{size}")
+    written = write_sample(name, own, size or SIZES.get(name), overwrite=True)
+    require_going(stopped)
+    case = next(path for path in written if path.suffix == ".cfg")
+    return open_file(case, None, report, stopped)

@@ -16,7 +16,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.threshold import Choice
-from slideviz.session.guess import guess_by_name
+from slideviz.session.opening import guess_by_name
 
 WHOLE_NUMBER = 1e-3
 """A wheel may miss a whole number of passages by this much."""

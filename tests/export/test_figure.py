@@ -11,9 +11,7 @@ from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export import vector
-from slideviz.export.exposure import told
 from slideviz.export.film import filming
-from slideviz.export.mark_words import mark_words
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import (
     TITLE_ROOM,
@@ -22,8 +20,8 @@ from slideviz.export.picture_options import (
     title_of,
     words_of_size,
 )
-from slideviz.export.reel import Reel
-from slideviz.export.titles import fitting, pair_titles
+from slideviz.export.reel import Reel, told
+from slideviz.export.titles import fitting, mark_words, pair_titles
 from slideviz.export.vector import draw_vector, require_vector, write_vector
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.quality import quality

@@ -15,11 +15,10 @@ from slideviz.case.model import Case
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export import offscreen_renderer as renderer_module
-from slideviz.export.exposure import told
 from slideviz.export.film import film, film_options, filming
 from slideviz.export.offscreen import font_scale, offscreen
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import Reel, check_film
+from slideviz.export.reel import Reel, check_film, told
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene

@@ -15,8 +15,8 @@ from qtpy.QtWidgets import QApplication, QDialog
 
 from slideviz import read
 from slideviz.errors import SlidevizError
-from slideviz.export import exposure
 from slideviz.export import film as film_module
+from slideviz.export import reel
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import Reel
@@ -376,7 +376,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
     ran, film, answers, tmp_path, monkeypatch, qtbot
 ):
     threads = {"measured": set(), "written": set()}
-    measure, write = film_module.quality, exposure.writer
+    measure, write = film_module.quality, reel.writer
 
     def spy_quality(*values, **named):
         threads["measured"].add(threading.current_thread())
@@ -393,7 +393,7 @@ def test_images_in_between_are_measured_and_written_beside_the_window(
             yield spy_add
 
     monkeypatch.setattr(film_module, "quality", spy_quality)
-    monkeypatch.setattr(exposure, "writer", spy_writer)
+    monkeypatch.setattr(reel, "writer", spy_writer)
     answers("ask_save", tmp_path / "out.gif")
     film.form.kind.show_value(".gif")
     film.form.between.setValue(1)

@@ -14,14 +14,14 @@ from slideviz.gui import files
 from slideviz.gui.start import COLUMNS, RECENT, StartPage, changed_words
 from slideviz.gui.widgets.cards import _DRAWINGS, SIZE, card
 from slideviz.samples.table import SAMPLES
-from slideviz.session import jobs_sample
+from slideviz.session import jobs
 
 
 @pytest.fixture
 def small(monkeypatch, tmp_path):
     """Samples of few cells, in a folder of the test."""
     monkeypatch.setattr(files, "sample_folder", lambda: tmp_path / "samples")
-    monkeypatch.setattr(jobs_sample, "SIZES", {"passage": 12, "hexahedron": 6})
+    monkeypatch.setattr(jobs, "SIZES", {"passage": 12, "hexahedron": 6})
     return tmp_path
 
 
@@ -51,13 +51,13 @@ def test_a_card_opens_its_sample_and_deforms_nothing(driver, small, key):
 
 
 def test_large_samples_open_small():
-    assert max(jobs_sample.SIZES.values()) <= 50_000
-    assert {"stator", "turbine-row"} <= set(jobs_sample.SIZES)
+    assert max(jobs.SIZES.values()) <= 50_000
+    assert {"stator", "turbine-row"} <= set(jobs.SIZES)
 
 
 def test_a_sample_can_be_cancelled_while_it_is_made(small):
     with pytest.raises(Cancelled, match="as you asked"):
-        jobs_sample.open_sample("passage", small, lambda _: None, lambda: True)
+        jobs.open_sample("passage", small, lambda _: None, lambda: True)
 
 
 def test_a_sample_that_cannot_be_written_is_told(driver, small):

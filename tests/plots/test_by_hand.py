@@ -13,11 +13,11 @@ from slideviz.mesh.io.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up
 from slideviz.plots.written import figure_bytes
 from slideviz.session import changes
-from slideviz.session.guess import guess_by_name
-from slideviz.session.period_words import found_text
+from slideviz.session.motions import found_text
+from slideviz.session.opening import guess_by_name
+from slideviz.session.run_messages import in_window_words
 from slideviz.session.runs_table import best
 from slideviz.session.state import Frame, Run
-from slideviz.session.window_words import in_window_words
 
 
 @pytest.fixture

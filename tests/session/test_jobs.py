@@ -6,7 +6,7 @@ from slideviz.case.model import Case, FromFile, Translate
 from slideviz.errors import Cancelled, CaseError, MeshError
 from slideviz.samples.table import write_sample
 from slideviz.session import jobs
-from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.motions import Ghosts
 from slideviz.session.state import Frame
 
 
@@ -147,7 +147,7 @@ def test_the_view_needs_no_qt():
 
     code = (
         "import sys, slideviz.scene.scene, slideviz.export.picture, slideviz.session.jobs, "
-        "slideviz.session.changes, slideviz.session.motion_ghosts\n"
+        "slideviz.session.changes, slideviz.session.motions\n"
         "bad = [m for m in sys.modules if m.split('.')[0] in ('qtpy', 'PySide6', 'pyvistaqt')]\n"
         "sys.exit(str(bad) if bad else 0)"
     )

@@ -7,8 +7,8 @@ from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.session import changes
-from slideviz.session.motion_ghosts import Ghosts
 from slideviz.session.motion_table import Rows
+from slideviz.session.motions import Ghosts
 
 PAIR = ("bottom", "left")
 

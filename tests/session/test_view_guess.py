@@ -1,7 +1,7 @@
 import pytest
 
 from slideviz.mesh.periodic import find_pairs
-from slideviz.session.guess import guess_by_name, guess_case, guess_roles
+from slideviz.session.opening import guess_by_name, guess_case, guess_roles
 
 
 @pytest.mark.parametrize(

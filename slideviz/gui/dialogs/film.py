@@ -16,9 +16,9 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.export.exposure import Drawn
 from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.reel import Drawn
 from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later

@@ -22,8 +22,8 @@ from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.panels.method_more import MoreSettings
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.session import changes
-from slideviz.session.period_words import found_text
-from slideviz.session.run_requirements import Missing
+from slideviz.session.motions import found_text
+from slideviz.session.run_messages import Missing
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 

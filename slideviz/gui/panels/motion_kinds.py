@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
-from slideviz.session.motion_places import Axis
+from slideviz.session.motions import Axis
 from slideviz.terms import MOTION_KINDS
 
 KINDS: dict[type, str] = {

@@ -36,9 +36,9 @@ from slideviz.gui.widgets.plot_canvas import folder_of, main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
-from slideviz.session.motion_places import centroid, machine_axis, new_target, targets
 from slideviz.session.motion_table import Rows
-from slideviz.session.run_requirements import Missing
+from slideviz.session.motions import centroid, machine_axis, new_target, targets
+from slideviz.session.run_messages import Missing
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 

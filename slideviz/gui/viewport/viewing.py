@@ -16,7 +16,7 @@ from slideviz.gui.widgets.runs_menu import fill_pane
 from slideviz.scene.color_legend import STRIP
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
-from slideviz.session.motion_ghosts import Ghosts
+from slideviz.session.motions import Ghosts
 from slideviz.session.panes import choices, close_pane, panes
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session

@@ -1,0 +1,150 @@
+"""Motions in a session: where they begin and where they take boundaries; the period in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements, read_displacements
+from slideviz.case.model import Case, FromFile, Target, moves
+from slideviz.case.motion import moved_together
+from slideviz.case.motion_words import direction_words
+from slideviz.errors import SlidevizError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.periodic import Pair
+from slideviz.session.state import Session
+
+DIGITS = 12
+"""Of a centroid, counted from the first of the extent of the mesh."""
+
+Axis = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Direction, and a point on it."""
+
+
+def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
+    """Return the centroid of boundaries together, without the last digits, which are rounding."""
+    digits = DIGITS - math.ceil(math.log10(mesh.extent)) if mesh.extent > 0.0 else DIGITS
+    found = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
+    nodes = np.unique(np.concatenate([*found, np.empty(0, np.int64)]))
+    middle = mesh.points[nodes].mean(axis=0) if len(nodes) else np.zeros(mesh.dim)
+    return tuple(round(float(v), digits) + 0.0 for v in middle)
+
+
+def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
+    """Return the direction from an axis to a point, across the axis; None where it is on it."""
+    direction, origin = (np.array(values) for values in axis)
+    arm = np.array((*point, 0.0)[:3]) - origin
+    arm = arm - direction * (arm @ direction) / (direction @ direction)
+    length = float(np.linalg.norm(arm))
+    if not length > 0.0:
+        return None
+    x, y, z = (round(float(v), DIGITS) + 0.0 for v in arm / length)
+    return x, y, z
+
+
+def new_target(session: Session) -> Target:
+    """Return what a new motion moves: what is selected, else what has none yet, else all."""
+    case = session.case
+    moving = case.markers_with("moving")
+    without = [n for n in moving if not any(moves(motion, n) for motion in case.motions)]
+    names = tuple(name for name in moving if name in session.view.selected) or tuple(without)
+    if len(names) == 1:
+        return names[0]
+    return names if names and names != moving else "" if len(moving) > 1 else "".join(moving)
+
+
+def targets(session: Session) -> tuple[Target, ...]:
+    """Return what a motion may move: each, what is selected where that are several, and all."""
+    moving = session.case.markers_with("moving")
+    selected = tuple(name for name in moving if name in session.view.selected)
+    several = (selected,) if 1 < len(selected) < len(moving) else ()
+    return (*moving, *several, *(("",) if len(moving) > 1 else ()))
+
+
+def machine_axis(session: Session) -> Axis | None:
+    """Return the axis about which periodic boundaries repeat, if they do."""
+    for pair in session.pairs:
+        both = {session.role(pair.first), session.role(pair.second)}
+        if pair.kind == "rotational" and both == {"periodic"}:
+            return pair.axis, pair.origin
+    return None
+
+
+class Ghosts:
+    """Moved boundaries of one mesh; displacement files are read once and again when changed."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._nodes = {marker.name: marker.nodes for marker in mesh.markers}
+        self._files: dict[tuple[Path, tuple[str, ...], float], Displacements | None] = {}
+
+    def moved(self, case: Case) -> dict[str, FloatArray]:
+        """Return for each boundary that moves where its nodes, (u, d), go.
+
+        A displacement file that cannot be read moves nothing here; the run will say why.
+        """
+        on = {
+            name: self._nodes[name]
+            for name in case.markers_with("moving")
+            if name in self._nodes and any(moves(motion, name) for motion in case.motions)
+        }
+        files: dict[tuple[Path, Target], Displacements] = {}
+        for motion in case.motions:
+            if isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
+                files[motion.path, motion.marker] = read
+        points = self.mesh.points
+        moved = moved_together(case.motions, points, on, files)
+        return {name: points[nodes] + moved[name] for name, nodes in on.items()}
+
+    def _read(self, motion: FromFile, on: Mapping[str, IntArray]) -> Displacements | None:
+        # A file of several boundaries lists nodes of each.
+        names = tuple(name for name in on if moves(motion, name))
+        if not names:
+            return None
+        try:
+            key = (motion.path, names, motion.path.stat().st_mtime)
+        except OSError:
+            return None
+        if key not in self._files:
+            wanted = np.unique(np.concatenate([on[name] for name in names]))
+            shape, of = self.mesh.points.shape, f"boundaries {', '.join(names)}"
+            try:
+                self._files[key] = read_displacements(motion.path, wanted, shape, of)
+            except SlidevizError:
+                self._files[key] = None
+        return self._files[key]
+
+
+def period_text(pair: Pair) -> str:
+    """Return the period of a pair in a few words: λ or θ, and along or about what."""
+    if pair.kind == "rotational":
+        return f"θ = {math.degrees(pair.period):.6g}° about {_axis(pair.axis)}"
+    return f"λ = {pair.period:.6g} along {_axis((pair.vector / pair.period).tolist())}"
+
+
+def _axis(direction: Sequence[float]) -> str:
+    """Return an axis in words: which of its two ways it is told does not matter."""
+    return direction_words(direction).removeprefix("-")
+
+
+def found_text(session: Session) -> str:
+    """Return the period of the periodic boundaries that matched, in words."""
+    names = session.case.markers_with("periodic")
+    lines = [
+        f"Found: {pair.first} → {pair.second}, {period_text(pair)}"
+        for pair in session.pairs
+        if pair.first in names and pair.second in names
+    ]
+    paired = {
+        end
+        for p in session.pairs
+        if {p.first, p.second} <= set(names)
+        for end in (p.first, p.second)
+    }
+    alone = [name for name in names if name not in paired]
+    if alone and len(names) >= 2 and session.mesh is not None:
+        lines.append(f"No match found yet for {' and '.join(alone)}; the run will try.")
+    return "\n".join(lines)
