@@ -36,14 +36,14 @@ def _run(argv: Sequence[str]) -> int:
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
         from slideviz.cli.places import inputs_of
-        from slideviz.cli.progress import compiling_told
+        from slideviz.cli.progress import compiling_noted
         from slideviz.mesh.io.file_checks import protected
 
         arguments = parse(argv)
         arguments.inputs = inputs_of(arguments)
         with (
             protected(lambda: arguments.inputs),
-            compiling_told(getattr(arguments, "quiet", False)),
+            compiling_noted(getattr(arguments, "quiet", False)),
         ):
             return int(arguments.command(arguments))
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2

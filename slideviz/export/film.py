@@ -17,7 +17,7 @@ from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
-from slideviz.export.reel import USUAL, Drawn, Reel, check_film, exposing, told
+from slideviz.export.reel import USUAL, Drawn, Reel, check_film, exposing, images_drawn
 from slideviz.export.titles import (
     DETAIL,
     LETTER_WIDTH,
@@ -91,7 +91,9 @@ def film(
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
         runs = renderer.shown(session, figure)
         titles = _titles_of_runs(runs, figure, renderer.shows_detail, reel.between > 0)
-        yield from told(filming(renderer, figure, path, reel, titles=titles, overwrite=overwrite))
+        yield from images_drawn(
+            filming(renderer, figure, path, reel, titles=titles, overwrite=overwrite)
+        )
 
 
 def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:

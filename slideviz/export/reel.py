@@ -117,7 +117,7 @@ class Drawn:
     total: int
 
 
-def told(pieces: Generator[object, Any, None]) -> Generator[Drawn, None, None]:
+def images_drawn(pieces: Generator[object, Any, None]) -> Generator[Drawn, None, None]:
     """Yield how far the pieces of a film are, all done here."""
     run = here(pieces)
     try:

@@ -269,7 +269,7 @@ class Files(QObject):
         if self._saved_to is not None and self._saved_to.suffix == ".su2":
             case = case.change(mesh_out=self._saved_to)
         try:
-            keep_view(replace(session, case=case), self.window.scene.eye.place).write(path)
+            keep_view(replace(session, case=case), self.window.scene.camera.place).write(path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return False

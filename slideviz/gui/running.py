@@ -75,7 +75,7 @@ class Running(QObject):
     def start_run(self) -> None:
         """Deform the mesh with the settings there are."""
         session = self.store.session
-        if self.runner.busy or changes.is_missing(session):
+        if self.runner.busy or changes.run_requirements(session):
             return
         self.banner.hide()
         self.store.change(changes.start_run)

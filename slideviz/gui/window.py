@@ -33,7 +33,7 @@ from slideviz.gui.widgets.questions import Banner
 from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.io.file_checks import protected
 from slideviz.session import changes, jobs
-from slideviz.session.run_messages import Missing
+from slideviz.session.run_messages import Requirement
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
@@ -210,7 +210,7 @@ class MainWindow(QMainWindow):
         self.autosave: Autosave | None = None
         self.restore: Restore | None = None
         if folder is not None:
-            self.autosave = Autosave(self.store, folder, lambda: self.scene.eye.place, self)
+            self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.place, self)
             self.restore = Restore(self, self.offer, self.autosave)
 
     def restore_layout(self) -> None:
@@ -301,7 +301,7 @@ class MainWindow(QMainWindow):
 
     # The view --------------------------------------------------------------------------
 
-    def lead_to(self, missing: Missing) -> None:
+    def lead_to(self, missing: Requirement) -> None:
         """Bring the panel to the front where something is put right, and the field."""
         if missing.place == "open":
             self.files.ask_and_open()

@@ -33,8 +33,8 @@ SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
 """Direction from the mesh to the eye, and what is up."""
 
 
-class Eye:
-    """The camera of a stage.
+class Camera:
+    """The camera of a stage: aimed, fitted and zoomed.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Eye:
 
     Attributes
     ----------
-    beside : Eye or None
+    beside : Camera or None
         That of a view beside this one, which looks from the same place: what fills the view is
         all that both show.
     """
@@ -53,7 +53,7 @@ class Eye:
         self.stage = stage
         self._shapes = shapes
         self._fitted: tuple[float, ...] = ()
-        self.beside: Eye | None = None
+        self.beside: Camera | None = None
 
     @property
     def _camera(self) -> Any:
@@ -91,8 +91,8 @@ class Eye:
 
     def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
         """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
-        eyes = [self] if self.beside is None else [self, self.beside]
-        shapes = [shape for eye in eyes for shape in eye._shapes()]
+        cameras = [self] if self.beside is None else [self, self.beside]
+        shapes = [shape for camera in cameras for shape in camera._shapes()]
         if not shapes:
             return None
         axes = self._axes()
@@ -102,7 +102,7 @@ class Eye:
         ends = np.array([(one.min(axis=1), one.max(axis=1)) for one in along])
         low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
         extent = high - low
-        half = max(eye._half(extent) for eye in eyes)
+        half = max(camera._half(extent) for camera in cameras)
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
 
     def _half(self, extent: Any) -> float:
@@ -173,7 +173,7 @@ class Eye:
         camera.parallel_scale = camera.parallel_scale / factor
         renderer.ResetCameraClippingRange()
 
-    def take(self, other: Eye) -> None:
+    def take(self, other: Camera) -> None:
         """Look from where another eye looks; the strip of the legend stays as it is here."""
         camera, theirs = self._camera, other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
@@ -206,7 +206,7 @@ class Eye:
                 return True
         return False
 
-    def looks_like(self, other: Eye) -> bool:
+    def looks_like(self, other: Camera) -> bool:
         """Tell whether another eye looks from the same place in the same way."""
         camera, theirs = self._camera, other._camera
         return (

@@ -15,7 +15,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
 from slideviz.scene.stage import Stage
-from slideviz.scene.threshold import ChosenLayer
+from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session.passages import find_period, moved, passages, passages_around
 from slideviz.session.state import Session
 
@@ -94,7 +94,7 @@ class CopyLayer:
     """
 
     def __init__(
-        self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, chosen: ChosenLayer
+        self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, chosen: ThresholdLayer
     ) -> None:
         self.stage = stage
         self._cells, self._boundaries, self._chosen = cells, boundaries, chosen

@@ -17,7 +17,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, Drawn
-from slideviz.scene.camera import SLACK, Eye
+from slideviz.scene.camera import SLACK, Camera
 from slideviz.scene.ghosts import GhostLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cell import MarkLayer
@@ -27,7 +27,7 @@ from slideviz.scene.passages import CopyLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
-from slideviz.scene.threshold import ChosenLayer
+from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session
 from slideviz.session.store import tell_all
@@ -53,7 +53,7 @@ class Scene:
         self.stage = Stage(plotter, look, font_scale)
         self._cells = CellLayer(self.stage)
         self._boundaries = BoundaryLayer(self.stage)
-        self._chosen = ChosenLayer(self.stage, self._cells)
+        self._chosen = ThresholdLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
         self.sections = SectionLayer(self.stage)
         self.layers: tuple[Layer, ...] = (
@@ -68,7 +68,7 @@ class Scene:
             LegendLayer(self.stage),
             TriadLayer(self.stage),
         )
-        self.eye = Eye(self.stage, self._shapes)
+        self.camera = Camera(self.stage, self._shapes)
         self.session = Session()
         self.set_look(look)
 
@@ -148,7 +148,7 @@ class Scene:
 
     def resized(self) -> None:
         """Put the legend where it belongs in a view of another size."""
-        self.eye.shift()
+        self.camera.shift()
         self._again()
 
     def _again(self) -> None:
@@ -170,21 +170,21 @@ class Scene:
 
     def look_from(self, side: str) -> None:
         """Look at all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
-        self.eye.look_from(side, self._parallel())
+        self.camera.look_from(side, self._parallel())
 
     def look_along(self, view: Overview, meshes: Iterable[Mesh]) -> None:
         """Look at all that is drawn of some states of the mesh, or at the detail of a view."""
         mesh = self.session.mesh
         assert mesh is not None
-        self.eye.turn(view.towards, view.up, True)
+        self.camera.turn(view.towards, view.up, True)
         if view.detail is None:
-            self.eye.fit(padded(self._cells.points(one)) for one in meshes)
+            self.camera.fit(padded(self._cells.points(one)) for one in meshes)
             return
         width, height = self.plotter.window_size
         free = max(width - self.stage.strip(), 1.0)
         half = view.detail.width / min(free, 1.3 * height) * height / 2.0
-        self.eye.shift()
-        self.eye.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
+        self.camera.shift()
+        self.camera.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
 
     def _parallel(self) -> bool:
         mesh = self.session.mesh
@@ -195,19 +195,19 @@ class Scene:
 
     def take_camera(self, other: Scene) -> None:
         """Look from where another scene looks."""
-        self.eye.take(other.eye)
+        self.camera.take(other.camera)
 
     def fit(self) -> None:
         """Make everything fill the view, from the present side, beside the legend's strip."""
-        self.eye.fit()
+        self.camera.fit()
 
     def sees_all(self, slack: float = SLACK) -> bool:
         """Tell whether nothing of the mesh is outside the view, or by a part of it only."""
-        return self.eye.sees_all(slack)
+        return self.camera.sees_all(slack)
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
         """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
-        self.eye.zoom_at(x, y, factor)
+        self.camera.zoom_at(x, y, factor)
 
     def pick(self, x: float, y: float) -> str | None:
         """Return the visible boundary at a pixel counted from the lower left, or None.
@@ -269,4 +269,4 @@ class Scene:
             return
         middle, size = surroundings(mesh, cell)
         depth = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-        self.eye.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)
+        self.camera.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)

@@ -19,7 +19,7 @@ from slideviz.session.state import Session
 NAME = "chosen"
 
 
-class ChosenLayer:
+class ThresholdLayer:
     """The cells that the threshold of the view leaves.
 
     In 2D the other cells keep a faint area without lines; in 3D the sides between chosen cells

@@ -13,7 +13,7 @@ import numpy as np
 from slideviz.case.section_shapes import SECTION_SHAPES
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.around_axis import AboutAxis, Unrolled
-from slideviz.sections.handles import Grips, Part, rounded, rounded_place, within
+from slideviz.sections.handles import HandleParts, Part, rounded, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
     FEW,
@@ -58,11 +58,11 @@ class Circle(InPlane):
         """Return its centre (2,)."""
         return np.asarray(section.origin)[:2]
 
-    def grips(self, section: Section, parts: list[FloatArray], box: Box) -> Grips:
+    def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
         """Return where it is held: in its centre, and at a point of it."""
         longest = max(parts, key=len)
         ends = longest[None, len(longest) // 2 if len(parts) > 1 else len(longest) // 8]
-        return Grips(within(self.middle(section)[None], box), ends, parts)
+        return HandleParts(within(self.middle(section)[None], box), ends, parts)
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box

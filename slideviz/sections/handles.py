@@ -21,7 +21,7 @@ _DIGITS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Grips:
+class HandleParts:
     """Points where a section is held, and all of it that can be seen.
 
     Attributes
@@ -39,10 +39,10 @@ class Grips:
     lines: list[FloatArray]
 
 
-def grips(section: Section, box: Box) -> Grips | None:
+def handle_parts(section: Section, box: Box) -> HandleParts | None:
     """Return where a section can be held within a box that is seen; None where none of it is."""
     parts = section.in_plane.trace(section, box)
-    return section.in_plane.grips(section, parts, box) if parts else None
+    return section.in_plane.handle_parts(section, parts, box) if parts else None
 
 
 def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.mesh.model import FloatArray
-from slideviz.sections.handles import Grips, Part, rounded_place, within
+from slideviz.sections.handles import HandleParts, Part, rounded_place, within
 from slideviz.sections.shape import (
     DIGITS,
     InPlane,
@@ -108,9 +108,9 @@ class Line(InPlane):
         # A plane that leans in z meets the mesh beside the foot of its origin.
         return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
 
-    def grips(self, section: Section, parts: list[FloatArray], box: Box) -> Grips:
+    def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
         """Return where it is held: at its ends, and at the point it turns about."""
-        return Grips(self._pivot(section, box)[None], parts[0], parts)
+        return HandleParts(self._pivot(section, box)[None], parts[0], parts)
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box

@@ -12,7 +12,7 @@ from slideviz.mesh.model import FloatArray
 from slideviz.sections.polygons import Polygons
 
 if TYPE_CHECKING:
-    from slideviz.sections.handles import Grips, Part
+    from slideviz.sections.handles import HandleParts, Part
     from slideviz.sections.line import Box
     from slideviz.sections.model import Section, Triple
 
@@ -149,7 +149,7 @@ class InPlane(Protocol):
     def middle(self, section: Section) -> FloatArray:
         """Return the point (2,) by which it is moved."""
 
-    def grips(self, section: Section, parts: list[FloatArray], box: Box) -> Grips:
+    def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
         """Return where it can be held within a box that its ``parts`` are in."""
 
     def dragged(

@@ -45,11 +45,11 @@ from slideviz.session.changes_view import (
 )
 from slideviz.session.colors import fit_colours
 from slideviz.session.opening import open_mesh, suggested_reduction
-from slideviz.session.run_messages import Missing, is_missing
+from slideviz.session.run_messages import Requirement, run_requirements
 
 __all__ = [
     "UNDEFORMED",
-    "Missing",
+    "Requirement",
     "add_frames",
     "add_motion",
     "add_section",
@@ -59,7 +59,6 @@ __all__ = [
     "fit_colours",
     "flat_one",
     "fresh_view",
-    "is_missing",
     "isolate",
     "lay_flat",
     "mark",
@@ -72,6 +71,7 @@ __all__ = [
     "rename_run",
     "replace_motion",
     "replace_section",
+    "run_requirements",
     "saved_case",
     "saved_mesh",
     "seen_beside",

@@ -14,13 +14,13 @@ from slideviz.session.jobs import Report, Stopped
 from slideviz.session.state import Session
 
 
-def clash_key(session: Session) -> tuple[object, ...]:
+def intersection_key(session: Session) -> tuple[object, ...]:
     """Return what a clash depends on: it need not be looked for again while this is the same."""
     case = session.case
     return (session.mesh, case.motions, tuple(sorted(case.roles.items())), case.periodic)
 
 
-def find_clash(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
+def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
     """Return the sentence about a clash, or about a displacement file with mistakes.
 
     It is empty when there is none, or when the case has other problems: they are told elsewhere.
@@ -46,8 +46,8 @@ def _first_line(error: SlidevizError, files: list[Path]) -> str:
     return f"{first} ({len(others)} more)." if others else f"{first}."
 
 
-def set_clash(session: Session, text: str, key: tuple[object, ...]) -> Session:
+def set_intersection(session: Session, text: str, key: tuple[object, ...]) -> Session:
     """Return the session with what was found for ``key``, unless that is no longer asked for."""
-    if clash_key(session) != key or session.clash == text:
+    if intersection_key(session) != key or session.clash == text:
         return session
     return replace(session, clash=text)

@@ -89,7 +89,7 @@ def notes_of(run: Run) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Missing:
+class Requirement:
     """What must be put right before a run, in words, and which panel does it.
 
     Attributes
@@ -106,34 +106,34 @@ class Missing:
     motion: int = 0
 
 
-def is_missing(session: Session) -> tuple[Missing, ...]:
+def run_requirements(session: Session) -> tuple[Requirement, ...]:
     """Return what must be put right before a run, most urgent first; empty when ready."""
     if session.mesh is None:
-        return (Missing("Open a mesh first.", "open"),)
+        return (Requirement("Open a mesh first.", "open"),)
     case = session.case
     # What is typed comes first: the rest looks at the case, which still has the number before it.
-    found = [Missing(text, place) for place, text in session.invalid]
+    found = [Requirement(text, place) for place, text in session.invalid]
     moving = case.markers_with("moving")
     if not moving:
-        found.append(Missing("No boundary moves: give one the role “moving”.", "boundaries"))
+        found.append(Requirement("No boundary moves: give one the role “moving”.", "boundaries"))
     found += [
-        Missing(f"“{name}” has no motion: add one.", "motion", name)
+        Requirement(f"“{name}” has no motion: add one.", "motion", name)
         for name in moving
         if not any(moves(motion, name) for motion in case.motions)
     ]
     if case.motions and all(moves_nothing(motion) for motion in case.motions):
-        found.append(Missing("Nothing moves yet: type how far in the motion.", "motion"))
+        found.append(Requirement("Nothing moves yet: type how far in the motion.", "motion"))
     for place, motion in enumerate(case.motions):
         if isinstance(motion, FromFile) and not motion.path.is_file():
             text = f"The displacement file {motion.path} does not exist."
-            found.append(Missing(text, "motion", motion=place))
+            found.append(Requirement(text, "motion", motion=place))
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
-        found.append(Missing(text, "method"))
+        found.append(Requirement(text, "method"))
     if not found:
-        found = [Missing(text, "boundaries") for text in _problems(session)]
+        found = [Requirement(text, "boundaries") for text in _problems(session)]
     if not found and session.clash:
-        found = [Missing(session.clash, "motion")]
+        found = [Requirement(session.clash, "motion")]
     return tuple(found)
 
 

@@ -18,7 +18,7 @@ from slideviz.export import offscreen_renderer as renderer_module
 from slideviz.export.film import film, film_options, filming
 from slideviz.export.offscreen import font_scale, offscreen
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import Reel, check_film, told
+from slideviz.export.reel import Reel, check_film, images_drawn
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
@@ -53,7 +53,7 @@ def film_of(session, file, reel, like=None):
     """Film what a view shows."""
     figure = replace(film_options(reel.size), fill=like is None)
     with OffscreenRenderer(session, find_surfaces(session.mesh), like) as renderer:
-        yield from told(filming(renderer, figure, file, reel))
+        yield from images_drawn(filming(renderer, figure, file, reel))
 
 
 def mp4_images(file):

@@ -48,7 +48,7 @@ def test_beside_the_mesh_no_plate_is_seen(plotter, square, look):
 @pytest.mark.parametrize("by", ["size-skew", "role"])
 def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, look, by):
     scene, session = opened(plotter, square, look, colour_by=by)
-    scene.eye.aim((2.0, 2.0, 0.0), 0.3)
+    scene.camera.aim((2.0, 2.0, 0.0), 0.3)
     covered = image(scene)
     scene.stage.has_plate = False
     scene.update(session)

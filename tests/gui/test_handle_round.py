@@ -98,7 +98,7 @@ def test_it_is_pulled_to_another_radius_and_undone_as_one(window, panel, perspec
     window.store.change(changes.set_view, perspective=perspective)
     window.viewing.look_from("iso")
     window.view.snapshot()
-    (first,), camera = sections(window), window.scene.eye.place
+    (first,), camera = sections(window), window.scene.camera.place
     low, high = panel.editor._span
     wanted = high - 0.2 * (high - low)
     pull(window, wanted)
@@ -107,7 +107,7 @@ def test_it_is_pulled_to_another_radius_and_undone_as_one(window, panel, perspec
     assert (pulled.origin, pulled.direction) == (first.origin, first.direction)
     assert len(str(pulled.radius)) <= 8
     assert panel.editor.number.value == pytest.approx(pulled.radius)
-    assert window.scene.eye.place[:9] == pytest.approx(camera[:9])
+    assert window.scene.camera.place[:9] == pytest.approx(camera[:9])
     pull(window, low + 0.2 * (high - low))
     assert sections(window)[0].radius < first.radius
     window.store.undo()
@@ -167,24 +167,24 @@ def test_what_the_mouse_would_take_is_shown(window, panel):
     assert len(blue(window.view)) < 10
     # It goes from below the mouse by itself.
     window.viewing.look_from("+z")
-    window.scene.eye.aim(ball(window) + 0.01, 0.05, 1.0)
+    window.scene.camera.aim(ball(window) + 0.01, 0.05, 1.0)
     window.view.snapshot()
     assert window.view.cursor().shape() == shapes.ArrowCursor
     assert len(blue(window.view)) > 30
 
 
 def test_what_is_dragged_beside_it_turns_the_view(window, panel):
-    camera, before = window.scene.eye.place, sections(window)
+    camera, before = window.scene.camera.place, sections(window)
     start = pixel(window.view, ball(window)) + np.array([0.0, 60.0])
     drag(window.view, start, start + 40.0)
-    assert window.scene.eye.place != camera
+    assert window.scene.camera.place != camera
     assert sections(window) == before
 
 
 def test_in_a_detail_it_is_in_reach(window, panel):
     cut = window.scene.sections.drawn["section:0"].polygons.points
     corner = cut[np.argmax(np.linalg.norm(cut - ball(window), axis=1))]
-    window.scene.eye.aim(corner, 0.1 * float(np.ptp(cut, axis=0).max()), 1.0)
+    window.scene.camera.aim(corner, 0.1 * float(np.ptp(cut, axis=0).max()), 1.0)
     window.view.snapshot()
     x, y = pixel(window.view, ball(window))
     assert 0 < x < window.view.width()
@@ -225,7 +225,7 @@ def test_beside_the_mesh_it_can_be_pulled_back(window, driver, panel):
     start = pixel(window.view, ball(window))
     x, y = start
     if not (0 < x < window.view.width() and 0 < y < window.view.height()):
-        window.scene.eye.aim(ball(window), 0.5, 1.0)
+        window.scene.camera.aim(ball(window), 0.5, 1.0)
         window.view.snapshot()
     pull(window, 0.3)
     assert sections(window)[0].radius == pytest.approx(0.3, abs=0.02)

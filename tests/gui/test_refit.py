@@ -16,9 +16,9 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
     window.viewing.fit()
     if zoomed:
         window.scene.zoom_at(50, 50, 1.7)
-    before = window.scene.eye.place
+    before = window.scene.camera.place
     window.start_run()
     driver.settle()
     assert window.store.session.deformed is not None
-    assert np.allclose(window.scene.eye.place, before) == zoomed
+    assert np.allclose(window.scene.camera.place, before) == zoomed
     assert zoomed or window.scene.sees_all()

@@ -394,7 +394,7 @@ def test_the_whole_mesh_is_seen_in_both_and_a_detail_stays_one(ran):
 def test_entering_the_comparison_shows_all_of_both_unless_a_detail_is_looked_at(ran):
     store, viewing = ran.window.store, ran.window.viewing
     # Far to the side, as after a drag: nothing was looked at in detail.
-    viewing.scene.eye.aim((9.0, 0.0, 0.0), viewing.view.camera.parallel_scale)
+    viewing.scene.camera.aim((9.0, 0.0, 0.0), viewing.view.camera.parallel_scale)
     compare(ran, changes.UNDEFORMED)
     for view, scene in ((viewing.view, viewing.scene), (viewing.second, viewing.second_scene)):
         seen = to_display(view, np.concatenate([one.shape.points for one in scene.drawn.values()]))
@@ -402,9 +402,9 @@ def test_entering_the_comparison_shows_all_of_both_unless_a_detail_is_looked_at(
         assert (seen.max(axis=0) <= view.window_size).all()
     store.change(changes.show_beside, None)
     ran.window.viewing.fly_to(3)
-    place = viewing.scene.eye.place
+    place = viewing.scene.camera.place
     compare(ran, changes.UNDEFORMED)
-    assert viewing.scene.eye.place == place
+    assert viewing.scene.camera.place == place
 
 
 @pytest.mark.parametrize("leads", [0, 1])
@@ -418,20 +418,20 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
     where = QPointF(60, 90)
     none = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase
     wheel = QWheelEvent(where, where, QPoint(), QPoint(0, 120), *none, False)
-    before = viewing.scene.eye.place
+    before = viewing.scene.camera.place
     QApplication.sendEvent(views[leads], wheel)
-    assert viewing.scene.eye.place != before
-    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    assert viewing.scene.camera.place != before
+    assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
     ran.qtbot.waitUntil(lambda: bool(painted))
-    before = viewing.scene.eye.place
+    before = viewing.scene.camera.place
     left = Qt.MouseButton.LeftButton
     QTest.mousePress(views[leads], left, pos=QPoint(80, 80))
     for step in range(1, 6):
         QTest.mouseMove(views[leads], QPoint(80 + 8 * step, 80 + 4 * step))
     QTest.mouseRelease(views[leads], left, pos=QPoint(120, 100))
-    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
     ran.window.actions_.by_name["fit"].trigger()
-    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
 
 
 @pytest.mark.parametrize("two", [False, True])
@@ -439,21 +439,21 @@ def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved
     viewing = compare(ran) if two else ran.window.viewing
     ran.window.viewing.fit()
     lead = viewing._scenes()[-1]
-    before = lead.eye.place
+    before = lead.camera.place
     ran.window.docks["runs"].hide()
     ran.window.docks["histogram"].hide()
     ran.window.resize(1100, 640)
-    ran.qtbot.waitUntil(lambda: lead.eye.place != before)
+    ran.qtbot.waitUntil(lambda: lead.camera.place != before)
     QApplication.processEvents()
-    place = lead.eye.place
-    assert lead.eye.fitted
+    place = lead.camera.place
+    assert lead.camera.fitted
     ran.window.viewing.fit()
-    assert lead.eye.place == pytest.approx(place)
+    assert lead.camera.place == pytest.approx(place)
     lead.zoom_at(100, 100, 1.5)
-    place = lead.eye.place
+    place = lead.camera.place
     ran.window.resize(1280, 800)
     QApplication.processEvents()
-    assert lead.eye.place == place
+    assert lead.camera.place == place
 
 
 def test_linked_views_come_to_rest(ran, qtbot):
@@ -476,11 +476,11 @@ def test_look_from_and_rotation_of_a_solid_mesh_are_shared(driver, sample_folder
     assert viewing.titles[1].text == "Undeformed mesh"
     for side in ("+x", "-y", "iso"):
         driver.window.actions_.by_name[f"side{side}"].trigger()
-        assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+        assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
     driver.window.store.change(changes.set_view, perspective=True)
     assert not viewing.second.camera.parallel_projection
     viewing.second.camera.Azimuth(20)
-    assert viewing.second_scene.eye.looks_like(viewing.scene.eye)
+    assert viewing.second_scene.camera.looks_like(viewing.scene.camera)
     block = {
         name: scene.drawn["BLOCK"].shape.points
         for name, scene in zip("ab", viewing._scenes(), strict=True)
@@ -561,7 +561,7 @@ def test_the_window_closes_during_a_comparison(ran, answers):
 
 
 def test_the_camera_moves_after_a_run_only_if_some_of_the_mesh_has_left_the_view(ran):
-    window, eye = ran.window, ran.window.scene.eye
+    window, eye = ran.window, ran.window.scene.camera
     window.viewing.fit()
     before = eye.place
     assert eye.fitted

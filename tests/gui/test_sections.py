@@ -572,7 +572,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     window.view.snapshot()
-    camera = window.scene.eye.place
+    camera = window.scene.camera.place
     (line,) = sections(window)
     start, shift = np.array(line.origin[:2]), np.array([0.1, 0.05])
     drag_in_view(window.view, start, start + shift)
@@ -585,7 +585,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
     assert turned.origin == pytest.approx(moved.origin, abs=1e-3)
     # The view stayed where it was, and each drag is undone by itself.
-    assert window.scene.eye.place[:6] == pytest.approx(camera[:6])
+    assert window.scene.camera.place[:6] == pytest.approx(camera[:6])
     window.store.undo()
     assert sections(window) == (moved,)
     window.store.undo()
@@ -618,13 +618,13 @@ def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
     assert any(name.startswith("handle:") for name in window.view.actors)
     handle = window.cutting.handles.of(window.view)
     # What is dragged beside it moves the view, as ever.
-    camera = window.scene.eye.place
+    camera = window.scene.camera.place
     beside = handle._grips.ends[0] + 0.2
     drag_in_view(window.view, beside, beside + 0.1)
-    assert window.scene.eye.place != camera
+    assert window.scene.camera.place != camera
     # Wherever one looks, it is in reach.
     (x, y, _), half = sections(window)[0].origin, 0.02
-    window.scene.eye.aim((x, y + 0.3, 0.0), half, 1.0)
+    window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
     for point in (*handle._grips.ends, *handle._grips.middle):
         assert abs(point[1] - y - 0.3) < half
     flat_panel.handle.click()

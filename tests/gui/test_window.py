@@ -336,7 +336,7 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
         return ""
 
     opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
-    monkeypatch.setattr(intersections, "find_clash", listening)
+    monkeypatch.setattr(intersections, "find_intersection", listening)
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
     opened.click(field)

@@ -257,13 +257,13 @@ def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
     window.docks_.lead_to("worst")
     panel = window.docks_.panels["worst"]
     opened.qtbot.waitUntil(lambda: panel.model.rowCount() > 0 and panel.isVisible())
-    before = window.scene.eye.place
+    before = window.scene.camera.place
     click(panel, 2)
     cell = opened.session.view.marked
     assert cell == panel.model.cell(2)
     assert np.allclose(window.scene.plotter.camera.focal_point[:2], middle(opened, cell))
     QTest.mouseClick(panel.back, Qt.MouseButton.LeftButton)
-    assert np.allclose(window.scene.eye.place, before)
+    assert np.allclose(window.scene.camera.place, before)
 
 
 def test_an_export_that_fails_is_told_in_the_window(opened, tmp_path, answers):

@@ -153,5 +153,5 @@ def test_what_is_missing_has_the_words_of_the_window(plain):
     session = changes.set_role(plain, ("left", "right", "bottom"), "periodic")
     session = changes.set_role(session, ("top",), "moving")
     session = changes.add_motion(session, Translate("top", (0.0, 0.1)))
-    (told,) = {m.text for m in changes.is_missing(session)}
+    (told,) = {m.text for m in changes.run_requirements(session)}
     assert told.startswith("The role “periodic” has an odd number of markers (bottom, right, left)")

@@ -267,7 +267,7 @@ def test_a_marked_cell_inside_a_3d_mesh_is_seen_through_its_boundaries(scene, be
 
 def test_flying_to_a_cell_puts_it_into_the_middle_at_a_good_size(scene, bent):
     session = opened(scene, bent)
-    before = scene.eye.place
+    before = scene.camera.place
     cell = 200
     at = session.frame.mesh.points[nodes_of(session.mesh, cell)]
     scene.fly_to(cell)
@@ -275,7 +275,7 @@ def test_flying_to_a_cell_puts_it_into_the_middle_at_a_good_size(scene, bent):
     assert np.allclose(scene.plotter.camera.focal_point, at.mean(axis=0))
     seen = to_display(scene.plotter, at)
     assert 300 / 16 < np.ptp(seen, axis=0).max() < 300 / 4
-    scene.eye.go(before)
-    assert np.allclose(scene.eye.place, before)
+    scene.camera.go(before)
+    assert np.allclose(scene.camera.place, before)
     scene.fly_to(10**9)
-    assert np.allclose(scene.eye.place, before)
+    assert np.allclose(scene.camera.place, before)

@@ -18,7 +18,7 @@ from slideviz.scene.passages import (
     outermost,
 )
 from slideviz.scene.pick import to_display
-from slideviz.scene.threshold import ChosenLayer
+from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session import changes
 from slideviz.session.inspect import middles
 from slideviz.session.state import Frame
@@ -226,7 +226,7 @@ def test_neighbours_show_the_chosen_cells_only(scene, row):
 
 def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
     session = opened(scene, stator, copies=1, colour_by="size-skew")
-    chosen = next(layer for layer in scene.layers if isinstance(layer, ChosenLayer))
+    chosen = next(layer for layer in scene.layers if isinstance(layer, ThresholdLayer))
     for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
         scene.update(changes.set_view(session, threshold=threshold))
         actors = scene.plotter.actors

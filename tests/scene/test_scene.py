@@ -363,11 +363,11 @@ def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, s
 def test_a_camera_comes_back(scene, session):
     opened(scene, session)
     scene.zoom_at(100, 100, 2.0)
-    place = scene.eye.place
+    place = scene.camera.place
     scene.fit()
-    assert scene.eye.place != place
-    scene.eye.go(place)
-    assert np.allclose(scene.eye.place, place)
+    assert scene.camera.place != place
+    scene.camera.go(place)
+    assert np.allclose(scene.camera.place, place)
 
 
 def culling(scene):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.sections.handles import dragged, grips, nearest
+from slideviz.sections.handles import dragged, handle_parts, nearest
 from slideviz.sections.line import along, box_around, line_ends, trace
 from slideviz.sections.model import Section
 
@@ -55,19 +55,19 @@ def test_the_box_around_a_mesh_has_a_margin():
 
 
 def test_a_line_is_held_at_its_origin_or_in_the_middle_of_what_is_seen():
-    held = grips(LINE, BOX)
+    held = handle_parts(LINE, BOX)
     assert np.allclose(held.middle, [[1.0, 0.5]])
     assert np.allclose(held.ends, [[1, 0], [1, 2]])
     away = Section("plane", (1.0, 77.0, 0.0), (1.0, 0.0, 0.0))
-    assert np.allclose(grips(away, BOX).middle, [[1.0, 1.0]])
-    assert grips(Section("plane", (5.0, 0.0, 0.0), (1.0, 0.0, 0.0)), BOX) is None
+    assert np.allclose(handle_parts(away, BOX).middle, [[1.0, 1.0]])
+    assert handle_parts(Section("plane", (5.0, 0.0, 0.0), (1.0, 0.0, 0.0)), BOX) is None
 
 
 def test_a_circle_is_held_on_itself_and_in_its_middle_where_that_is_seen():
-    held = grips(RING, BOX)
+    held = handle_parts(RING, BOX)
     assert np.allclose(held.middle, [[2.0, 1.0]])
     assert np.hypot(*(held.ends[0] - (2, 1))) == pytest.approx(0.5)
-    around = grips(Section("cylinder", (-2.0, 1.0, 0.0), radius=3.0), BOX)
+    around = handle_parts(Section("cylinder", (-2.0, 1.0, 0.0), radius=3.0), BOX)
     assert len(around.middle) == 0
     assert (around.ends[0] > BOX[0]).all()
     assert (around.ends[0] < BOX[1]).all()

@@ -4,11 +4,11 @@ import pytest
 
 from slideviz.case.model import Case, FromFile, Translate
 from slideviz.session import changes
-from slideviz.session.intersections import clash_key, find_clash, set_clash
+from slideviz.session.intersections import find_intersection, intersection_key, set_intersection
 
 
 def look(case, mesh, stopped=False):
-    return find_clash(case, mesh, lambda _: None, lambda: stopped)
+    return find_intersection(case, mesh, lambda _: None, lambda: stopped)
 
 
 @pytest.fixture
@@ -66,12 +66,14 @@ def test_boundaries_that_disagree_about_a_node_are_told(square):
 def test_a_clash_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
     session = changes.set_role(session, ["bottom"], "moving")
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
-    assert not changes.is_missing(session)
-    key = clash_key(session)
-    told = set_clash(session, "It clashes.", key)
-    assert [(m.text, m.place) for m in changes.is_missing(told)] == [("It clashes.", "motion")]
-    assert not changes.is_missing(set_clash(told, "", key))
+    assert not changes.run_requirements(session)
+    key = intersection_key(session)
+    told = set_intersection(session, "It clashes.", key)
+    assert [(m.text, m.place) for m in changes.run_requirements(told)] == [
+        ("It clashes.", "motion")
+    ]
+    assert not changes.run_requirements(set_intersection(told, "", key))
     later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
-    assert set_clash(later, "It clashes.", key) is later
-    assert clash_key(changes.set_case(session, steps=7)) == key
-    assert clash_key(changes.set_role(session, ["top"], "internal")) != key
+    assert set_intersection(later, "It clashes.", key) is later
+    assert intersection_key(changes.set_case(session, steps=7)) == key
+    assert intersection_key(changes.set_role(session, ["top"], "internal")) != key

@@ -54,11 +54,11 @@ def test_a_boundary_that_no_longer_moves_leaves_the_motion(session):
 
 def test_who_has_a_motion_is_not_asked_for_one(session):
     session = changes.set_role(session, PAIR, "moving")
-    assert sum("has no motion" in m.text for m in changes.is_missing(session)) == 2
+    assert sum("has no motion" in m.text for m in changes.run_requirements(session)) == 2
     one = changes.add_motion(session, Translate("left", (0.0, 0.1)))
-    assert [m.text for m in changes.is_missing(one)] == ["“bottom” has no motion: add one."]
-    assert not changes.is_missing(changes.add_motion(session, Translate(PAIR, (0.0, 0.1))))
-    assert not changes.is_missing(changes.add_motion(session, Translate("", (0.0, 0.1))))
+    assert [m.text for m in changes.run_requirements(one)] == ["“bottom” has no motion: add one."]
+    assert not changes.run_requirements(changes.add_motion(session, Translate(PAIR, (0.0, 0.1))))
+    assert not changes.run_requirements(changes.add_motion(session, Translate("", (0.0, 0.1))))
 
 
 def test_the_table_lists_the_nodes_of_all_of_them(square):

@@ -120,7 +120,7 @@ def test_essence_takes_unnamed_boundaries_as_fixed():
 
 def test_what_is_missing_is_told_in_the_order_of_work(session):
     def first(state):
-        found = changes.is_missing(state)
+        found = changes.run_requirements(state)
         return (found[0].text, found[0].place) if found else None
 
     assert first(Session()) == ("Open a mesh first.", "open")
@@ -149,17 +149,17 @@ def test_what_is_missing_is_told_in_the_order_of_work(session):
 def test_motions_that_move_nothing_are_not_ready(session, still, moves):
     session = changes.set_role(session, ("left",), "moving")
     session = changes.add_motion(session, still)
-    (missing,) = changes.is_missing(session)
+    (missing,) = changes.run_requirements(session)
     assert missing.place == "motion"
     assert "Nothing moves yet" in missing.text
     # One of several may stay.
-    assert changes.is_missing(changes.add_motion(session, moves)) == ()
+    assert changes.run_requirements(changes.add_motion(session, moves)) == ()
 
 
 def test_what_the_case_finds_wrong_is_passed_on(session):
     session = changes.set_role(session, ("left",), "moving")
     session = changes.add_motion(session, Translate("left", (1.0, 0.0)))
-    (missing,) = changes.is_missing(changes.set_case(session, steps=-1))
+    (missing,) = changes.run_requirements(changes.set_case(session, steps=-1))
     assert "-1" in missing.text
 
 

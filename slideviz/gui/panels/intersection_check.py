@@ -45,7 +45,7 @@ class ClashWatch(QObject):
     def _changed(self, old: Session, new: Session) -> None:
         if new.mesh is None or (old.mesh is new.mesh and old.case is new.case):
             return
-        if intersections.clash_key(new) != self._known:
+        if intersections.intersection_key(new) != self._known:
             self._timer.start()
 
     def _look(self) -> None:
@@ -53,12 +53,12 @@ class ClashWatch(QObject):
         if self._runner.busy:
             self._timer.start()
         elif session.mesh is not None:
-            self._asked = intersections.clash_key(session)
-            self._runner.start(intersections.find_clash, session.case, session.mesh)
+            self._asked = intersections.intersection_key(session)
+            self._runner.start(intersections.find_intersection, session.case, session.mesh)
 
     def _found(self, text: str) -> None:
         self._known = self._asked
-        self.store.change(intersections.set_clash, text, self._asked)
+        self.store.change(intersections.set_intersection, text, self._asked)
         self._again()
 
     def _failed(self, error: Exception) -> None:
@@ -67,5 +67,5 @@ class ClashWatch(QObject):
 
     def _again(self) -> None:
         session = self.store.session
-        if session.mesh is not None and intersections.clash_key(session) != self._known:
+        if session.mesh is not None and intersections.intersection_key(session) != self._known:
             self._timer.start()

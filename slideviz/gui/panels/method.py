@@ -23,7 +23,7 @@ from slideviz.gui.panels.method_more import MoreSettings
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.session import changes
 from slideviz.session.motions import found_text
-from slideviz.session.run_messages import Missing
+from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
@@ -100,7 +100,7 @@ class MethodPanel(QWidget):
         bar = self.scroll.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
 
-    def lead_to(self, _missing: Missing) -> None:
+    def lead_to(self, _missing: Requirement) -> None:
         """Put the cursor where something is put right."""
         if not self.watch.focus():
             self.form.fields["sliding"].setFocus()

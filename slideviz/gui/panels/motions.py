@@ -38,7 +38,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motion_table import Rows
 from slideviz.session.motions import centroid, machine_axis, new_target, targets
-from slideviz.session.run_messages import Missing
+from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
@@ -228,7 +228,7 @@ class MotionPanel(QWidget):
         self.store.change(changes.add_motion, motion)
         self.editor.focus()
 
-    def lead_to(self, missing: Missing) -> None:
+    def lead_to(self, missing: Requirement) -> None:
         """Put the cursor where something is put right; what wants a motion gets one."""
         motions = self.store.session.case.motions
         if self.watch.focus():

@@ -21,7 +21,7 @@ from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.plot_canvas import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
-from slideviz.session.changes import is_missing
+from slideviz.session.changes import run_requirements
 from slideviz.session.jobs import Doing
 from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
 from slideviz.session.state import Session
@@ -37,7 +37,7 @@ class RunPanel(QWidget):
 
     Signals
     -------
-    place_wanted(Missing)
+    place_wanted(Requirement)
         The link to where what is missing is put right.
     """
 
@@ -91,7 +91,7 @@ class RunPanel(QWidget):
         key = (session.mesh, session.case, session.clash, session.invalid)
         if key != getattr(self, "_key", None):
             self._key = key
-            self._missing = is_missing(session)
+            self._missing = run_requirements(session)
             self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
         self.cancel.setVisible(bool(self._busy))
         self.run.setVisible(not self._busy)

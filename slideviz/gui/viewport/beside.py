@@ -112,7 +112,7 @@ class CameraLink:
         def follow(*_) -> None:
             # Drawing sets near and far planes, which is no movement: without the second
             # condition the views would make each other draw for ever.
-            if self._following or leader.eye.looks_like(follower.eye):
+            if self._following or leader.camera.looks_like(follower.camera):
                 return
             self._following = True
             try:

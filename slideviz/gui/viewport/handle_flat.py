@@ -15,7 +15,7 @@ from slideviz.gui.viewport.handle import HANDLE_COLOUR
 from slideviz.gui.viewport.pulled import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, Pulled
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import on_plane, to_display
-from slideviz.sections.handles import Grips, Part, dragged, grips, nearest
+from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, nearest
 from slideviz.sections.line import Box
 from slideviz.sections.model import Section
 
@@ -35,7 +35,7 @@ class FlatHandle(Pulled[tuple[Section, Box]]):
         super().__init__(view, *others)
         self._look: Look | None = None
         self._lift = 0.0
-        self._grips: Grips | None = None
+        self._grips: HandleParts | None = None
         self._placed: tuple[object, ...] = ()
         self._watching = view.camera.AddObserver("ModifiedEvent", lambda *_: self.put())
 
@@ -72,7 +72,7 @@ class FlatHandle(Pulled[tuple[Section, Box]]):
         if key == self._placed:
             return
         self._placed = key
-        self._grips = grips(self.section, seen)
+        self._grips = handle_parts(self.section, seen)
         empty = np.empty((0, 2))
         points = empty
         if self._grips is not None:

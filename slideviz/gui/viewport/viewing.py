@@ -93,7 +93,7 @@ class Viewing(QWidget):
 
     def _make_second(self, session: Session) -> None:
         """Make the second view; from now on what moves one camera moves the other."""
-        detail = self._before is not None or self.scene.eye.sees_detail()
+        detail = self._before is not None or self.scene.camera.sees_detail()
         self.second = self._make_view()
         self._place(session.view.swapped)
         self.second.setVisible(True)
@@ -107,7 +107,10 @@ class Viewing(QWidget):
         self.second_scene.take_camera(self.scene)
         self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
-        self.scene.eye.beside, self.second_scene.eye.beside = self.second_scene.eye, self.scene.eye
+        self.scene.camera.beside, self.second_scene.camera.beside = (
+            self.second_scene.camera,
+            self.scene.camera,
+        )
         self._rearranged(not detail)
         self.second.unveil()
         self.second_made.emit()
@@ -116,7 +119,7 @@ class Viewing(QWidget):
         """Let the two views change places where they stand the other way round."""
         if (self._grid.itemAtPosition(1, 0).widget() is self.second) == swapped:
             return
-        fitted = self._leader.eye.fitted
+        fitted = self._leader.camera.fitted
         self._place(swapped)
         self._share_legend(swapped)
         if fitted:
@@ -147,7 +150,7 @@ class Viewing(QWidget):
 
     def _resized(self, scene: Scene) -> None:
         """Draw a view of another size; where everything filled it, everything does again."""
-        fitted = self._leader.eye.fitted
+        fitted = self._leader.camera.fitted
         scene.resized()
         if fitted:
             self._leader.fit()
@@ -173,7 +176,7 @@ class Viewing(QWidget):
         whole = self.scene.sees_all()
         self._link.end()
         self._link = None
-        self.scene.eye.beside = None
+        self.scene.camera.beside = None
         for view in (second, self.view):
             self._grid.removeWidget(view)
         self._grid.addWidget(self.view, 1, 0)
@@ -198,7 +201,7 @@ class Viewing(QWidget):
         self.view.set_flat(session.mesh.dim == 2)
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
-            self.scene.eye.go(opened.camera)
+            self.scene.camera.go(opened.camera)
         self.scene.set_motion_ghosts(self._ghosts.moved(session.case))
         self.view.unveil()
 
@@ -297,14 +300,14 @@ class Viewing(QWidget):
 
         While everything is seen the camera stays: a jump would look like a motion of the mesh.
         """
-        fitted = self._leader.eye.fitted
-        if fitted and any(scene.eye.loses_some() for scene in self._scenes()):
+        fitted = self._leader.camera.fitted
+        if fitted and any(scene.camera.loses_some() for scene in self._scenes()):
             self.fit()
 
     def fly_to(self, cell: int) -> None:
         """Look at a cell of the mesh that is shown; `fly_back` returns."""
         if self._before is None:
-            self._before = self.scene.eye.place
+            self._before = self.scene.camera.place
         self.scene.fly_to(cell)
         self.render()
 
@@ -314,7 +317,7 @@ class Viewing(QWidget):
         if before is None:
             self.fit()
         else:
-            self.scene.eye.go(before)
+            self.scene.camera.go(before)
             self.render()
 
     def look_from(self, side: str) -> None:
