@@ -9,7 +9,7 @@ from PIL import Image
 
 from slideviz.case.cfg import set_key
 from slideviz.case.model import Case
-from slideviz.samples.table import SAMPLES, VARIANTS
+from slideviz.samples.table import SAMPLES
 from slideviz.study.combinations import METHODS
 from slideviz.terms import PERIODIC_MODES
 from tools.study import __main__ as study
@@ -30,7 +30,7 @@ def published():
 @pytest.mark.parametrize("call", CALLS, ids=lambda call: call.name)
 def test_every_call_is_one_that_can_be_made(call):
     assert call.sample in SAMPLES
-    assert call.variant in ("", *VARIANTS[call.sample])
+    assert call.variant in ("", *SAMPLES[call.sample].variants)
     assert set(call.methods.split(",")) <= set(METHODS)
     assert set(filter(None, call.periodic.split(","))) <= set(PERIODIC_MODES)
     case = Case()

@@ -21,13 +21,13 @@ def sample(arguments: argparse.Namespace) -> int:
     """Write a sample case, or list the samples."""
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
-    from slideviz.samples.table import SAMPLES, VARIANTS, write_sample
+    from slideviz.samples.table import SAMPLES, write_sample
 
     if arguments.name is None:
         print("samples (slideviz sample NAME -o DIR):")
-        print(table([(name, about) for name, about in SAMPLES.items()]))
+        print(table([(name, row.about) for name, row in SAMPLES.items()]))
         print("variants (--variant):")
-        print(table([(name, ", ".join(kinds)) for name, kinds in VARIANTS.items()]))
+        print(table([(name, ", ".join(row.variants)) for name, row in SAMPLES.items()]))
         return DONE
     folder = arguments.output or Path(arguments.name)
     paths = write_sample(arguments.name, folder, arguments.size, arguments.variant, arguments.force)

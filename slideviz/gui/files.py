@@ -88,9 +88,9 @@ class Files(QObject):
 
     def ask_and_open_sample(self) -> None:
         """Ask for a sample and its size, and open it."""
-        from slideviz.samples.table import DEFAULT_SIZES
+        from slideviz.samples.table import SAMPLES
 
-        sizes = {name: jobs.SIZES.get(name, DEFAULT_SIZES[name]) for name in self.samples}
+        sizes = {name: jobs.SIZES.get(name, SAMPLES[name].size) for name in self.samples}
         found = questions.ask_sample(self.window, self.samples, sizes)
         if found is not None:
             self.open_sample(found[0], size=found[1])
@@ -330,4 +330,4 @@ def known_samples() -> dict[str, str]:
     """Return the sample cases: name and description."""
     from slideviz.samples.table import SAMPLES
 
-    return dict(SAMPLES)
+    return {name: row.about for name, row in SAMPLES.items()}

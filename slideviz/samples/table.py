@@ -1,8 +1,8 @@
-"""Sample cases: those of the thesis (chapter 4), at any size, and a blade passage."""
+"""The table of the samples: cases of the thesis (chapter 4), at any size, and a blade passage."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,43 +16,6 @@ from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.row import row_case, row_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh
 from slideviz.samples.thesis import FILE, thesis_case
-
-SAMPLES: Mapping[str, str] = {
-    "square": "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
-    "polar": "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
-    "hexahedron": "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
-    "cylindrical": "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
-    "passage": "2D: turbine blade in a periodic passage; size: cells along the inflow (36)",
-    "turbine-row": "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
-    "size: cells (224180)",
-    "stator": "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
-}
-"""What each sample is, by name."""
-
-DEFAULT_SIZES = {
-    "square": 25,
-    "polar": 25,
-    "hexahedron": 25,
-    "cylindrical": 25,
-    "passage": 36,
-    "turbine-row": 224_180,
-    "stator": 240_000,
-}
-VARIANTS: Mapping[str, tuple[str, ...]] = {
-    "square": ("file", "motion", "translate"),
-    "polar": ("file",),
-    "hexahedron": ("file", "motion", "flat"),
-    "cylindrical": ("file",),
-    "passage": ("motion",),
-    "turbine-row": ("motion",),
-    "stator": ("file",),
-}
-"""How each sample can move, the default first.
-
-``file``: as a displacement file; ``motion``: the same by MOTION keys; ``translate``: the case of
-thesis Figure 4.4, which moves the block close to two sides; ``flat``: that of Figure 4.14, without
-a component in z.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +41,91 @@ class Sample:
     displacement: Displacements | None = None
 
 
+@dataclass(frozen=True)
+class SampleKind:
+    """A kind of sample: what makes it, and the words for it.
+
+    Attributes
+    ----------
+    about : str
+        What it is, for people.
+    size : int
+        The usual size.
+    make : callable
+        Returns the sample of a name, a size and a variant.
+    variants : tuple of str
+        How it can move, the default first. ``file``: as a displacement file; ``motion``: the same
+        by MOTION keys; ``translate``: the case of thesis Figure 4.4, which moves the block close
+        to two sides; ``flat``: that of Figure 4.14, without a component in z.
+    """
+
+    about: str
+    size: int
+    make: Callable[[str, int, str], Sample]
+    variants: tuple[str, ...] = ("motion",)
+
+
+def _thesis(name: str, size: int, variant: str) -> Sample:
+    return Sample(name, *thesis_case(name, size, variant))
+
+
+def _passage(name: str, size: int, _variant: str) -> Sample:
+    return Sample(name, passage_mesh(size), passage_case())
+
+
+def _turbine_row(name: str, size: int, _variant: str) -> Sample:
+    return Sample(name, row_mesh(size), row_case(size))
+
+
+def _stator(name: str, size: int, _variant: str) -> Sample:
+    mesh = stator_mesh(size)
+    return Sample(name, mesh, stator_case(), stator_displacement(mesh))
+
+
+SAMPLES: Mapping[str, SampleKind] = {
+    "square": SampleKind(
+        "2D: turned block in a square, periodic in y (thesis 4.1.1); size 25 or 200 there",
+        25,
+        _thesis,
+        ("file", "motion", "translate"),
+    ),
+    "polar": SampleKind(
+        "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
+        25,
+        _thesis,
+        ("file",),
+    ),
+    "hexahedron": SampleKind(
+        "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
+        25,
+        _thesis,
+        ("file", "motion", "flat"),
+    ),
+    "cylindrical": SampleKind(
+        "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
+        25,
+        _thesis,
+        ("file",),
+    ),
+    "passage": SampleKind(
+        "2D: turbine blade in a periodic passage; size: cells along the inflow (36)", 36, _passage
+    ),
+    "turbine-row": SampleKind(
+        "2D: supersonic vane in a cascade, layer and triangles (thesis 4.1.3); "
+        "size: cells (224180)",
+        224_180,
+        _turbine_row,
+    ),
+    "stator": SampleKind(
+        "3D: stator passage, 41 around, hexahedra (thesis 4.2.3); size: cells (240000)",
+        240_000,
+        _stator,
+        ("file",),
+    ),
+}
+"""Every kind of sample, by name."""
+
+
 def sample(name: str, size: int | None = None, variant: str | None = None) -> Sample:
     """Return a sample case.
 
@@ -87,9 +135,9 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
         One of ``SAMPLES``.
     size : int, optional
         Cells in each direction; of the passage: cells along its inflow; of turbine row and
-        stator: all cells. One of ``DEFAULT_SIZES`` when left out.
+        stator: all cells. The usual size when left out.
     variant : str, optional
-        One of ``VARIANTS[name]``; the first when left out.
+        One of ``SAMPLES[name].variants``; the first when left out.
 
     Raises
     ------
@@ -99,18 +147,11 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     if name not in SAMPLES:
         hint = nearest(name, SAMPLES)
         raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
-    kind = variant or VARIANTS[name][0]
-    if kind not in VARIANTS[name]:
-        raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(VARIANTS[name])}")
-    cells = DEFAULT_SIZES[name] if size is None else size
-    if name == "passage":
-        return Sample(name, passage_mesh(cells), passage_case())
-    if name == "turbine-row":
-        return Sample(name, row_mesh(cells), row_case(cells))
-    if name == "stator":
-        mesh = stator_mesh(cells)
-        return Sample(name, mesh, stator_case(), stator_displacement(mesh))
-    return Sample(name, *thesis_case(name, cells, kind))
+    row = SAMPLES[name]
+    kind = variant or row.variants[0]
+    if kind not in row.variants:
+        raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(row.variants)}")
+    return row.make(name, row.size if size is None else size, kind)
 
 
 def write_sample(

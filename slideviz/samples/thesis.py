@@ -43,7 +43,7 @@ _CORNERS = {
 def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displacements | None]:
     """Return mesh, case and, unless ``variant`` is ``motion``, the displacement file's content.
 
-    ``variant`` is one of ``samples.VARIANTS[name]``.
+    ``variant`` is one of ``SAMPLES[name].variants``.
 
     Raises
     ------

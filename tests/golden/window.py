@@ -208,11 +208,15 @@ def tell_contexts(desk: Desk, window) -> None:
 
 def tell_dialogs(desk: Desk, window, place: Path) -> None:
     """Keep the words of every dialog, and pictures of those that a user fills in."""
-    from slideviz.samples.table import DEFAULT_SIZES, SAMPLES
+    from slideviz.samples.table import SAMPLES
 
     here = [place / name for name in ("a.su2", "b.su2")]
     with answered(desk):
-        questions.ask_sample(window, SAMPLES, DEFAULT_SIZES)
+        questions.ask_sample(
+            window,
+            {name: row.about for name, row in SAMPLES.items()},
+            {name: row.size for name, row in SAMPLES.items()},
+        )
         questions.ask_replace(window, here[:1])
         questions.ask_replace(window, here)
         questions.ask_overwrite_input(window, here[0])

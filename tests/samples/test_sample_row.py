@@ -13,7 +13,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
 from slideviz.samples.row import NEAREST, front_points, row_case, row_mesh
 from slideviz.samples.sizing import Sizing, find_sizing, inside, relax, triangulate
-from slideviz.samples.table import DEFAULT_SIZES, sample
+from slideviz.samples.table import SAMPLES, sample
 from slideviz.samples.vane import camber, pitch, vane_layers
 
 TRIANGLE, QUADRILATERAL = 5, 9
@@ -59,7 +59,7 @@ def test_size_is_the_number_of_cells_and_all_are_good(size):
 def test_default_size_has_the_numbers_of_the_thesis():
     """Thesis Table 4.7, and the 1315 nodes of the vane of Table 4.8."""
     mesh = sample("turbine-row").mesh
-    assert DEFAULT_SIZES["turbine-row"] == 224_180
+    assert SAMPLES["turbine-row"].size == 224_180
     assert len(mesh.cells) == pytest.approx(224_180, rel=0.02)
     assert len(mesh.points) == pytest.approx(129_883, rel=0.02)
     assert len(mesh.marker("BLADE").nodes) == 1315

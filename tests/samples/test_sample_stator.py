@@ -16,7 +16,7 @@ from slideviz.samples.blade import Section, blade_nodes
 from slideviz.samples.channel import Shares, counts
 from slideviz.samples.passage import make_grid, smoothed, straight_points
 from slideviz.samples.stator import refined, stator_mesh
-from slideviz.samples.table import DEFAULT_SIZES, Sample, sample, write_sample
+from slideviz.samples.table import SAMPLES, Sample, sample, write_sample
 
 made = cache(sample)
 KEPT = Path(__file__).parents[2] / "sample_meshes" / "stator"
@@ -47,7 +47,7 @@ def test_size_is_the_number_of_cells_and_all_are_good(size):
 def test_default_size_is_near_that_of_the_thesis():
     """Thesis Table 4.13: 240004 cells and 256590 nodes."""
     mesh = sample("stator").mesh
-    assert DEFAULT_SIZES["stator"] == 240_000
+    assert SAMPLES["stator"].size == 240_000
     assert len(mesh.cells) == pytest.approx(240_004, rel=0.03)
     assert len(mesh.points) == pytest.approx(256_590, rel=0.03)
     assert sv.quality(mesh).min > 0.7

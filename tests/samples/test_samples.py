@@ -13,7 +13,7 @@ from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.samples.passage import passage_mesh, smooth
-from slideviz.samples.table import SAMPLES, VARIANTS, Sample, sample, write_sample
+from slideviz.samples.table import SAMPLES, Sample, sample, write_sample
 
 ROOT = Path(__file__).parents[2]
 THESIS = ROOT / ".." / "shared" / "meshes" / "thesis"
@@ -187,7 +187,9 @@ def same_mesh(one: sv.Mesh, other: sv.Mesh) -> bool:
     )
 
 
-@pytest.mark.parametrize(("name", "variant"), [(n, v) for n in SAMPLES for v in VARIANTS[n]])
+@pytest.mark.parametrize(
+    ("name", "variant"), [(n, v) for n in SAMPLES for v in SAMPLES[n].variants]
+)
 def test_written_sample_reads_back_bit_for_bit_wherever_it_is_moved(tmp_path, name, variant):
     size = {"passage": 12, "turbine-row": 5_000, "stator": 5_000}.get(name, 5)
     paths = write_sample(name, tmp_path / "a" / "b", size, variant)
