@@ -13,9 +13,9 @@ from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.samples.passage import passage_case, passage_mesh
-from slideviz.samples.row import row_case, row_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh
 from slideviz.samples.thesis import FILE, thesis_case
+from slideviz.samples.turbine_row import row_case, row_mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ def row_mesh(size: int) -> Mesh:
     CaseError
         ``size`` is not within ``SIZES``.
     """
-    from slideviz.samples.row import front_points
+    from slideviz.samples.turbine_row import front_points
 
     if not SIZES[0] <= size <= SIZES[1]:
         raise CaseError(f"size {size} is out of range; a turbine row has {SIZES[0]} to {SIZES[1]}")
