@@ -11,7 +11,7 @@ from slideviz.case.model import Case, Rotate, Scale
 from slideviz.deformation.setup import make_setup
 from slideviz.mesh.topology import find_boundary
 from tests import builders
-from tools.laws.renumber import renumbered
+from tools.laws.meshes import renumbered
 
 MESHES = {
     "square": (lambda: builders.square(11, "mixed"), "BLOCK", ("y_m", "y_p")),

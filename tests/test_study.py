@@ -13,9 +13,9 @@ from slideviz.samples.table import SAMPLES
 from slideviz.study.combinations import METHODS
 from slideviz.terms import PERIODIC_MODES
 from tools.study import __main__ as study
+from tools.study.__main__ import FIGURES, WIDTH
 from tools.study.cases import CALLS, GREEDY
 from tools.study.dense import dense
-from tools.study.publish import FIGURES, WIDTH
 from tools.study.sections import SECTIONS
 from tools.study.summary import HERE, Line, write_summary
 

@@ -24,8 +24,15 @@ from scipy.sparse.linalg import splu
 
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.samples.blade import PASSAGE, Section, blade_nodes
-from slideviz.samples.channel import Counts, channel_numbers, channel_points, counts
+from slideviz.samples.blade import (
+    PASSAGE,
+    Counts,
+    Section,
+    blade_nodes,
+    channel_numbers,
+    channel_points,
+    counts,
+)
 
 WALL = 0.05
 """Height of the cells at the blade over that of the O-grid's outermost ones."""

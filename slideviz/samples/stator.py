@@ -18,8 +18,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.samples.blade import Section, blade_nodes, camber
-from slideviz.samples.channel import Counts, Shares, counts
+from slideviz.samples.blade import Counts, Section, Shares, blade_nodes, camber, counts
 from slideviz.samples.passage import Grid, layer_parts, make_grid, smoothed, straight_points
 from slideviz.samples.thesis import FILE
 

@@ -12,8 +12,7 @@ from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
-from slideviz.samples.blade import Section, blade_nodes
-from slideviz.samples.channel import Shares, counts
+from slideviz.samples.blade import Section, Shares, blade_nodes, counts
 from slideviz.samples.passage import make_grid, smoothed, straight_points
 from slideviz.samples.stator import refined, stator_mesh
 from slideviz.samples.table import SAMPLES, Sample, sample, write_sample

@@ -15,9 +15,8 @@ from slideviz.case.model import Translate
 from slideviz.deformation.stepping import Step
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
-from tools.laws.meshes import images
+from tools.laws.meshes import images, renumbered
 from tools.laws.oracle import Frame, carried, goals, nodes_with
-from tools.laws.renumber import renumbered
 from tools.laws.surfaces import off_surface
 
 ROUND = 500 * np.finfo(float).eps

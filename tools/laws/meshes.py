@@ -1,4 +1,4 @@
-"""Random meshes: of many shapes, spacings, sizes and places."""
+"""Random meshes of many shapes, spacings, sizes and places, and the same in another order."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.mesh.periodic import axis_basis
+from tests import builders
 from tools.laws import shapes
 from tools.laws.draw import Rng
 from tools.laws.made import Made, Period
@@ -94,3 +95,17 @@ def images(made: Made, period: Period) -> IntArray:
         assert gap.min(axis=1).max(initial=0.0) < 1e-7 * made.mesh.extent, (first, second)
         found.append(np.stack([a, b[gap.argmin(axis=1)]], axis=1))
     return np.concatenate(found)
+
+
+def renumbered(mesh: Mesh, rng: np.random.Generator) -> tuple[Mesh, IntArray]:
+    """Return the mesh in another order, and which old node each new one is (n,)."""
+    order = rng.permutation(len(mesh.points))
+    mesh = builders.permuted(mesh, order)
+    markers = tuple(Marker(m.name, _shuffled(m.cells, rng)) for m in mesh.markers)
+    return Mesh(mesh.points, _shuffled(mesh.cells, rng), markers, name=mesh.name), order
+
+
+def _shuffled(cells: Cells, rng: np.random.Generator) -> Cells:
+    order = rng.permutation(len(cells))
+    parts = [cells.connectivity[cells.offsets[i] : cells.offsets[i + 1]] for i in order]
+    return Cells.from_types(cells.types[order], np.concatenate(parts))
