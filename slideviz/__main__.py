@@ -10,9 +10,10 @@ import sys
 _ENDS = {
     signal.SIGINT: "cancelled",
     signal.SIGTERM: "ended by SIGTERM",
-    signal.SIGHUP: "ended by SIGHUP",
 }
 """The signals that end any command at any moment: code 128 and the number of the signal."""
+if hasattr(signal, "SIGHUP"):  # Windows has none
+    _ENDS[signal.SIGHUP] = "ended by SIGHUP"
 
 
 def main() -> int:

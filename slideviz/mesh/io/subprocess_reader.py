@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes
 import os
 import pickle
-import resource
 import select
 import signal
 import subprocess
@@ -137,8 +136,7 @@ def main() -> None:
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        _limit(seconds, memory)
         try:
             mesh = read_with_meshio(path, lambda _: None)
         except MeshError as problem:
@@ -149,6 +147,14 @@ def main() -> None:
             markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
             cells = (mesh.cells.types, mesh.cells.connectivity)
             pickle.dump((mesh.points, cells, markers, mesh.name), channel)
+
+
+def _limit(seconds: int, memory: int) -> None:
+    """Let the system end this process after so many seconds, and refuse it more bytes."""
+    import resource  # POSIX only
+
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 
 
 def _die_with(parent: int) -> None:
