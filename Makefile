@@ -10,7 +10,7 @@ RUNS := 5000
 SEED := 0
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format golden bench laws shots study clean
+.PHONY: help setup upgrade demo test test-all lint format docs golden bench laws shots study clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | while IFS=$$'\t' read -r name text; \
@@ -18,6 +18,9 @@ help: ## list the targets
 
 setup: ## make .venv/bin/slideviz and all it needs (does nothing when it is there)
 	@tools/setup.sh
+
+upgrade: ## renew constraints.txt, the versions that setup installs (PYTHON=/path/to/python3.11)
+	@tools/upgrade.sh
 
 demo: setup ## deform a blade passage into demo/ and open it (WINDOW=no: do not open it)
 	@tools/demo.sh

@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
-# Makes .venv/bin/slideviz, with everything to run and test it. Does nothing where all is there.
+# Makes .venv/bin/slideviz, with everything to run and test it, in the versions of constraints.txt.
+# Does nothing where all is there. `tools/setup.sh docs` adds what builds the documentation.
 #
 # PYTHON=/path/to/python chooses the interpreter; SYSTEM_PACKAGES=no leaves apt alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 VENV=.venv
-STAMP=$VENV/.installed
+EXTRAS=test,dev${1:+,$1}
+STAMP=$VENV/.installed${1:+-$1}
 # What the Qt and VTK wheels expect of the system, a screen that is not there (Xvfb) for the
 # tests of the window, and a font.
 PACKAGES=(
@@ -99,17 +101,18 @@ make_venv() {
 }
 
 # All that decides what pip would install.
-fingerprint() { { $VENV/bin/python --version; cat pyproject.toml; } | sha256sum; }
+fingerprint() { { $VENV/bin/python --version; cat pyproject.toml constraints.txt; } | sha256sum; }
 
 install_slideviz() {
-    if [ -x $VENV/bin/slideviz ] && [ "$(cat $STAMP 2>/dev/null)" = "$(fingerprint)" ]; then
+    if [ -x $VENV/bin/slideviz ] && [ "$(cat "$STAMP" 2>/dev/null)" = "$(fingerprint)" ]; then
         return 0
     fi
-    say "installing slideviz and what it needs into $VENV (a few minutes the first time)"
-    rm -f $STAMP
-    $VENV/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test,dev]' \
+    say "installing slideviz [$EXTRAS] into $VENV (a few minutes the first time)"
+    rm -f "$STAMP"
+    $VENV/bin/python -m pip install --quiet --disable-pip-version-check \
+        --constraint constraints.txt --editable ".[$EXTRAS]" \
         </dev/null || fail "pip could not install slideviz; its message is above"
-    fingerprint >$STAMP
+    fingerprint >"$STAMP"
 }
 
 install_system_packages

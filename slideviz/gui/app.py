@@ -38,6 +38,7 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     QSurfaceFormat.setDefaultFormat(_graphics())
     app = QApplication.instance() or QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")
+    app.setDesktopFileName("slideviz")
     app.setWindowIcon(logo())
     places = QStandardPaths.StandardLocation
     kept, cache = _folder(places.AppDataLocation), _folder(places.CacheLocation)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib.resources import files
 
 from qtpy.QtCore import QByteArray, QRectF, QSize, Qt
 from qtpy.QtGui import QIcon, QPainter, QPixmap
@@ -73,14 +74,6 @@ _SVG = (
     'stroke-width="{w}" stroke-linecap="round" stroke-linejoin="round">{body}</g></svg>'
 )
 
-LOGO = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64">
-<rect width="64" height="64" rx="13" fill="#173a5e"/>
-<g fill="none" stroke="#7fb2de" stroke-width="2">
-<path d="M8 50C20 46 30 40 38 12M20 56C32 50 42 42 50 14M8 34c14-2 30 2 48 14
-M10 20c14 0 32 6 46 12"/>
-</g><path d="M15 44C22 24 34 16 50 16 44 30 32 42 15 44z" fill="#ffb000" stroke="#173a5e"
-stroke-width="2.5" stroke-linejoin="round"/></svg>"""
-
 
 def _pixmap(svg: str, size: int) -> QPixmap:
     pixmap = QPixmap(QSize(size, size))
@@ -128,8 +121,9 @@ def role_icon(role: str) -> QIcon:
 
 @lru_cache(maxsize=1)
 def logo() -> QIcon:
-    """Return the sign of the program."""
+    """Return the icon of the program, the one that is installed with its desktop file."""
+    svg = (files("slideviz.gui") / "desktop" / "slideviz.svg").read_text(encoding="utf-8")
     found = QIcon()
     for size in (16, 32, 64, 128):
-        found.addPixmap(_pixmap(LOGO, size))
+        found.addPixmap(_pixmap(svg, size))
     return found

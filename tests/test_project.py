@@ -1,0 +1,52 @@
+"""What the project says of itself agrees with the program."""
+
+import tomllib
+from configparser import ConfigParser
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+
+import yaml
+
+import slideviz
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_the_citation_names_this_version_and_the_thesis():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == slideviz.__version__
+    assert citation["repository-code"] == PROJECT["project"]["urls"]["Repository"]
+    (thesis,) = citation["references"]
+    assert "Radial Basis Function Interpolation" in thesis["title"]
+
+
+def test_the_desktop_file_starts_what_is_installed():
+    entry = ConfigParser(interpolation=None)
+    shared = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["shared-data"]
+    (desktop,) = [path for path in shared if path.endswith(".desktop")]
+    entry.read(ROOT / desktop, encoding="utf-8")
+    command = entry["Desktop Entry"]["Exec"].split()[0]
+    module, _, name = PROJECT["project"]["gui-scripts"][command].partition(":")
+    assert callable(getattr(import_module(module), name))
+    icons = [path for path in shared if path.endswith(f"{entry['Desktop Entry']['Icon']}.svg")]
+    assert len(icons) == 1
+    assert (ROOT / icons[0]).is_file()
+
+
+def test_every_dependency_has_a_tested_version():
+    pinned = {
+        _name(line)
+        for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+        if not line.startswith("#")
+    }
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    wanted = [*PROJECT["project"]["dependencies"], *chain.from_iterable(extras)]
+    assert {_name(line) for line in wanted} <= pinned
+
+
+def _name(requirement: str) -> str:
+    """Return the name of a requirement as package indexes compare it."""
+    kept = requirement.replace("_", "-").lower()
+    return kept[: next((i for i, c in enumerate(kept) if c in "=<>~; "), len(kept))]
