@@ -6,6 +6,9 @@ PYTEST := $(BIN)/python -m pytest
 # Each core takes tests from the others when it has none left (ARGS=-n0: one after the other).
 PARALLEL := -n auto --maxprocesses 4 --dist worksteal
 
+# A screen for the pictures of the examples; without one VTK draws off screen, and says so.
+XVFB = $(if $(shell command -v xvfb-run),xvfb-run -a)
+
 RUNS := 5000
 SEED := 0
 
@@ -40,6 +43,10 @@ lint: setup ## style, types, and the direction of imports
 format: setup ## let ruff put right what it can
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: setup ## build the documentation into build/docs/html; its examples run
+	@tools/setup.sh docs
+	$(XVFB) $(BIN)/python -m sphinx -W --keep-going -q -j auto docs build/docs/html
 
 golden: setup ## record what users get, which test-all compares (PARTS="films window")
 	$(BIN)/python -m tests.golden.record $(PARTS)

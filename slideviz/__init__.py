@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from slideviz.case.model import Case
+    from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
     from slideviz.deformation.solver import Step, deform
     from slideviz.errors import SlidevizError
     from slideviz.mesh.io.files import read, write
@@ -21,11 +21,17 @@ if TYPE_CHECKING:
 _HOME = {
     "Case": "case.model",
     "Cells": "mesh.model",
+    "FromFile": "case.model",
     "Marker": "mesh.model",
     "Mesh": "mesh.model",
     "Quality": "mesh.quality",
+    "Radial": "case.model",
+    "Reduction": "case.model",
+    "Rotate": "case.model",
+    "Scale": "case.model",
     "SlidevizError": "errors",
     "Step": "deformation.solver",
+    "Translate": "case.model",
     "deform": "deformation.solver",
     "quality": "mesh.quality",
     "read": "mesh.io.files",
@@ -35,11 +41,17 @@ _HOME = {
 __all__ = [
     "Case",
     "Cells",
+    "FromFile",
     "Marker",
     "Mesh",
     "Quality",
+    "Radial",
+    "Reduction",
+    "Rotate",
+    "Scale",
     "SlidevizError",
     "Step",
+    "Translate",
     "__version__",
     "deform",
     "quality",

@@ -140,6 +140,20 @@ class Case:
     many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
     control nodes are used, ``idw_power`` where it is the number of dimensions. ``view`` has how
     a window showed the case, by key: it changes no result.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> case = sv.Case(
+    ...     roles={"blade": "moving", "inflow": "sliding", "outflow": "sliding"},
+    ...     motions=(sv.Rotate("blade", 5.0), sv.Translate("blade", (0.001, 0.0))),
+    ...     sliding="ps",
+    ... )
+    >>> case.markers_with("sliding")
+    ('inflow', 'outflow')
+    >>> case.change(steps=5).write("blade.cfg")
+    >>> sv.Case.read("blade.cfg").steps
+    5
     """
 
     mesh_file: Path | None = None

@@ -61,6 +61,24 @@ def deform(
     Thesis chapters 2 and 3: the displacement is divided by the number of steps, in the working
     frame, and every step solves at the positions the one before it left. With ``steps`` 0
     (STEPS= auto) they come only when their number is settled.
+
+    Examples
+    --------
+    Two squares side by side; the left side stays, the right side moves by 0.5:
+
+    >>> import slideviz as sv
+    >>> mesh = sv.Mesh(
+    ...     [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]],
+    ...     sv.Cells.from_blocks([(9, [[0, 1, 4, 3], [1, 2, 5, 4]])]),
+    ...     (
+    ...         sv.Marker("left", sv.Cells.from_blocks([(3, [[0, 3]])])),
+    ...         sv.Marker("right", sv.Cells.from_blocks([(3, [[2, 5]])])),
+    ...     ),
+    ... )
+    >>> case = sv.Case(roles={"right": "moving"}, motions=(sv.Translate("right", (0.5, 0.0)),))
+    >>> for step in sv.deform(case, mesh):
+    ...     print(step.index, step.mesh.points[:3, 0].round(2))
+    1 [0.   1.28 2.5 ]
     """
     tell = progress or (lambda _: None)
     watch = Watch(lambda phase, fraction: tell(Progress(1, max(1, case.steps), phase, fraction)))

@@ -166,6 +166,18 @@ def quality(
         mesh.
     CaseError
         The metric is unknown.
+
+    Examples
+    --------
+    A square, and the same with a corner drawn in to its centre and beyond:
+
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.quality(square).min
+    1.0
+    >>> folded = square.with_points([[0, 0], [1, 0], [0.4, 0.4], [0, 1]])
+    >>> sv.quality(folded, reference=square).summary()["inverted"]
+    1
     """
     if metric not in METRICS:
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")

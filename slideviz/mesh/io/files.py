@@ -42,6 +42,14 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
     ------
     MeshError
         The file cannot be read, or has a mistake: the place and the remedy.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.write("square.su2", square)
+    >>> sv.read("square.su2")
+    Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
     path = Path(path)
     tick = progress or (lambda _: None)
@@ -138,6 +146,15 @@ def write(
     ------
     MeshError
         The file cannot be written, or the mesh does not fit the format.
+
+    Examples
+    --------
+    For SU2, and with the quality of each cell for ParaView:
+
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.write("square.su2", square)
+    >>> sv.write("square.vtu", square, cell_data={"quality": sv.quality(square).values})
     """
     path = Path(path)
     if not overwrite and _is_source(path, mesh):

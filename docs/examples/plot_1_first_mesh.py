@@ -1,0 +1,58 @@
+"""
+A turbine blade in its passage
+==============================
+
+Read a mesh and a case, deform, rate the result, look at it with PyVista, and write it.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import mkdtemp
+
+import pyvista as pv
+
+import slideviz as sv
+
+# %%
+# The sample ``passage`` is one passage of a linear cascade. The command ``slideviz sample passage
+# -o DIR`` writes its mesh and its case; here Python calls it.
+
+folder = Path(mkdtemp())
+sample = ["sample", "passage", "-o", str(folder)]
+subprocess.run([sys.executable, "-m", "slideviz", *sample], check=True, stdout=subprocess.DEVNULL)
+
+mesh = sv.read(folder / "mesh.su2")
+case = sv.Case.read(folder / "passage.cfg")
+print(mesh)
+print(dict(case.roles))
+
+# %%
+# ``sv.deform`` is a generator: it gives a step when it is asked for one. Whoever pulls it may stop
+# at any time.
+
+for step in sv.deform(case, mesh):
+    print(f"step {step.index} of {step.total}: {step.control_nodes} control nodes")
+deformed = step.mesh
+
+# %%
+# Quality is size-skew, from 0 to 1, against the undeformed mesh.
+
+quality = sv.quality(deformed, reference=mesh)
+print(f"minimum {quality.min:.3f}, mean {quality.mean:.3f}, {quality.inverted} inverted cells")
+print("worst cells:", quality.worst(3))
+
+# %%
+# A VTU file takes values on the cells along, and PyVista and ParaView read it.
+
+sv.write(folder / "deformed.vtu", deformed, cell_data={"quality": quality.values}, base=mesh)
+plotter = pv.Plotter(window_size=(900, 560))
+plotter.add_mesh(pv.read(folder / "deformed.vtu"), scalars="quality", clim=(0, 1), show_edges=True)
+plotter.view_xy()
+plotter.camera.zoom(1.4)
+plotter.show()
+
+# %%
+# The same mesh for SU2, with everything else that the file had:
+
+sv.write(folder / "deformed.su2", deformed)

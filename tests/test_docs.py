@@ -1,0 +1,111 @@
+"""What the documentation shows is what the program does.
+
+Blocks ``console`` of a page are run one after the other, in a folder of the page's own, and must
+print what the page says (``...`` stands for anything); blocks ``python`` run between them.
+"""
+
+import doctest
+import inspect
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import slideviz as sv
+from slideviz.cli import exit_codes
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BLOCK = re.compile(r"^```(console|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"^\$ (.*(?:\\\n.*)*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+EXAMPLES = sorted(path.name for path in DOCS.glob("examples/*.py"))
+PAGES = sorted(
+    str(path.relative_to(ROOT))
+    for path in [ROOT / "README.md", *DOCS.rglob("*.md")]
+    if BLOCK.search(path.read_text(encoding="utf-8"))
+)
+
+
+def run(command: list[str], folder: Path) -> str:
+    """Return what a command prints; it finds this slideviz, and needs no screen."""
+    found = dict(
+        os.environ,
+        PATH=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        PYTHONPATH=str(ROOT),
+        PYTHONUNBUFFERED="1",
+        MPLBACKEND="Agg",
+        PYVISTA_OFF_SCREEN="true",
+    )
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=found,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-3000:]
+    # The first command of all compiles, and says so.
+    return re.sub(r"^slideviz: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_of_the_gallery_runs(name, tmp_path):
+    run([sys.executable, str(DOCS / "examples" / name)], tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_shows_what_its_commands_print(page, tmp_path):
+    for kind, text in BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
+        if kind == "python":
+            run([sys.executable, "-c", text], tmp_path)
+            continue
+        commands = COMMAND.findall(text)
+        assert commands, f"no command in {text!r}"
+        for command, wanted in commands:
+            got = run(["bash", "-c", command], tmp_path)
+            alike = doctest.OutputChecker().check_output(wanted, got, FLAGS)
+            assert alike or not wanted.strip(), f"$ {command}\n{got}"
+
+
+@pytest.mark.parametrize("name", [name for name in sv.__all__ if not name.startswith("_")])
+def test_examples_in_docstrings(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    thing = getattr(sv, name)
+    tests = doctest.DocTestFinder(recurse=True).find(thing, name, globs={"sv": sv})
+    if inspect.isfunction(thing):
+        assert any(test.examples for test in tests), f"the docstring of {name} has no example"
+    runner = doctest.DocTestRunner(optionflags=FLAGS)
+    for test in tests:
+        assert runner.run(test).failed == 0
+
+
+def test_the_page_of_the_report_has_its_keys(tmp_path):
+    run(["slideviz", "sample", "passage", "--size", "12", "-o", "."], tmp_path)
+    run(["slideviz", "run", "passage.cfg", "-q", "--json", "report.json"], tmp_path)
+    report = json.loads((tmp_path / "report.json").read_text())
+    keys = set(report) | {
+        f"{name}.{key}"
+        for name in ("quality", "seconds", "node_counts")
+        for key in report[name]
+        if key != "undeformed"
+    }
+    page = (DOCS / "reference" / "report.md").read_text(encoding="utf-8")
+    assert keys - {"quality", "seconds", "node_counts"} <= set(re.findall(r"`([a-z_.]+)`", page))
+
+
+def test_the_page_of_exit_codes_has_them_all():
+    page = (DOCS / "reference" / "exit-codes.md").read_text(encoding="utf-8")
+    listed = {int(code) for code in re.findall(r"^\| (\d+) \|", page, re.MULTILINE)}
+    named = {value for name, value in vars(exit_codes).items() if name.isupper()}
+    assert listed == named | {143}
