@@ -80,7 +80,9 @@ def _keys_page() -> str:
     about = text.index("\n\n") + 2
     first = re.search(r"^[A-Z]{2}[A-Z ]*$", text, re.MULTILINE)
     assert first is not None, "`slideviz keys` has no headings"
-    page += [text[about : first.start()].replace("$", r"\$"), ""]
+    # The page says "own" in words where the terminal has a sign.
+    rules = re.sub(r"\s+Keys marked \+ .*?too\.", "", text[about : first.start()], flags=re.DOTALL)
+    page += [rules.strip(), ""]
     page += ["`slideviz keys` prints this page in the terminal.", ""]
     listed = False
     for line in text[first.start() :].splitlines():

@@ -1,7 +1,8 @@
 """What the documentation shows is what the program does.
 
 Blocks ``console`` of a page are run one after the other, in a folder of the page's own, and must
-print what the page says (``...`` stands for anything); blocks ``python`` run between them.
+print what the page says (``...`` stands for anything). Between them blocks ``python`` run, and
+blocks with a caption are written to the file that it names.
 """
 
 import doctest
@@ -20,7 +21,10 @@ from slideviz.cli import exit_codes
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-BLOCK = re.compile(r"^```(console|python)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r"^```(console|python|\{code-block\} text\n:caption: .*?\n)\n(.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
 COMMAND = re.compile(r"^\$ (.*(?:\\\n.*)*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -69,6 +73,9 @@ def test_a_page_shows_what_its_commands_print(page, tmp_path):
     for kind, text in BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
         if kind == "python":
             run([sys.executable, "-c", text], tmp_path)
+            continue
+        if kind != "console":
+            (tmp_path / kind.split(":caption:")[1].strip()).write_text(text)
             continue
         commands = COMMAND.findall(text)
         assert commands, f"no command in {text!r}"
