@@ -36,7 +36,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
     ready_numerics()
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QSurfaceFormat.setDefaultFormat(_graphics())
-    app = QApplication.instance() or QApplication(sys.argv[:1])
+    app = QApplication.instance()
+    if not isinstance(app, QApplication):
+        app = QApplication(sys.argv[:1])
     app.setApplicationName("slideviz")
     app.setDesktopFileName("slideviz")
     app.setWindowIcon(logo())

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt
+from qtpy.QtGui import QContextMenuEvent, QMouseEvent
 from qtpy.QtWidgets import QDockWidget, QMainWindow, QMenu, QTabBar, QWidget
 
 from slideviz.gui.responsiveness.timers import later
@@ -64,20 +65,21 @@ class DockTabs(QObject):
     def _set_title(self, dock: QDockWidget, titled: bool) -> None:
         # What stands in the place of a title bar hides it.
         if (dock.titleBarWidget() is None) != titled:
-            dock.setTitleBarWidget(None if titled else QWidget())
+            dock.setTitleBarWidget(None if titled else QWidget())  # type: ignore[arg-type]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kinds = QEvent.Type
-        if event.type() not in (kinds.MouseButtonDblClick, kinds.ContextMenu):
-            return False
-        dock = self._dock_at(watched, event.pos())
-        if dock is None:
-            return False
-        if event.type() == kinds.MouseButtonDblClick:
-            self.take_out(dock)
+        twice = event.type() == QEvent.Type.MouseButtonDblClick
+        if isinstance(event, QMouseEvent) and twice:
+            dock = self._dock_at(watched, event.position().toPoint())
+            if dock is not None:
+                self.take_out(dock)
+        elif isinstance(event, QContextMenuEvent):
+            dock = self._dock_at(watched, event.pos())
+            if dock is not None:
+                self.menu_of(dock).popup(event.globalPos())
         else:
-            self.menu_of(dock).popup(event.globalPos())
-        return True
+            return False
+        return dock is not None
 
     def _dock_at(self, bar: QObject, where: QPoint) -> QDockWidget | None:
         assert isinstance(bar, QTabBar)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 from qtpy.QtCore import QByteArray, QEvent, QObject, Qt, QTimer
 from qtpy.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget, QWidget
@@ -21,7 +21,9 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.panels.runs import RunsPanel
 from slideviz.gui.panels.sections import sections_panel
 from slideviz.gui.panels.worst import WorstPanel
+from slideviz.gui.widgets.services import Services
 
+Panel = TypeVar("Panel", bound=QWidget)
 Side = Qt.DockWidgetArea
 LEFT, RIGHT = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
 BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -47,7 +49,7 @@ class DockRow:
     name: str
     title: str
     area: Qt.DockWidgetArea
-    make: Callable[[Any], QWidget]
+    make: Callable[[Services], QWidget]
     after: str = ""
     named: bool = False
     shown: bool = True
@@ -83,7 +85,7 @@ DOCKS: tuple[DockRow, ...] = (
 class Docks(QObject):
     """The docks of a window, by name in ``by_name``; their panels in ``panels``."""
 
-    def __init__(self, window: QMainWindow) -> None:
+    def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.window = window
         self._widths: dict[Side, int] = {}
@@ -121,6 +123,10 @@ class Docks(QObject):
         dock.visibilityChanged.connect(lambda shown: None if shown else _leave(dock))
         self.by_name[row.name] = dock
         self.panels[row.name] = panel
+
+    def panel(self, kind: type[Panel]) -> Panel:
+        """Return the panel of a kind."""
+        return next(panel for panel in self.panels.values() if isinstance(panel, kind))
 
     def restore(self, state: QByteArray | None) -> None:
         """Put every dock where it was, or, where nobody knows of that, where it belongs at first.

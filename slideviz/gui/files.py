@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
@@ -20,6 +21,9 @@ from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
 from slideviz.session.keep import keep_view
 
+if TYPE_CHECKING:
+    from slideviz.gui.window import MainWindow
+
 log = logging.getLogger("slideviz")
 RECENT = 10
 
@@ -27,7 +31,7 @@ RECENT = 10
 class Files(QObject):
     """The files of a window."""
 
-    def __init__(self, window, settings: QSettings) -> None:
+    def __init__(self, window: MainWindow, settings: QSettings) -> None:
         super().__init__(window)
         self.window = window
         self.settings = settings
@@ -46,8 +50,8 @@ class Files(QObject):
     def recent(self) -> list[Path]:
         """Return the files used last, newest first."""
         listed = self.settings.value("recent", []) or []
-        listed = [listed] if isinstance(listed, str) else listed
-        return [Path(text) for text in listed]
+        assert isinstance(listed, str | list)
+        return [Path(text) for text in ([listed] if isinstance(listed, str) else listed)]
 
     def remember(self, path: Path) -> None:
         """Put a file at the top of the recent ones."""
@@ -182,10 +186,10 @@ class Files(QObject):
         text = f"Save {' and '.join(unsaved.values())} before {before}?"
         if "run" in unsaved:
             lost = "Its steps are lost, for it goes on; cancel it to save what there is."
-            others = {name: words for name, words in unsaved.items() if name != "run"}
-            if not others:
+            rest = {name: words for name, words in unsaved.items() if name != "run"}
+            if not rest:
                 return f"Run {session.shown} goes on. Lose its steps?"
-            return f"{self._question(others, before)}\nRun {session.shown} goes on. {lost}"
+            return f"{self._question(rest, before)}\nRun {session.shown} goes on. {lost}"
         more = []
         shown = session.run_shown
         if "case" in unsaved and shown and shown.end == "done" and not session.outdated:
@@ -220,6 +224,7 @@ class Files(QObject):
             return
         step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
         default = self.folder() / f"{self.stem()}{step}.su2"
+        assert session.mesh is not None
         filters = questions.mesh_filters(session.mesh)
         path = questions.ask_save(self.window, "Save mesh", default, filters)
         if path is None:
@@ -244,7 +249,8 @@ class Files(QObject):
             self._saved_to = path
             self.window.store.change(changes.saved_mesh)
         self.window.say(f"Saved {path}")
-        lost = left_out(path, self.window.store.session.mesh)
+        mesh = self.window.store.session.mesh
+        lost = left_out(path, mesh) if mesh is not None else ""
         if lost:
             self.window.banner.tell(f"Saved. {lost}")
         if self.after_save is not None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject
 
@@ -15,6 +16,9 @@ from slideviz.gui.widgets.faults import old_crashes
 from slideviz.gui.widgets.questions import Banner
 from slideviz.session import jobs
 from slideviz.session.keep import restored
+
+if TYPE_CHECKING:
+    from slideviz.gui.window import MainWindow
 
 log = logging.getLogger("slideviz")
 
@@ -32,7 +36,7 @@ class Restore(QObject):
         Goes on with what is restored.
     """
 
-    def __init__(self, window, banner: Banner, autosave: Autosave) -> None:
+    def __init__(self, window: MainWindow, banner: Banner, autosave: Autosave) -> None:
         super().__init__(window)
         self.window = window
         self.banner = banner

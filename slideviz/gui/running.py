@@ -48,7 +48,7 @@ class Running(QObject):
         self.store = store
         self.banner = banner
         self.runner = JobRunner(self)
-        self._finish: Callable[[Any], None] | None = None
+        self._finish: Callable[[Any], object] | None = None
         self._next: Callable[[], None] | None = None
         self._deforms = False
         self.runner.doing.connect(self.doing)
@@ -61,7 +61,13 @@ class Running(QObject):
     def _tell(self, doing: Doing) -> None:
         self.said.emit(doing.text)
 
-    def start_job(self, text: str, finish: Callable[[Any], None], function, *values) -> None:
+    def start_job(
+        self,
+        text: str,
+        finish: Callable[[Any], object],
+        function: Callable[..., Any],
+        *values: object,
+    ) -> None:
         """Start a job beside the window; one that still runs is cancelled first."""
         if self.runner.busy:
             self._next = partial(self.start_job, text, finish, function, *values)

@@ -146,12 +146,12 @@ def shrink(path: Path) -> None:
     apart = drawn.quantize(APART, Image.Quantize.MAXCOVERAGE, kmeans=1).getpalette() or []
     many = drawn.quantize(MANY, Image.Quantize.MEDIANCUT).getpalette() or []
     counted = sorted(drawn.getcolors(drawn.width * drawn.height) or [], reverse=True)
-    exact = [part for _, colour in counted[:EXACT] for part in colour]
+    exact = np.ravel([colour for _, colour in counted[:EXACT]]).tolist()
     palette = apart[: 3 * APART] + many[: 3 * MANY] + exact
     # Pillow's own search for the nearest colour is coarse: it takes 250 for 255.
     tree = KDTree(np.reshape(palette, (-1, 3)))
     colours, where = np.unique(np.asarray(drawn).reshape(-1, 3), axis=0, return_inverse=True)
-    nearest = tree.query(colours)[1].astype(np.uint8)[where.ravel()]
+    nearest = np.asarray(tree.query(colours)[1], np.uint8)[where.ravel()]
     fewer = Image.fromarray(nearest.reshape(drawn.height, drawn.width), "P")
     fewer.putpalette(palette)
     fewer.save(path, optimize=True)

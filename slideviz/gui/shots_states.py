@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.model import Case, Motion, Rotate, Translate
+from slideviz.gui.panels.sections import SectionsPanel
 from slideviz.gui.shots_wait import settle
 from slideviz.samples.table import sample, write_sample
 from slideviz.sections.model import Section
@@ -109,7 +110,7 @@ def section(window: MainWindow, place: Path) -> None:
     _open(window, _stator(place))
     _run(window, **SLIDING)
     window.docks_.lead_to("sections")
-    window.docks_.panels["sections"].add["cylinder"].click()
+    window.docks_.panel(SectionsPanel).add["cylinder"].click()
     window.store.change(changes.set_view, copies=1)
     window.cutting.want_flat(True)
     window.store.change(changes.show, OUTER, False)
@@ -129,7 +130,7 @@ def beside(window: MainWindow, place: Path) -> None:
     settle(window)
     window.viewing.look_from("+x")
     settle(window)
-    scene, view = window.viewing.second_scene, window.viewing.second
+    (_, (view, scene)) = window.viewing.pairs()
     scene.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
 
 

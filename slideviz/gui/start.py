@@ -8,7 +8,8 @@ import html
 from datetime import datetime
 from pathlib import Path
 
-from qtpy.QtCore import QDateTime, QEvent, QLocale, QSize, Qt, Signal
+from qtpy.QtCore import QDate, QEvent, QLocale, QSize, Qt, Signal
+from qtpy.QtGui import QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -146,8 +147,8 @@ class StartPage(QScrollArea):
             self._cards.setColumnStretch(column, int(column < columns))
 
     def _draw_cards(self) -> None:
-        line = self.palette().color(self.palette().ColorRole.WindowText)
-        line = "#aab4c0" if line.lightness() > 128 else "#76828f"
+        letters = self.palette().color(self.palette().ColorRole.WindowText)
+        line = "#aab4c0" if letters.lightness() > 128 else "#76828f"
         for name, button in self.sample_buttons.items():
             button.setIcon(card(name, line))
 
@@ -172,12 +173,12 @@ class StartPage(QScrollArea):
 
     # Qt --------------------------------------------------------------------------------
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self.sample_buttons:
             self._place_cards()
 
-    def changeEvent(self, event) -> None:
+    def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and getattr(self, "sample_buttons", None):
             self._draw_cards()
@@ -186,7 +187,7 @@ class StartPage(QScrollArea):
 class Card(QToolButton):
     """The button of a sample; the Enter key presses it, too."""
 
-    def keyPressEvent(self, event) -> None:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
         else:
@@ -219,7 +220,7 @@ class RecentButton(QPushButton):
         self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.setFixedHeight(self.fontMetrics().height() + 12)
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         folder = str(self.path.parent).replace(str(Path.home()), "~", 1)
         room = self.folder.width()
@@ -238,7 +239,7 @@ def changed_words(path: Path, now: datetime | None = None) -> str:
     if days in (0, 1):
         return f"{'today' if days == 0 else 'yesterday'} {clock}"
     locale = QLocale()
-    return locale.toString(QDateTime(then).date(), locale.FormatType.ShortFormat)
+    return locale.toString(QDate(then.year, then.month, then.day), locale.FormatType.ShortFormat)
 
 
 def _heading(text: str) -> QLabel:

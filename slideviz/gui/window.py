@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
-from qtpy.QtWidgets import QGridLayout, QLabel, QMainWindow, QVBoxLayout, QWidget
+from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QVBoxLayout, QWidget
 
 from slideviz.case.motion_words import box_words
 from slideviz.gui.actions import Actions
@@ -19,19 +22,28 @@ from slideviz.gui.dialogs.exporter import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks
 from slideviz.gui.files import Files
+from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.intersection_check import ClashWatch
+from slideviz.gui.panels.log import LogPanel
+from slideviz.gui.panels.method import MethodPanel
+from slideviz.gui.panels.motions import MotionPanel
+from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.responsiveness.jit_warmup import WarmUp
 from slideviz.gui.restore import Restore
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
+from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.cutting import Cutting
 from slideviz.gui.viewport.player import Player
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.questions import Banner
+from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.io.file_checks import protected
+from slideviz.mesh.model import Mesh
+from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
 from slideviz.session.run_messages import Requirement
 from slideviz.session.store import Store
@@ -39,7 +51,7 @@ from slideviz.session.store import Store
 log = logging.getLogger("slideviz")
 
 
-class MainWindow(QMainWindow):
+class MainWindow(Services):
     """The window of slideviz.
 
     Parameters
@@ -71,6 +83,7 @@ class MainWindow(QMainWindow):
         self.faults = Faults(self.banner, self)
         self.store.failed = self.faults.tell
         self.running = Running(self.store, self.banner, self)
+        self.runner = self.running.runner
         self.files = Files(self, self.settings)
         self.exports = Exports(self)
         self.help = Help(self)
@@ -120,53 +133,48 @@ class MainWindow(QMainWindow):
         column.addWidget(self.player)
         self.setCentralWidget(centre)
 
-    def _inputs(self):
+    def _inputs(self) -> Mapping[Path, str]:
         """Return the files that are not to be written over, and what they are."""
         return self.store.session.inputs()
 
     @property
-    def view(self):
+    def view(self) -> View3D:
         """Return the first view."""
         return self.viewing.view
 
     @property
-    def scene(self):
+    def scene(self) -> Scene:
         """Return what the first view draws."""
         return self.viewing.scene
 
     @property
-    def runner(self):
-        """Return what runs the jobs."""
-        return self.running.runner
-
-    @property
-    def docks(self):
+    def docks(self) -> dict[str, QDockWidget]:
         """Return the docks, by name."""
         return self.docks_.by_name
 
     @property
-    def boundaries(self):
+    def boundaries(self) -> BoundariesPanel:
         """Return the panel of the boundaries."""
-        return self.docks_.panels["boundaries"]
+        return self.docks_.panel(BoundariesPanel)
 
     @property
-    def motions(self):
+    def motions(self) -> MotionPanel:
         """Return the panel of the motions."""
-        return self.docks_.panels["motion"]
+        return self.docks_.panel(MotionPanel)
 
     @property
-    def method(self):
+    def method(self) -> MethodPanel:
         """Return the panel of the method."""
-        return self.docks_.panels["method"]
+        return self.docks_.panel(MethodPanel)
 
     @property
-    def run_panel(self):
+    def run_panel(self) -> RunPanel:
         """Return the panel that starts a run."""
-        return self.docks_.panels["run"]
+        return self.docks_.panel(RunPanel)
 
     def _make_status(self) -> None:
         self.mesh_text = QLabel()
-        self._measured = None
+        self._measured: Mesh | None = None
         self.preparing = QLabel("Preparing… ")
         self.preparing.setToolTip("The numerics are compiled, once after each installation.")
         self.preparing.hide()
@@ -269,7 +277,13 @@ class MainWindow(QMainWindow):
 
     # Jobs ------------------------------------------------------------------------------
 
-    def start_job(self, text: str, finish, function, *values) -> None:
+    def start_job(
+        self,
+        text: str,
+        finish: Callable[[Any], object],
+        function: Callable[..., Any],
+        *values: object,
+    ) -> None:
         """Start a job beside the window; one that still runs is cancelled first."""
         if self.runner.busy:
             self.run_panel.show_cancelling()
@@ -327,18 +341,18 @@ class MainWindow(QMainWindow):
 
     # Qt --------------------------------------------------------------------------------
 
-    def dragEnterEvent(self, event) -> None:
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if any(url.isLocalFile() for url in event.mimeData().urls()):
             event.acceptProposedAction()
 
-    def dropEvent(self, event) -> None:
+    def dropEvent(self, event: QDropEvent) -> None:
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if paths:
             event.acceptProposedAction()
             # After the drop is over: a question now would hold the other program.
             QTimer.singleShot(0, lambda: self.files.open_path(paths[0]))
 
-    def closeEvent(self, event) -> None:
+    def closeEvent(self, event: QCloseEvent) -> None:
         if not self._closed:
             if self.files.saving:
                 self.say("The window closes when the mesh is saved")
@@ -363,7 +377,7 @@ class MainWindow(QMainWindow):
             self.left_behind = not self.running.close()
             if self.autosave is not None:
                 self.autosave.close()
-            self.docks_.panels["log"].detach()
+            self.docks_.panel(LogPanel).detach()
             self.cutting.close_views()
             self.viewing.close_views()
             self._kept.close()

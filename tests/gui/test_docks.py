@@ -42,7 +42,7 @@ def method(driver, sample_folder, qtbot):
 
 def seen_in(panel, widget):
     """Return the part of a widget that is seen in the scroll area of a panel."""
-    port = panel.scroll.viewport()
+    port = panel.area.viewport()
     place = QRect(widget.mapTo(port, QPoint(0, 0)), widget.size())
     return place.intersected(port.rect())
 
@@ -53,7 +53,7 @@ def is_whole(panel, widget):
 
 def controls(panel):
     """Return all that can be set in the panel, from the first to the last."""
-    inside = panel.scroll.widget()
+    inside = panel.area.widget()
     every = [w for w in inside.findChildren(QWidget) if isinstance(w, (Choice, NumberField))]
     every += [panel.steps, panel.reduction, panel.more.button]
     return [w for w in every if w.isVisibleTo(inside) and w.isEnabled()]
@@ -68,9 +68,9 @@ def run_is_seen(window):
 def test_every_setting_is_reached_with_the_tab_key_and_seen_whole(method, driver):
     window, wanted, found = driver.window, controls(method), set()
     assert {method.more.kernel, method.more.gamma, method.more.level_end} <= set(wanted)
-    assert method.scroll.verticalScrollBar().maximum() > 0, "not all have room at once"
+    assert method.area.verticalScrollBar().maximum() > 0, "not all have room at once"
     driver.activate()
-    method.scroll.verticalScrollBar().setValue(0)
+    method.area.verticalScrollBar().setValue(0)
     method.method.setFocus()
     for _ in range(2 * len(wanted)):
         at = QApplication.focusWidget()
@@ -94,12 +94,12 @@ def turn_wheel(widget, notches):
 
 
 def test_every_setting_is_reached_with_the_wheel_which_changes_none(method, driver):
-    case, bar = driver.session.case, method.scroll.verticalScrollBar()
+    case, bar = driver.session.case, method.area.verticalScrollBar()
     bar.setValue(0)
     found = set()
     for _ in range(60):
         found |= {w for w in controls(method) if is_whole(method, w)}
-        port = method.scroll.viewport()
+        port = method.area.viewport()
         # Over whatever control is in the middle.
         under = port.childAt(port.rect().center()) or port
         before = bar.value()
@@ -115,9 +115,9 @@ def test_every_setting_is_reached_with_the_wheel_which_changes_none(method, driv
 
 
 def test_no_setting_is_cut_off_at_the_side(method):
-    right = method.scroll.viewport().width()
+    right = method.area.viewport().width()
     for widget in controls(method):
-        edge = widget.mapTo(method.scroll.widget(), QPoint(widget.width(), 0)).x()
+        edge = widget.mapTo(method.area.widget(), QPoint(widget.width(), 0)).x()
         assert edge <= right, widget.objectName()
 
 

@@ -15,7 +15,9 @@ from slideviz.gui.dialogs.film import FilmDialog
 from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
+from slideviz.gui.widgets.services import Services
 from slideviz.session import changes, jobs_export
+from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")
 COPIED_WIDTH = 1600
@@ -25,13 +27,13 @@ COPIED_WIDTH = 1600
 class Exports(QObject):
     """The exports of a window."""
 
-    def __init__(self, window) -> None:
+    def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.window = window
         self.film: FilmDialog | None = None
 
     @property
-    def _session(self):
+    def _session(self) -> Session:
         return self.window.store.session
 
     def _renderer(self) -> OffscreenRenderer:
@@ -113,15 +115,15 @@ class Exports(QObject):
         dialog.show()
 
     def _ask_film(self, kind: str) -> Path | None:
-        files = self.window.files
+        files, parent = self.window.files, self.film or self.window
         stem = f"{files.stem()}_steps"
         if kind:
             filters = {".mp4": "MP4 film (*.mp4)", ".gif": "GIF film (*.gif)"}[kind]
             path = questions.ask_save(
-                self.film, "Export film", files.folder() / f"{stem}{kind}", filters
+                parent, "Export film", files.folder() / f"{stem}{kind}", filters
             )
             return path.with_suffix(kind) if path is not None else None
-        folder = questions.ask_folder(self.film, "Folder for the pictures", files.folder())
+        folder = questions.ask_folder(parent, "Folder for the pictures", files.folder())
         return new_folder(folder, stem.replace(".", "_")) if folder is not None else None
 
     def _film_closed(self) -> None:
@@ -151,12 +153,12 @@ class Exports(QObject):
     def steps(self) -> None:
         """Ask for a name and write the mesh of every step, with a number behind the name."""
         session, files = self._session, self.window.files
-        run = session.run_shown
-        if run is None or not run.frames or self.window.runner.busy:
+        run, mesh = session.run_shown, session.mesh
+        if run is None or mesh is None or not run.frames or self.window.runner.busy:
             return
         default = files.folder() / f"{files.stem()}_step.su2"
         title = f"Save {len(run.frames)} steps: each name gets a number, as in NAME_1.su2"
-        filters = questions.mesh_filters(session.mesh)
+        filters = questions.mesh_filters(mesh)
         path = questions.ask_numbered(self.window, title, default, filters)
         if path is None:
             return
@@ -184,7 +186,7 @@ class Exports(QObject):
         self.window.say(f"Saved {path}")
 
 
-def picture_filters(session) -> str:
+def picture_filters(session: Session) -> str:
     """Return the formats that a picture of a session can be saved in."""
     mesh = session.mesh
     if mesh is None or mesh.dim != 2 or len(mesh.cells) > MOST_CELLS:

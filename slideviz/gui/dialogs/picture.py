@@ -10,6 +10,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from qtpy.QtCore import QSize, Qt
+from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -82,7 +83,11 @@ class PictureDialog(QDialog):
     """
 
     def __init__(
-        self, parent: QWidget, renderer: OffscreenRenderer, view_size=(1280, 800), kept=""
+        self,
+        parent: QWidget,
+        renderer: OffscreenRenderer,
+        view_size: tuple[int, int] = (1280, 800),
+        kept: str = "",
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Export picture")
@@ -135,12 +140,12 @@ class PictureDialog(QDialog):
             box.setSuffix(" px")
             box.valueChanged.connect(self._pixels_typed)
         self.width_cm, self.height_cm = QDoubleSpinBox(), QDoubleSpinBox()
-        for box, value in zip((self.width_cm, self.height_cm), PAPER, strict=False):
-            box.setRange(1.0, 200.0)
-            box.setDecimals(1)
-            box.setSuffix(" cm")
-            box.setValue(value)
-            box.valueChanged.connect(self._changed)
+        for length, value in zip((self.width_cm, self.height_cm), PAPER, strict=False):
+            length.setRange(1.0, 200.0)
+            length.setDecimals(1)
+            length.setSuffix(" cm")
+            length.setValue(value)
+            length.valueChanged.connect(self._changed)
         self.dpi = QSpinBox()
         self.dpi.setRange(50, 1200)
         self.dpi.setValue(round(PAPER[2]))
@@ -192,13 +197,14 @@ class PictureDialog(QDialog):
     @property
     def figure(self) -> PictureOptions:
         """Return what was chosen."""
-        picked = {name: box.isChecked() for name, box in self.options.items()}
+        picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
             size = self.width_px.value(), self.height_px.value()
             return PictureOptions(size, background, **picked, letters=text * LETTERS)
         dpi = float(self.dpi.value())
-        size = tuple(round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
+        wide, high = (round(box.value() / 2.54 * dpi) for box in (self.width_cm, self.height_cm))
+        size = wide, high
         pixels = text * PAPER_POINTS / 72.0 * dpi
         letters = pixels / 13.0 / font_scale(size)
         return PictureOptions(size, background, **picked, letters=letters, dpi=dpi)
@@ -288,7 +294,7 @@ class PictureDialog(QDialog):
             copy_image(to_image(self.renderer.image(self.figure)))
         self.words.setText("Copied to the clipboard.")
 
-    def showEvent(self, event) -> None:
+    def showEvent(self, event: QShowEvent) -> None:
         """Draw the first preview; nothing is drawn that nobody sees."""
         super().showEvent(event)
         self._changed()

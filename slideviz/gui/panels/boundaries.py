@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from qtpy.QtCore import QItemSelectionModel, QPoint, Qt, Signal
-from qtpy.QtGui import QAction, QBrush, QContextMenuEvent
+from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -53,7 +54,7 @@ class BoundariesTable(QTableWidget):
         rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
         return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
 
-    def contextMenuEvent(self, event) -> None:
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
             row = self.chosen_row()
             where = self.visualRect(self.model().index(row, NAME)).center()
@@ -63,7 +64,7 @@ class BoundariesTable(QTableWidget):
         if row >= 0:
             self.menu_wanted.emit(row, self.viewport().mapToGlobal(where))
 
-    def keyPressEvent(self, event) -> None:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         key, alt = event.key(), event.modifiers() & Qt.KeyboardModifier.AltModifier
         plain = (Qt.Key.Key_F2, Qt.Key.Key_Return, Qt.Key.Key_Enter)
         row = self.chosen_row()
@@ -216,7 +217,7 @@ class BoundariesPanel(QWidget):
                     # Keys go on from here.
                     model.setCurrentIndex(index, QItemSelectionModel.SelectionFlag.NoUpdate)
                 model.select(index, flags)
-                self.table.scrollToItem(self.table.item(row, NAME))
+                self.table.scrollTo(index)
 
     # Widgets to state ------------------------------------------------------------------
 
@@ -275,6 +276,6 @@ def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMen
     return menu
 
 
-def _later(store: Store, function, *values):
+def _later(store: Store, function: Callable[..., Session], *values: object) -> Callable[..., None]:
     """Return a slot that makes this change, whatever Qt tells it."""
     return lambda *_: store.change(function, *values)

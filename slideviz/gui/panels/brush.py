@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from qtpy.QtCore import QRectF, Qt, Signal
-from qtpy.QtGui import QColor, QPainter, QPen
+from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
 
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.gui.widgets.plot_canvas import PlotCanvas
+from slideviz.gui.widgets.plot_image import Draw
 
 GRIP_PX = 6
 """A press so near to an end of the range moves that end."""
@@ -31,7 +34,7 @@ class BrushCanvas(PlotCanvas):
     brushed = Signal(object)
     held = Signal(bool)
 
-    def __init__(self, drawing) -> None:
+    def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
         self.band: Range | None = None
         self._held: float | None = None
@@ -53,7 +56,7 @@ class BrushCanvas(PlotCanvas):
             self.band = band
             self.update()
 
-    def mousePressEvent(self, event) -> None:
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
             return
         x = event.position().x()
@@ -65,7 +68,7 @@ class BrushCanvas(PlotCanvas):
                     self._held, self._moved = self.band[far], True
         self.held.emit(True)
 
-    def mouseMoveEvent(self, event) -> None:
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._held is None:
             self._show_grip(event.position().x())
             return
@@ -75,23 +78,23 @@ class BrushCanvas(PlotCanvas):
             self.show_band((min(self._held, here), max(self._held, here)))
             self.brushed.emit(self.band)
 
-    def mouseReleaseEvent(self, event) -> None:
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._held is not None:
             self._held = None
             if not self._moved:
                 self.brushed.emit(None)
             self.held.emit(False)
 
-    def mouseDoubleClickEvent(self, _event) -> None:
+    def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
         self.brushed.emit(None)
 
     def _show_grip(self, x: float) -> None:
-        near = bool(self.figure.axes) and self.band is not None
-        near = near and any(abs(x - self.pixel_of(value)) <= GRIP_PX for value in self.band)
+        ends = (self.band or ()) if self.figure.axes else ()
+        near = any(abs(x - self.pixel_of(value)) <= GRIP_PX for value in ends)
         shape = Qt.CursorShape.SizeHorCursor if near else Qt.CursorShape.CrossCursor
         self.setCursor(shape)
 
-    def paintEvent(self, event) -> None:
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if self.band is None or not self.figure.axes:
             return

@@ -4,13 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Literal
 
 import numpy as np
+from matplotlib.figure import Figure
 from qtpy.QtCore import Qt
+from qtpy.QtGui import QMouseEvent
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.plot_canvas import (
@@ -18,15 +22,16 @@ from slideviz.gui.widgets.plot_canvas import (
     PlotArea,
     PlotCanvas,
     ask_and_write,
-    folder_of,
     write_plot,
 )
 from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.tips import wrapped
+from slideviz.mesh.model import FloatArray
 from slideviz.plots import curves
 from slideviz.plots.draw import convergence, quality_by_step
 from slideviz.plots.spanwise import spanwise
-from slideviz.plots.style import add_legend
+from slideviz.plots.style import Style, add_legend
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
 from slideviz.session.state import Session
@@ -48,11 +53,11 @@ WHAT = {"minimum": "minimum", "mean": "mean"}
 class CurveCanvas(PlotCanvas):
     """A plot that tells the value of the horizontal axis where it is clicked."""
 
-    def __init__(self, drawing) -> None:
+    def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
-        self.picked = lambda _value: None
+        self.picked: Callable[[float], None] = lambda _: None
 
-    def mouseReleaseEvent(self, event) -> None:
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         left = event.button() == Qt.MouseButton.LeftButton
         if not left or self.wiped or not self.figure.axes:
             return
@@ -67,8 +72,8 @@ class CurvesPanel(QWidget):
         self.store = store
         self._profiles = curves.Profiles()
         self._mesh: object = None
-        self.area = PlotArea(self.drawing, CurveCanvas)
-        self.canvas: CurveCanvas = self.area.canvas
+        self.canvas = CurveCanvas(self.drawing)
+        self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 4, 4, 4)
@@ -80,7 +85,7 @@ class CurvesPanel(QWidget):
         self.sync(store.session)
 
     def _make_head(self) -> QHBoxLayout:
-        self.kind = Choice(dict(KINDS))
+        self.kind = Choice(KINDS)
         self.kind.setObjectName("curve_kind")
         for index, tip in enumerate(TIPS.values()):
             self.kind.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
@@ -100,7 +105,7 @@ class CurvesPanel(QWidget):
 
     def _make_span(self) -> QWidget:
         self.span_row = QWidget()
-        self.what = Choice(dict(WHAT))
+        self.what = Choice(WHAT)
         self.what.setToolTip("The lowest or the mean quality of each layer.")
         self.coordinate = Choice({})
         self.coordinate.setToolTip(
@@ -163,7 +168,7 @@ class CurvesPanel(QWidget):
             )
         return ""
 
-    def take_theme(self, look, _colour: str) -> None:
+    def take_theme(self, look: Look, _colour: str) -> None:
         """Take the colours of the theme."""
         self.canvas.set_look(look)
 
@@ -203,7 +208,7 @@ class CurvesPanel(QWidget):
         )
 
 
-def close_limits(values) -> tuple[float, float]:
+def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
     """Return the ends of an axis around qualities: round numbers, with room for the markers."""
     good = np.concatenate(list(values))
     low, high = rounded_out(float(np.nanmin(good)), float(np.nanmax(good)))
@@ -211,7 +216,7 @@ def close_limits(values) -> tuple[float, float]:
     return low - room, high + room
 
 
-def draw_steps(session: Session, whole: bool, figure, style) -> None:
+def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> None:
     """Draw minimum and mean quality of each run against the step."""
     axes, runs = figure.add_subplot(), curves.step_runs(session)
     quality_by_step(axes, runs, style)
@@ -223,9 +228,10 @@ def draw_steps(session: Session, whole: bool, figure, style) -> None:
     axes.set_xlim(-0.03 * last, 1.03 * last)
 
 
-def draw_greedy(session: Session, figure, style) -> None:
+def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
     """Draw how the error of the step that is shown fell."""
     axes, run = figure.add_subplot(), curves.greedy_run(session)
+    assert run is not None
     convergence(axes, [run], style=style)
     axes.set_title(run.label, fontsize=style.size, color=style.look.text)
 
@@ -233,10 +239,10 @@ def draw_greedy(session: Session, figure, style) -> None:
 def draw_span(
     profiles: curves.Profiles,
     session: Session,
-    along: tuple[str, str],
+    along: tuple[curves.Coordinate, Literal["minimum", "mean"]],
     whole: bool,
-    figure,
-    style,
+    figure: Figure,
+    style: Style,
 ) -> None:
     """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
     axes, (coordinate, what) = figure.add_subplot(), along

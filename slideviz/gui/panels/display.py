@@ -21,7 +21,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui.commands import COMMANDS, Now
 from slideviz.gui.panels.display_fields import Copies, Span, map_icon
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.plot_canvas import main_window
+from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.periodic import Pair
 from slideviz.scene.passages import Period
@@ -30,7 +30,7 @@ from slideviz.session.colors import usual_range
 from slideviz.session.passages import passages_around
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, labels
+from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
 
 TIPS = {
     "map": "The colours of values; all are told apart by colour-blind people.",
@@ -115,7 +115,7 @@ class DisplayPanel(QWidget):
         self.form.addRow(self.copies_label, self.copies)
         grid = QGridLayout()
         grid.setVerticalSpacing(3)
-        self.shown: dict[str, QCheckBox] = {}
+        self.shown: dict[Shown, QCheckBox] = {}
         for index, (name, term) in enumerate(SHOWN.items()):
             box = QCheckBox(term.label)
             box.setObjectName(f"show_{name}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QWidget
@@ -43,7 +45,7 @@ class Copies(NumberBox):
         digits = "".join(sign for sign in text if sign.isdigit())
         return min(int(digits), self.maximum()) if digits else 0
 
-    def validate(self, text: str, at: int) -> object:
+    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
         """Let anything be typed that a number can be read from."""
         good = any(sign.isdigit() for sign in text) or text.strip() == "all"
         state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
@@ -53,7 +55,7 @@ class Copies(NumberBox):
 class Span(QWidget):
     """Two numbers, the first below the second."""
 
-    def __init__(self, name: str, changed) -> None:
+    def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
         super().__init__()
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)

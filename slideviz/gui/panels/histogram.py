@@ -8,9 +8,10 @@ from functools import partial
 
 import numpy as np
 from qtpy.QtCore import Qt, QTimer
-from qtpy.QtGui import QKeySequence, QShortcut
+from qtpy.QtGui import QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
+from slideviz.color_scheme import Look
 from slideviz.gui.panels.brush import BrushCanvas, Range
 from slideviz.gui.responsiveness.settings import SELECTING_MS
 from slideviz.gui.responsiveness.timers import later
@@ -18,11 +19,11 @@ from slideviz.gui.widgets.plot_canvas import (
     PLOT_FILTERS,
     PlotArea,
     ask_and_write,
-    folder_of,
     is_seen,
     write_plot,
 )
 from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_histogram import (
     Counts,
@@ -45,8 +46,8 @@ class HistogramPanel(QWidget):
         self._counts = Counts()
         self._wanted: Range | None = None
         self._told: Frame | None = None
-        self.area = PlotArea(self.drawing, BrushCanvas)
-        self.canvas: BrushCanvas = self.area.canvas
+        self.canvas = BrushCanvas(self.drawing)
+        self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._brushed)
         self.canvas.held.connect(self._held)
         self.numbers = QLabel()
@@ -154,13 +155,13 @@ class HistogramPanel(QWidget):
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"
             )
 
-    def paintEvent(self, event) -> None:
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         # Behind another tab nothing was told.
         if self._told is None and self.store.session.frame is not None:
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
 
-    def take_theme(self, look, _colour: str) -> None:
+    def take_theme(self, look: Look, _colour: str) -> None:
         """Take the colours of the theme."""
         self.canvas.set_look(look)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel
 
 from slideviz.case.key import Form, Key
 from slideviz.case.keys import KEYS
@@ -42,7 +42,9 @@ def _number_box(kind: Kind) -> NumberBox:
     return field
 
 
-FIELDS: dict[Entry, tuple[Callable[[Kind], QWidget], str]] = {
+Field = Choice | Switch | NumberField | NumberBox | VectorField
+
+FIELDS: dict[Entry, tuple[Callable[[Kind], Field], str]] = {
     "choice": (_choice, "chosen"),
     "switch": (lambda _: Switch(), "clicked"),
     "real": (number_field, "changed"),
@@ -71,12 +73,12 @@ class KeyForm(QFormLayout):
 
     changed = Signal(object, object)
 
-    def __init__(self, place: Form, own: Mapping[str, QWidget] | None = None) -> None:
+    def __init__(self, place: Form, own: Mapping[str, Field] | None = None) -> None:
         super().__init__()
         self.setVerticalSpacing(4)
         self.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        self.fields: dict[str, QWidget] = {}
-        self._rows: list[tuple[Key, QWidget]] = []
+        self.fields: dict[str, Field] = {}
+        self._rows: list[tuple[Key, Field]] = []
         self._own = own or {}
         for key in sorted(KEYS.values(), key=lambda key: key.rank):
             if key.form == place:
@@ -110,7 +112,7 @@ class KeyForm(QFormLayout):
             _set_tip(field, f"Not available: {why_not}." if why_not else tip)
 
 
-def _set_tip(field: QWidget, text: str) -> None:
+def _set_tip(field: Field, text: str) -> None:
     """Explain a field and its parts."""
     if hasattr(field, "set_tip"):
         field.set_tip(text)

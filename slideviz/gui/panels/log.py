@@ -7,7 +7,7 @@ import logging
 
 from qtpy.QtCore import QObject, Qt, Signal
 from qtpy.QtGui import QFontDatabase
-from qtpy.QtWidgets import QPlainTextEdit
+from qtpy.QtWidgets import QPlainTextEdit, QWidget
 
 LOGGERS = ("slideviz", "py.warnings")
 """Whose lines are shown: ours, those of Qt and VTK below it, and Python's warnings."""
@@ -46,7 +46,7 @@ class LogHandler(logging.Handler):
 class LogPanel(QPlainTextEdit):
     """Shows the newest lines of the log."""
 
-    def __init__(self, parent=None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setReadOnly(True)
         self.setMaximumBlockCount(2000)

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
+from typing import Any, cast
 
 from qtpy.QtCore import QPoint, QRect, Qt, QTimer
 from qtpy.QtWidgets import (
+    QFormLayout,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -21,6 +24,8 @@ from slideviz.case.model import Case, Reduction
 from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.panels.method_more import MoreSettings
 from slideviz.gui.widgets.field_watch import FieldWatch
+from slideviz.gui.widgets.fields import NumberField
+from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motions import found_text
 from slideviz.session.run_messages import Requirement
@@ -37,7 +42,7 @@ class MethodPanel(QWidget):
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.store = store
-        self._mesh = None
+        self._mesh: Mesh | None = None
         self._extent = 0.0
         self._reduction: Reduction | None = None
         layout = self._make_scroll()
@@ -60,13 +65,13 @@ class MethodPanel(QWidget):
     def _make_scroll(self) -> QVBoxLayout:
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
-        self.scroll = WholeScroll()
-        self.scroll.setWidgetResizable(True)
-        self.scroll.setFrameShape(QFrame.Shape.NoFrame)
-        self.scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        outside.addWidget(self.scroll)
+        self.area = WholeScroll()
+        self.area.setWidgetResizable(True)
+        self.area.setFrameShape(QFrame.Shape.NoFrame)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        outside.addWidget(self.area)
         inside = QWidget()
-        self.scroll.setWidget(inside)
+        self.area.setWidget(inside)
         layout = QVBoxLayout(inside)
         layout.setContentsMargins(6, 6, 6, 4)
         return layout
@@ -75,9 +80,10 @@ class MethodPanel(QWidget):
         """Say in the form what belongs to its fields."""
         form, fields = self.form, self.form.fields
         fields["reduction"].setText("Use fewer control nodes")
-        row, _ = form.getWidgetPosition(fields["origin"])
+        row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.found)
-        both, (row, role) = QWidget(), form.getWidgetPosition(fields["tolerance"])
+        both = QWidget()
+        row, role = _position(form, fields["tolerance"])
         form.removeWidget(fields["tolerance"])
         line = QHBoxLayout(both)
         line.setContentsMargins(0, 0, 0, 0)
@@ -96,8 +102,8 @@ class MethodPanel(QWidget):
 
     def _show_more(self) -> None:
         """Scroll to the settings that have opened below the others."""
-        self.scroll.widget().adjustSize()
-        bar = self.scroll.verticalScrollBar()
+        self.area.widget().adjustSize()
+        bar = self.area.verticalScrollBar()
         bar.setValue(min(self.more.y(), bar.maximum()))
 
     def lead_to(self, _missing: Requirement) -> None:
@@ -109,7 +115,10 @@ class MethodPanel(QWidget):
 
     def _set(self, key: Key, value: object) -> None:
         """Change the case by the value of a key, and by what the window means with it."""
-        own = {"DATA_REDUCTION": self._reduce, "DATA_RED_TOLERANCE": self._tolerate}
+        own: dict[str, Callable[[Case, Any], Case]] = {
+            "DATA_REDUCTION": self._reduce,
+            "DATA_RED_TOLERANCE": self._tolerate,
+        }
         case = self.store.session.case
         new = own.get(key.name, key.put)(case, value)
         values = {field.name: getattr(new, field.name) for field in fields(Case)}
@@ -158,7 +167,9 @@ class MethodPanel(QWidget):
     def _sync_hints(self, session: Session) -> None:
         """Say what is found, guessed and not available."""
         case, extent = session.case, self._extent
-        part = f"{self.form.fields['tolerance'].value / extent:.3g} of the extent" if extent else ""
+        tolerance = self.form.fields["tolerance"]
+        assert isinstance(tolerance, NumberField)
+        part = f"{tolerance.value / extent:.3g} of the extent" if extent else ""
         self.tolerance_hint.setText(part if case.reduction is not None else "")
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
         told = "\n".join(f"{title}: {why}." for title, why in reasons if why)
@@ -170,6 +181,10 @@ class MethodPanel(QWidget):
         ):
             label.setText(text)
             self.form.setRowVisible(label, bool(text))
+
+
+def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemRole]:
+    return cast("tuple[int, QFormLayout.ItemRole]", form.getWidgetPosition(field))
 
 
 def _hint() -> QLabel:
@@ -189,9 +204,10 @@ class WholeScroll(QScrollArea):
 
     def focusNextPrevChild(self, forwards: bool) -> bool:
         moved = super().focusNextPrevChild(forwards)
-        field = self.widget().focusWidget()
-        if moved and field is not None:
-            place = QRect(field.mapTo(self.widget(), QPoint(0, 0)), field.size())
+        inside = self.widget()
+        field = inside.focusWidget() if inside is not None else None
+        if moved and inside is not None and field is not None:
+            place = QRect(field.mapTo(inside, QPoint(0, 0)), field.size())
             for y in (place.bottom(), place.top()):
                 self.ensureVisible(place.left(), y, 0, 6)
         return moved

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QWidget
@@ -131,13 +132,15 @@ class MotionEditor(MotionForm):
     def _about_words(self, what: str) -> str:
         if what in ("centroid", "radial") and len(named(self._motion.marker)) != 1:
             return ABOUT[what].replace("its", "their")
-        if what != "axis" or self._dim == 2:
+        if what != "axis" or self._dim == 2 or self._machine is None:
             return ABOUT[what]
         axis, _ = self._machine
         return f"{ABOUT[what]} ({direction_words(axis)})"
 
-    def _is_machine(self, motion: Rotate | Radial) -> bool:
+    def _is_machine(self, motion: Rotate | Scale | Radial) -> bool:
         """Tell whether a motion is about the machine's axis."""
+        if self._machine is None or isinstance(motion, Scale):
+            return False
         axis, origin = self._machine
         return motion.axis == axis and motion.point == origin[: self._dim]
 
@@ -156,17 +159,20 @@ class MotionEditor(MotionForm):
             self.changed.emit(new_motion(kind, self._motion.marker, self._dim, self._machine))
 
     def _about_chosen(self, what: str) -> None:
-        motion, across = self._motion, self._radial(self._motion)
+        motion = self._motion
+        assert motion is not None
+        across = self._radial(motion)
+        radially = across is not None and getattr(motion, "axis", None) == across
         self._as_point = what == "point"
         if what == "point" and getattr(motion, "point", None) == "centroid":
             self.point.show_value(self._centroid(motion.marker))
-        elif what == "axis":
+        elif what == "axis" and self._machine is not None:
             axis, origin = self._machine
             self.axis.show_value(axis)
             self.point.show_value(origin)
-        elif what == "radial":
+        elif what == "radial" and across is not None:
             self.axis.show_value(across)
-        elif what == "centroid" and across is not None and motion.axis == across:
+        elif what == "centroid" and radially and self._machine is not None:
             self.axis.show_value(self._machine[0])
         self._tell()
         # What is about the axis already is the same motion: only the fields differ.
@@ -203,17 +209,18 @@ class MotionEditor(MotionForm):
 
     def _tell(self) -> None:
         marker, kind = self._targets[self.marker.currentData()], type(self._motion)
-        axis = self.axis.value if self._dim == 3 else Z
+        x, y, z = self.axis.value if self._dim == 3 else Z
         if self.axis.problem:
-            axis = getattr(self._motion, "axis", Z)
-        about = self.about.currentData()
-        point = "centroid" if about in ("centroid", "radial") else self.point.value
+            x, y, z = getattr(self._motion, "axis", Z)
+        axis, point = (x, y, z), self.point.value
+        centred = self.about.currentData() in ("centroid", "radial")
+        about: tuple[float, ...] | Literal["centroid"] = "centroid" if centred else point
         if kind is Translate:
             motion: Motion = Translate(marker, self.vector.value)
         elif kind is Rotate:
-            motion = Rotate(marker, self.angle.value, point, axis)
+            motion = Rotate(marker, self.angle.value, about, axis)
         elif kind is Scale:
-            motion = Scale(marker, self.factors.value, point)
+            motion = Scale(marker, self.factors.value, about)
         elif kind is Radial:
             factor = round(1.0 + self.percent.value / 100.0, 14)
             motion = Radial(marker, factor, self.distance.value, axis, point)

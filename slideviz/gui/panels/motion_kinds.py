@@ -26,8 +26,7 @@ def new_motion(kind: type, marker: Target, dim: int, machine: Axis | None = None
     if kind is Translate:
         return Translate(marker, (0.0,) * dim)
     if kind is Rotate:
-        about = "centroid" if machine is None else origin[:dim]
-        return Rotate(marker, 0.0, about, axis)
+        return Rotate(marker, 0.0, "centroid" if machine is None else origin[:dim], axis)
     if kind is Radial:
         return Radial(marker, 1.0, 0.0, axis, origin[:dim])
     if kind is Scale:

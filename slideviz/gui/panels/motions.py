@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +33,7 @@ from slideviz.gui.panels.motion_kinds import KINDS, new_motion
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.plot_canvas import folder_of, main_window
+from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
@@ -128,7 +129,7 @@ class MotionPanel(QWidget):
             self.menu_actions[name] = act
             self.list.addAction(act)
 
-    def _button(self, name: str, tip: str, function) -> QToolButton:
+    def _button(self, name: str, tip: str, function: Callable[[], object]) -> QToolButton:
         button = QToolButton()
         button.setObjectName(f"motion_{name}")
         button.setIcon(icon(name))
@@ -180,6 +181,7 @@ class MotionPanel(QWidget):
     def _centroid(self, target: Target) -> tuple[float, ...]:
         """Return the centroid of what a motion moves."""
         moving = self.store.session.case.markers_with("moving")
+        assert self._mesh is not None
         return centroid(self._mesh, named(target) or moving)
 
     def _sync_editor(self, session: Session) -> None:
@@ -281,6 +283,7 @@ class MotionPanel(QWidget):
         """Let the rows of the displacement file of a motion be typed."""
         row = self.list.currentRow()
         motion = self.store.session.case.motions[row]
+        assert isinstance(motion, FromFile)
         path = self._ask_table(motion.marker, motion.path)
         if path is None:
             return
@@ -290,12 +293,14 @@ class MotionPanel(QWidget):
         self.store.change(changes.replace_motion, row, FromFile(path, motion.marker))
 
     def _ask_table(self, marker: Target, path: Path) -> Path | None:
-        case, mesh_file = self.store.session.case, self.store.session.path
-        beside = case.source or mesh_file
+        session = self.store.session
+        case, mesh = session.case, session.mesh
+        assert mesh is not None
+        beside = case.source or session.path
         folder = beside.parent if beside is not None else folder_of(self)
         default = folder / f"displacement_{'_'.join(named(marker)) or 'all'}.txt"
         try:
-            rows = Rows.on(self.store.session.mesh, case, marker)
+            rows = Rows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
         except SlidevizError as error:
             main_window(self).banner.tell_error(error)

@@ -18,12 +18,12 @@ from slideviz.color_scheme import Look
 from slideviz.gui.commands import COMMANDS, Command
 from slideviz.gui.widgets.bar import QuietBar
 from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.plot_canvas import main_window
+from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.changes import run_requirements
 from slideviz.session.jobs import Doing
-from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
+from slideviz.session.run_messages import Requirement, ended, exact_cost, help_for, inverted_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
@@ -47,7 +47,7 @@ class RunPanel(QWidget):
         super().__init__(parent)
         self.store = store
         self._busy = ""
-        self._missing = ()
+        self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
         layout = QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 6, 6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, Qt
 from qtpy.QtGui import QIcon
 from qtpy.QtWidgets import QLabel, QMenu, QTreeWidgetItem, QVBoxLayout, QWidget
 
@@ -111,9 +111,12 @@ class RunsPanel(QWidget):
             tree.addTopLevelItem(item)
         champions = best(runs)
         for place, run in enumerate(runs):
-            self._sync_row(tree.topLevelItem(place), run, session, run.number in champions)
+            row = tree.topLevelItem(place)
+            assert row is not None
+            self._sync_row(row, run, session, run.number in champions)
         shown = next((place for place, run in enumerate(runs) if run.number == session.shown), None)
-        tree.setCurrentItem(tree.topLevelItem(shown) if shown is not None else None)
+        index = tree.model().index(-1 if shown is None else shown, 0)
+        tree.setCurrentIndex(index)
 
     def _sync_row(self, item: QTreeWidgetItem, run: Run, session: Session, champion: bool) -> None:
         last = run.last
@@ -160,7 +163,7 @@ class RunsPanel(QWidget):
         self.store.change(changes.show_beside, None if beside == number else number)
         self.store.change(changes.show_frame, frame)
 
-    def _menu_wanted(self, where) -> None:
+    def _menu_wanted(self, where: QPoint) -> None:
         item = self.tree.itemAt(where)
         if item is None:
             return

@@ -98,6 +98,7 @@ class RunActions:
         session, menu = self.store.session, QMenu(self.panel)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)
+        assert run is not None
         # A click with the right button chooses no row: which one is meant, the menu says.
         menu.addAction(f"Run {number}: {run_words(run)}").setEnabled(False)
         menu.addSeparator()

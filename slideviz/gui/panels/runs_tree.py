@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from qtpy.QtCore import QSize, Qt, Signal
-from qtpy.QtGui import QPalette
+from qtpy.QtCore import QAbstractItemModel, QSize, Qt, Signal
+from qtpy.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPalette
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -16,8 +16,10 @@ from qtpy.QtWidgets import (
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTreeWidget,
+    QWidget,
 )
 
+from slideviz.gui.widgets.elided import ModelIndex
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session.state import Session
 
@@ -45,13 +47,13 @@ class _FirstLine(QStyledItemDelegate):
 
     renamed = Signal(int, str)
 
-    def sizeHint(self, option, index) -> QSize:
+    def sizeHint(self, option: QStyleOptionViewItem, index: ModelIndex) -> QSize:
         item = QStyleOptionViewItem(option)
         self.initStyleOption(item, index)  # the best is bold, thus wider
         width = item.fontMetrics.horizontalAdvance(item.text) + 2 * PAD + 4
         return QSize(width, 2 * option.fontMetrics.height() + 2 * PAD)
 
-    def paint(self, painter, option, index) -> None:
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: ModelIndex) -> None:
         item = QStyleOptionViewItem(option)
         self.initStyleOption(item, index)
         element = QStyle.PrimitiveElement.PE_PanelItemViewItem
@@ -69,27 +71,33 @@ class _FirstLine(QStyledItemDelegate):
         painter.drawText(rect, item.displayAlignment, shown)
         painter.restore()
 
-    def createEditor(self, parent, _option, index) -> QLineEdit | None:
+    def createEditor(  # type: ignore[override]  # Qt takes None, too
+        self, parent: QWidget, _option: QStyleOptionViewItem, index: ModelIndex
+    ) -> QLineEdit | None:
         if index.column() != RUN:
             return None
         editor = QLineEdit(parent)
         editor.setPlaceholderText(f"Name of run {index.data(NUMBER)}")
         return editor
 
-    def setEditorData(self, editor, index) -> None:
+    def setEditorData(self, editor: QWidget, index: ModelIndex) -> None:
+        assert isinstance(editor, QLineEdit)
         # The row changes while its run goes on; what is being typed stays.
         if not editor.isModified():
             editor.setText(index.data(NAME))
 
-    def setModelData(self, editor, _model, index) -> None:
+    def setModelData(self, editor: QWidget, _model: QAbstractItemModel, index: ModelIndex) -> None:
+        assert isinstance(editor, QLineEdit)
         self.renamed.emit(index.data(NUMBER), editor.text())
 
-    def updateEditorGeometry(self, editor, option, _index) -> None:
+    def updateEditorGeometry(
+        self, editor: QWidget, option: QStyleOptionViewItem, _index: ModelIndex
+    ) -> None:
         width = editor.parentWidget().width() - option.rect.left()
         editor.setGeometry(option.rect.left(), option.rect.top(), width, option.rect.height())
 
 
-def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole):
+def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
     """Return the colour of letters in a row, chosen or not."""
     chosen = bool(option.state & QStyle.StateFlag.State_Selected)
     active = bool(option.state & QStyle.StateFlag.State_Active)
@@ -152,16 +160,16 @@ class RunTree(QTreeWidget):
         number = self.number if number is None else number
         for place in range(self.topLevelItemCount()):
             item = self.topLevelItem(place)
-            if item.data(RUN, NUMBER) == number:
+            if item is not None and item.data(RUN, NUMBER) == number:
                 self.editItem(item, RUN)
 
-    def keyPressEvent(self, event) -> None:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_F2:
             self.edit_name()
             return
         super().keyPressEvent(event)
 
-    def mousePressEvent(self, event) -> None:
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.RightButton:
             event.accept()  # the menu is about the run below the mouse; another may stay shown
             return
@@ -177,25 +185,25 @@ class RunTree(QTreeWidget):
         self.seen_before = now.shown, now.view.frame, now.view.beside
         super().mousePressEvent(event)
 
-    def mouseMoveEvent(self, event) -> None:
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         # A drag with Ctrl or the right button chooses nothing.
         if event.buttons() == Qt.MouseButton.LeftButton and not event.modifiers():
             super().mouseMoveEvent(event)
 
-    def mouseReleaseEvent(self, event) -> None:
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
             super().mouseReleaseEvent(event)
 
-    def mouseDoubleClickEvent(self, event) -> None:
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
             super().mouseDoubleClickEvent(event)
 
-    def dataChanged(self, first, last, roles=()) -> None:
+    def dataChanged(self, first: ModelIndex, last: ModelIndex, roles: Sequence[int] = ()) -> None:
         super().dataChanged(first, last, roles)
         # The line below spans all columns; Qt draws only the one that has changed.
         self.viewport().update()
 
-    def drawRow(self, painter, option, index) -> None:
+    def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: ModelIndex) -> None:
         super().drawRow(painter, option, index)
         rect = self.visualRect(index.siblingAtColumn(RUN))
         height = option.fontMetrics.height()

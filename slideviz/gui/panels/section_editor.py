@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
+from qtpy.QtGui import QStandardItemModel
 from qtpy.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QSlider, QWidget
 
 from slideviz.errors import CaseError
@@ -139,8 +140,9 @@ class SectionEditor(QWidget):
     def _sync_axes(self, flat: bool) -> None:
         """Offer the axes there are."""
         at = self.axis.findData("z")
-        item = self.axis.model().item(at)
-        item.setEnabled(not flat)
+        model = self.axis.model()
+        assert isinstance(model, QStandardItemModel)
+        model.item(at).setEnabled(not flat)
 
     def _sync_place(self, section: Section) -> None:
         """Show position or size; the range is looked for again only where it may differ."""
@@ -177,7 +179,8 @@ class SectionEditor(QWidget):
             self._offer(section_start.turned(self._section, AXES[word], self._points))
 
     def _direction_typed(self, values: tuple[float, ...]) -> None:
-        direction = (*values, 0.0, 0.0)[:3]
+        x, y, z = (*values, 0.0, 0.0)[:3]
+        direction = x, y, z
         if any(direction) and self._section is not None and self._points is not None:
             self._typing = True
             try:

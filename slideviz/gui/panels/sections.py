@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QKeySequence, QShortcut
 from qtpy.QtWidgets import (
+    QAbstractButton,
     QCheckBox,
     QHBoxLayout,
     QLabel,
@@ -23,11 +24,13 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
+from slideviz.color_scheme import Look
 from slideviz.export.section_job import Paper, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.scene.passages import Period
 from slideviz.sections.model import Section
@@ -71,7 +74,7 @@ class SectionsPanel(QWidget):
         self.cutting, self.store = cutting, cutting.store
         self._period = Period()
         self._size = 8.5, 12.0  # cm
-        self._icons: list[tuple[Any, str]] = []
+        self._icons: list[tuple[QAbstractButton, str]] = []
         self._listed: tuple[object, ...] = ()
         self._make_list()
         self._make_rest()
@@ -143,7 +146,7 @@ class SectionsPanel(QWidget):
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         column.addWidget(self.rest)
 
-    def take_theme(self, look, colour: str) -> None:
+    def take_theme(self, look: Look, colour: str) -> None:
         """Take other colours."""
         for button, name in self._icons:
             button.setIcon(icon(name, colour))
@@ -231,8 +234,8 @@ class SectionsPanel(QWidget):
         self.store.change(changes.show_handle, shown)
 
     def _want_picture(self, paper: Paper) -> None:
-        parts = {"title": self.titled.isChecked(), "axes": self.with_axes.isChecked()}
-        self.picture_wanted.emit(replace(paper, **parts))
+        title, axes = self.titled.isChecked(), self.with_axes.isChecked()
+        self.picture_wanted.emit(replace(paper, title=title, axes=axes))
 
     def _want_other_size(self) -> None:
         size = questions.ask_paper(self, *self._size)
@@ -262,14 +265,14 @@ class SectionsPanel(QWidget):
             self.store.change(changes.choose_section, row)
 
 
-def sections_panel(window: Any) -> SectionsPanel:
+def sections_panel(window: Services) -> SectionsPanel:
     """Return the panel of a window."""
     panel = SectionsPanel(window.cutting)
     panel.picture_wanted.connect(lambda paper: save_picture(window, paper))
     return panel
 
 
-def save_picture(window: Any, paper: Paper) -> None:
+def save_picture(window: Services, paper: Paper) -> None:
     """Ask for a name and write a picture of the section that is chosen, as it is shown."""
     session, section = window.store.session, window.store.session.view.section
     if section is None or session.frame is None or window.runner.busy:

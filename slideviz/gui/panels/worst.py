@@ -9,7 +9,7 @@ from collections.abc import Callable
 from html import escape
 
 from qtpy.QtCore import QModelIndex, Qt, QTimer
-from qtpy.QtGui import QGuiApplication, QKeySequence, QShortcut
+from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -22,7 +22,8 @@ from qtpy.QtWidgets import (
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
 from slideviz.gui.responsiveness.settings import REST_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.widgets.plot_canvas import ask_and_write, folder_of, is_seen, words_label
+from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
+from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session import changes
@@ -163,14 +164,14 @@ class WorstPanel(QWidget):
                 self.table.clearSelection()
                 self.table.setCurrentIndex(QModelIndex())
         self._marked = cell
-        there = cell is not None and session.frame is not None
-        there = there and 0 <= cell < len(session.frame.mesh.cells)
-        self.info.setVisible(bool(there))
-        if there:
+        frame = session.frame
+        cell = cell if frame and cell is not None and 0 <= cell < len(frame.mesh.cells) else None
+        self.info.setVisible(cell is not None)
+        if cell is not None:
             self.info.setText(info_text(session, cell))
             self.info.setToolTip(info_text(session, cell, every=True))
 
-    def paintEvent(self, event) -> None:
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         session = self.store.session
         # Behind another tab nothing was listed.
@@ -228,6 +229,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
 
     ``every`` tells every corner.
     """
+    assert session.frame is not None
     info = cell_info(session.frame, cell)
     red = f" style='color:{alarm()}'" if info.state == "inverted" else ""
     state = "" if info.state == "valid" else f", <span{red}>{info.state}</span>"

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import numpy as np
-from qtpy.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
-from qtpy.QtGui import QBrush, QColor
+from qtpy.QtCore import QAbstractTableModel, Qt, Signal
+from qtpy.QtGui import QBrush, QColor, QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from slideviz.gui.widgets.elided import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session.inspect import WorstCells
@@ -82,10 +83,10 @@ class WorstModel(QAbstractTableModel):
         found = np.flatnonzero(self.worst.cells[self.order] == cell)
         return int(found[0]) if len(found) else -1
 
-    def rowCount(self, parent: QModelIndex | None = None) -> int:
+    def rowCount(self, parent: ModelIndex | None = None) -> int:
         return len(self.order) if parent is None or not parent.isValid() else 0
 
-    def columnCount(self, _parent: QModelIndex | None = None) -> int:
+    def columnCount(self, _parent: ModelIndex | None = None) -> int:
         return len(self.headers)
 
     @property
@@ -98,7 +99,9 @@ class WorstModel(QAbstractTableModel):
             return _MIDDLE
         return _LEFT if self.headers[column] == LAST else _RIGHT
 
-    def headerData(self, section, orientation, role=Qt.ItemDataRole.DisplayRole):
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> object:
         if orientation != Qt.Orientation.Horizontal:
             return None
         if role == Qt.ItemDataRole.ToolTipRole:
@@ -111,7 +114,7 @@ class WorstModel(QAbstractTableModel):
         # Qt draws the sign of the order right behind the letters.
         return self.headers[section] + (GAP if section == QUALITY == self._by else "")
 
-    def data(self, index, role=Qt.ItemDataRole.DisplayRole):
+    def data(self, index: ModelIndex, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         at = self.order[index.row()]
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(at, index.column())
@@ -137,7 +140,7 @@ class WorstModel(QAbstractTableModel):
         # Without a sign before zeros.
         return f"{round(value, digits) + 0.0:.{digits}f}" if digits < 8 else f"{value:.3g}"
 
-    def sort(self, column: int, order=Qt.SortOrder.AscendingOrder) -> None:
+    def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         self._by, self._down = column, order == Qt.SortOrder.DescendingOrder
         self.beginResetModel()
         self._arrange()
@@ -200,12 +203,14 @@ class WorstTable(QTableView):
 
     def _share(self) -> None:
         """Give every column what its numbers need, when there are others than before."""
-        if self.model().rowCount() and self.model().headers != self._shared:
-            self._shared = self.model().headers
-            metrics, rows = self.fontMetrics(), range(self.model().rowCount())
+        model = self.model()
+        assert isinstance(model, WorstModel)
+        if model.rowCount() and model.headers != self._shared:
+            self._shared = model.headers
+            metrics, rows = self.fontMetrics(), range(model.rowCount())
             self._needed = []
             for column, words in enumerate(self._shared):
-                texts = [self.model().index(row, column).data() for row in rows]
+                texts = [model.index(row, column).data() for row in rows]
                 room = max(metrics.horizontalAdvance(text) for text in (*texts, *words.split()))
                 # What Qt would take is more than there is.
                 self._needed.append(room + 8 + (ARROW if column == QUALITY else 0))
@@ -223,11 +228,11 @@ class WorstTable(QTableView):
         for column, width in enumerate(self._given):
             self.setColumnWidth(column, width)
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._spread()
 
-    def keyPressEvent(self, event) -> None:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         before = self.currentIndex().row()
         super().keyPressEvent(event)
         row = self.currentIndex().row()

@@ -47,7 +47,7 @@ class RepaintCoalescer(QObject):
         self._let_go()
 
     def _let_go(self) -> None:
-        if self._held:
+        if self._held and self._window is not None:
             self._held = False
             QCoreApplication.postEvent(self._window, QEvent(QEvent.Type.UpdateRequest))
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from qtpy.QtCore import Qt, Signal
+from qtpy.QtGui import QResizeEvent, QShowEvent
 from qtpy.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton
 
 from slideviz.gui.viewport.canvas import View3D
@@ -81,11 +82,11 @@ class TitleBar(QFrame):
         self.label.setText(metrics.elidedText(self._text, Qt.TextElideMode.ElideRight, room))
         self.setToolTip(f"{self._text}\nClick to show something else here")
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
-    def showEvent(self, event) -> None:
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._fit()
 
@@ -108,8 +109,8 @@ class CameraLink:
             tag = camera.AddObserver("ModifiedEvent", self._follow(leader, follower, view))
             self._tags.append((camera, tag))
 
-    def _follow(self, leader: Scene, follower: Scene, view: View3D):
-        def follow(*_) -> None:
+    def _follow(self, leader: Scene, follower: Scene, view: View3D) -> Callable[..., None]:
+        def follow(*_: object) -> None:
             # Drawing sets near and far planes, which is no movement: without the second
             # condition the views would make each other draw for ever.
             if self._following or leader.camera.looks_like(follower.camera):

@@ -11,7 +11,8 @@ import numpy as np
 import pyvista as pv
 from pyvistaqt import QtInteractor
 from qtpy.QtCore import QObject, QPoint, Qt, QTimer, Signal
-from qtpy.QtWidgets import QApplication
+from qtpy.QtGui import QContextMenuEvent, QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
+from qtpy.QtWidgets import QApplication, QWidget
 from vtkmodules.vtkRenderingCore import vtkProp
 
 from slideviz.gui.responsiveness.repaint import RepaintCoalescer
@@ -45,7 +46,7 @@ class ViewSignals(QObject):
 class View3D(QtInteractor):
     """pyvistaqt's widget, painted only when something changed."""
 
-    def __init__(self, parent=None, multi_samples: int = 4) -> None:
+    def __init__(self, parent: QWidget | None = None, multi_samples: int = 4) -> None:
         super().__init__(parent, auto_update=False, multi_samples=multi_samples)
         # The window takes the dropped files: this widget would read them in its own way.
         self.setAcceptDrops(False)
@@ -56,7 +57,7 @@ class View3D(QtInteractor):
         self._veiled: list[list[vtkProp]] = []
         self._resizing = False
 
-    def render(self) -> None:
+    def render(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
         """Schedule one repaint; pyvista calls this everywhere."""
         if hasattr(self, "_one_paint") and not self._closed:
             self._rendered = True
@@ -98,7 +99,7 @@ class View3D(QtInteractor):
         if self._veiled:
             QTimer.singleShot(0, self._unveil_next)
 
-    def close(self) -> None:
+    def close(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
         """Give the graphics back; nothing is painted any more."""
         # Its parent may be gone already, and have closed it.
         with contextlib.suppress(RuntimeError):
@@ -112,7 +113,7 @@ class View3D(QtInteractor):
         """Return what the view shows now, (height, width, 3)."""
         while self._veiled:
             self._unveil_next()
-        self._render()
+        self._render()  # type: ignore[call-arg]  # pyvistaqt's decorator hides it
         return np.asarray(self.screenshot(return_img=True))
 
     def spare_software(self) -> None:
@@ -135,21 +136,21 @@ class View3D(QtInteractor):
         self.enable_custom_trackball_style(left="pan" if flat else "rotate", shift_left="pan")
 
     # Keys belong to the window's actions, not to VTK's w, s, r, f, p, j, t and 3.
-    def keyPressEvent(self, event) -> None:
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         event.ignore()
 
-    def keyReleaseEvent(self, event) -> None:
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
         event.ignore()
 
     # A click is a press and a release at one place; a drag turns the view and picks nothing.
-    def mousePressEvent(self, event) -> None:
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self._pressed = event.position().toPoint()
         if event.button() == Qt.MouseButton.RightButton:
             event.accept()
             return
         super().mousePressEvent(event)
 
-    def mouseReleaseEvent(self, event) -> None:
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         where = event.position().toPoint()
         pressed, self._pressed = self._pressed, None
         still = pressed is not None and (
@@ -163,16 +164,16 @@ class View3D(QtInteractor):
         if still and event.button() == Qt.MouseButton.LeftButton:
             self.told.clicked.emit(where, event.modifiers())
 
-    def contextMenuEvent(self, event) -> None:
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         event.accept()
 
-    def wheelEvent(self, event) -> None:
+    def wheelEvent(self, event: QWheelEvent) -> None:
         steps = event.angleDelta().y() / 120.0
         if steps:
             self.told.zoomed.emit(event.position().toPoint(), 1.2**steps)
         event.accept()
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         # Qt paints at once, and again when the widgets around have their places: on the way there
         # a view has several sizes that nobody sees.
         self._resizing = True

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QSplitter
+from qtpy.QtWidgets import QSplitter, QWidget
 
+from slideviz.color_scheme import Look
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.flats import FRAME_PX, Flats, beside
 from slideviz.gui.viewport.handles import Handles
+from slideviz.gui.viewport.section_curve import CurveView
+from slideviz.gui.viewport.unrolled import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.mesh.model import Mesh
 from slideviz.scene.cylinder_handle import points_near
@@ -39,7 +42,7 @@ class Cutting(QSplitter):
         Their colours.
     """
 
-    def __init__(self, viewing: Viewing, multi_samples: int, parent=None) -> None:
+    def __init__(self, viewing: Viewing, multi_samples: int, parent: QWidget | None = None) -> None:
         super().__init__(Qt.Orientation.Vertical, parent)
         self.setChildrenCollapsible(False)
         self.viewing, self.store = viewing, viewing.store
@@ -52,7 +55,11 @@ class Cutting(QSplitter):
         self.look = viewing.scene.look
         self.store.listen(self._session_changed)
         viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
-        viewing.second_leaves.connect(lambda: self.handles.drop(viewing.second))
+        viewing.second_leaves.connect(self._second_leaves)
+
+    def _second_leaves(self) -> None:
+        assert self.viewing.second is not None
+        self.handles.drop(self.viewing.second)
 
     # What is wanted --------------------------------------------------------------------
 
@@ -62,7 +69,7 @@ class Cutting(QSplitter):
         return self.store.session.view.section
 
     @property
-    def flat(self):
+    def flat(self) -> FlatView | CurveView | None:
         """Return the flat view of the first view, if there is one; of a 2D mesh the curve."""
         return None if self.flats is None else self.flats.first
 
@@ -107,8 +114,9 @@ class Cutting(QSplitter):
 
     def _sync_handles(self, session: Session) -> None:
         mesh, section = session.mesh, self.section
+        wanted = session.view.handle and session.frame is not None and not self._closed
         usable = section is not None and section.shown and can_cut(mesh, section)
-        if session.view.handle and usable and session.frame is not None and not self._closed:
+        if wanted and usable and section is not None and mesh is not None:
             self.handles.show(self._shown(session), section, mesh, self.look)
         else:
             self.handles.clear()
@@ -168,7 +176,7 @@ class Cutting(QSplitter):
         if whole:
             self.viewing.fit()
 
-    def set_look(self, look) -> None:
+    def set_look(self, look: Look) -> None:
         """Take other colours."""
         self.look = look
         if self.flats is not None:

@@ -11,6 +11,7 @@ from slideviz.gui.viewport.unrolled import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.sections.model import Section
 from slideviz.session.changes import UNDEFORMED, seen_beside
+from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
 
 FRAME_PX = 110
@@ -87,7 +88,7 @@ class Flats(QWidget):
             self._row.addWidget(self.first, 1)
         self.first.show_section(shown, section)
 
-    def _make(self, cuts) -> FlatView:
+    def _make(self, cuts: Cuts) -> FlatView:
         view = FlatView(self.viewing.store, cuts, self.look, self._multi_samples)
         view.closed.connect(self.closed)
         self._row.addWidget(view, 1)

@@ -70,7 +70,7 @@ class PlaneHandle:
         self._colour(look)
         if bounds != self._bounds:
             self._bounds = bounds
-            self.shape.PlaceWidget(bounds)
+            self.shape.PlaceWidget(list(bounds))
         if not self.dragging:
             self.shape.SetOrigin(*section.origin)
             self.shape.SetNormal(*section.basis[2])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyvista as pv
@@ -142,5 +142,4 @@ class FlatHandle(Pulled[tuple[Section, Box]]):
     def pulled(self, grasp: tuple[Section, Box], start: FloatArray, end: FloatArray) -> Section:
         """Return the line or circle moved, turned or widened."""
         section, box = grasp
-        assert self._part is not None
-        return dragged(section, self._part, (start, end), box)
+        return dragged(section, cast("Part", self._part), (start, end), box)

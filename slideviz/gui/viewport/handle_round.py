@@ -76,7 +76,7 @@ class RoundHandle(Pulled[tuple[Section, Place]]):
         pixels = self.seen(shape_of(self.section).surface(self.section, places, self.section.size))
         wide, high = self.view.window_size
         end = np.array([wide - self._strip() - EDGE_PX, high - EDGE_PX])
-        within = ((pixels >= EDGE_PX) & (pixels <= end)).all(axis=1)
+        within = np.all((pixels >= EDGE_PX) & (pixels <= end), axis=1)
         if within[0] or not within.any():
             return patch.middle
         off = np.linalg.norm(pixels - (EDGE_PX + end) / 2.0, axis=1)

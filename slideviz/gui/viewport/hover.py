@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QEvent, QObject, Qt
+from qtpy.QtCore import QEvent, QObject, QPoint, Qt
+from qtpy.QtGui import QHelpEvent, QKeyEvent, QMouseEvent
 from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.panels.worst import info_text
+from slideviz.gui.viewport.canvas import View3D
+from slideviz.scene.flat_scene import FlatScene
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.store import Store
@@ -24,7 +27,7 @@ class CellHover(QObject):
     store : Store
     """
 
-    def __init__(self, view, scene: Scene, store: Store) -> None:
+    def __init__(self, view: View3D, scene: Scene | FlatScene, store: Store) -> None:
         super().__init__(view)
         self.view, self.scene, self.store = view, scene, store
         view.setMouseTracking(True)
@@ -32,30 +35,30 @@ class CellHover(QObject):
         view.told.clicked.connect(self._clicked)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        kind = event.type()
-        if kind == QEvent.Type.ToolTip:
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
             self._tell(event)
             return True
-        if kind == QEvent.Type.MouseButtonDblClick:
+        twice = event.type() == QEvent.Type.MouseButtonDblClick
+        if isinstance(event, QMouseEvent) and twice:
             if event.button() == Qt.MouseButton.LeftButton:
                 self.mark(event.position().toPoint())
             return True
-        if kind == QEvent.Type.KeyPress and event.key() == Qt.Key.Key_Escape:
-            return self._escape()
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
+            return event.key() == Qt.Key.Key_Escape and self._escape()
         return False
 
-    def _clicked(self, where, keys) -> None:
+    def _clicked(self, where: QPoint, keys: Qt.KeyboardModifier) -> None:
         if keys & Qt.KeyboardModifier.AltModifier:
             self.mark(where)
 
-    def _tell(self, event) -> None:
+    def _tell(self, event: QHelpEvent) -> None:
         cell = self.scene.pick_cell(*self.view.to_pixels(event.pos()))
         if cell is None:
             QToolTip.hideText()
         else:
             QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
 
-    def mark(self, where) -> None:
+    def mark(self, where: QPoint) -> None:
         """Mark the cell at a place of the view; beside the mesh, or on the marked one: none."""
         cell = self.scene.pick_cell(*self.view.to_pixels(where))
         marked = self.store.session.view.marked

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QElapsedTimer, Qt, QTimer
-from qtpy.QtGui import QAction, QActionGroup
+from qtpy.QtGui import QAction, QActionGroup, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from slideviz.gui.commands import STEPS
@@ -157,7 +157,7 @@ class Player(QWidget):
             return f"{step}/{last}"
         return f"Step {step} of {last}" if step else "Undeformed"
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         narrow = self.width() < NARROW
         if narrow != self._narrow:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+from qtpy.QtGui import QMouseEvent
 
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray
@@ -97,6 +98,8 @@ class Pulled(QObject, Generic[Grasp]):
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         kind = event.type()
+        if not isinstance(event, QMouseEvent):
+            return False
         if kind == QEvent.Type.MouseButtonPress and event.button() == Qt.MouseButton.LeftButton:
             return self._press(event.position().toPoint())
         if kind == QEvent.Type.MouseMove:

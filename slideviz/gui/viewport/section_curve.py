@@ -18,10 +18,10 @@ from slideviz.gui.widgets.plot_canvas import (
     PLOT_FILTERS,
     PlotArea,
     ask_and_write,
-    folder_of,
     write_plot,
 )
 from slideviz.gui.widgets.plot_image import Draw
+from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import icon_colour
 from slideviz.plots.section_curve import Colours, CurveRow, draw_curves
 from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
@@ -61,9 +61,10 @@ class CurveView(QWidget):
         self.title.layout().insertWidget(1, self.save_button)
         self.facts = ElidedLabel()
         self.facts.setObjectName("curve_facts")
-        self.area = PlotArea(self.drawing, CurveCanvas)
-        self.area.canvas.picked = self._picked
-        self.area.canvas.setToolTip("Click to mark the cell at a place.")
+        canvas = CurveCanvas(self.drawing)
+        self.area = PlotArea(canvas)
+        canvas.picked = self._picked
+        canvas.setToolTip("Click to mark the cell at a place.")
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)

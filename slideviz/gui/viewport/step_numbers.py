@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QTextDocument
+from qtpy.QtGui import QResizeEvent, QTextDocument
 from qtpy.QtWidgets import QLabel, QSizePolicy
 
 from slideviz.gui.widgets.theme import alarm
@@ -44,7 +44,7 @@ class Results(QLabel):
         """Return the width of the most important number in its shortest form, in pixels."""
         return math.ceil(self._width_of(self._forms[-1][:1])) + 2 if self._forms else 0
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 

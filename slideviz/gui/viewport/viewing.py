@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QPoint, Qt, Signal
+from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import Look
@@ -142,6 +143,7 @@ class Viewing(QWidget):
 
     def _place(self, swapped: bool) -> None:
         """Put the second view to the right of the first, or to the left."""
+        assert self.second is not None
         pair = (self.second, self.view) if swapped else (self.view, self.second)
         for view in pair:
             self._grid.removeWidget(view)
@@ -232,7 +234,7 @@ class Viewing(QWidget):
         names = choices(session)
         for title, number in zip(self.titles, panes(session), strict=True):
             title.setVisible(True)
-            title.set_text(names.get(number, f"Run {number}"))
+            title.set_text("" if number is None else names.get(number, f"Run {number}"))
         if self.second is None:
             self._make_second(session)
         else:
@@ -251,7 +253,9 @@ class Viewing(QWidget):
 
     # Mouse -----------------------------------------------------------------------------
 
-    def _clicked(self, view: View3D, scene: Scene, where: QPoint, modifiers) -> None:
+    def _clicked(
+        self, view: View3D, scene: Scene, where: QPoint, modifiers: Qt.KeyboardModifier
+    ) -> None:
         if modifiers & Qt.KeyboardModifier.AltModifier:
             return  # means a cell
         name = scene.pick(*view.to_pixels(where))
@@ -277,13 +281,13 @@ class Viewing(QWidget):
         scene.zoom_at(*view.to_pixels(where), factor)
         self.render()
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._share_width()
 
     # Camera and pictures ---------------------------------------------------------------
 
-    def render(self) -> None:
+    def render(self) -> None:  # type: ignore[override]  # as the views do
         """Draw again what is shown."""
         self.view.render()
         if self.second is not None:

@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from qtpy.QtCore import Qt, Signal
+from qtpy.QtGui import QWheelEvent
 from qtpy.QtWidgets import QComboBox
 
 from slideviz.gui.widgets.tips import wrapped
+
+Value = TypeVar("Value")
 
 
 class Choice(QComboBox):
@@ -17,7 +21,7 @@ class Choice(QComboBox):
 
     chosen = Signal(object)
 
-    def __init__(self, words: dict[object, str]) -> None:
+    def __init__(self, words: Mapping[Value, str]) -> None:
         super().__init__()
         self.words = dict(words)
         for value, text in words.items():
@@ -41,5 +45,5 @@ class Choice(QComboBox):
         self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
         super().showPopup()
 
-    def wheelEvent(self, event) -> None:
+    def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()

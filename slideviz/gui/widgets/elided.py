@@ -4,15 +4,21 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QSize, Qt
-from qtpy.QtGui import QPainter
+from typing import TypeAlias
+
+from qtpy.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt
+from qtpy.QtGui import QPainter, QPaintEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
     QLabel,
     QSizePolicy,
     QStyledItemDelegate,
+    QStyleOptionViewItem,
     QWidget,
 )
+
+ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
+"""A place in a list, as Qt hands it to who draws it."""
 
 
 class ElidedLabel(QLabel):
@@ -31,7 +37,7 @@ class ElidedLabel(QLabel):
         room = self.contentsRect().width()
         return self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, room)
 
-    def paintEvent(self, _event) -> None:
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         self.style().drawItemText(
             painter,
@@ -47,7 +53,7 @@ class ElidedLabel(QLabel):
 class _Narrow(QStyledItemDelegate):
     """Asks for no width, so that the text of an item ends where the list does."""
 
-    def sizeHint(self, option, index) -> QSize:
+    def sizeHint(self, option: QStyleOptionViewItem, index: ModelIndex) -> QSize:
         return QSize(0, super().sizeHint(option, index).height())
 
 

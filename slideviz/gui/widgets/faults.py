@@ -14,9 +14,10 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import datetime
+from functools import partial
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 from qtpy.QtCore import QObject, QtMsgType, Signal, qInstallMessageHandler, qVersion
 from qtpy.QtWidgets import QApplication
@@ -48,6 +49,16 @@ _LEVELS = {
 log = logging.getLogger("slideviz")
 
 
+class Notice(Protocol):
+    """What shows an error, and how often it came."""
+
+    def tell_error(self, error: BaseException) -> None:
+        """Show an error."""
+
+    def count(self, times: int) -> None:
+        """Show how often it came."""
+
+
 class Faults(QObject):
     """Tells of errors in the banner of a window: each once, with how often it came.
 
@@ -61,7 +72,7 @@ class Faults(QObject):
 
     def __init__(
         self,
-        banner: Any,
+        banner: Notice,
         parent: QObject | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -127,7 +138,7 @@ def caught(faults: Faults) -> Iterator[None]:
         stack.callback(setattr, threading, "excepthook", threading.excepthook)
         stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
         sys.excepthook = lambda _, error, __: _uncaught(faults, error)
-        threading.excepthook = lambda what: what.exc_value and faults.tell(what.exc_value)
+        threading.excepthook = partial(_thread_failed, faults)
         sys.unraisablehook = lambda what: log.warning("ignored: %r", what.exc_value)
         qInstallMessageHandler(_qt_says)
         stack.callback(qInstallMessageHandler, None)
@@ -135,6 +146,11 @@ def caught(faults: Faults) -> Iterator[None]:
         logging.captureWarnings(True)
         stack.callback(logging.captureWarnings, False)
         yield
+
+
+def _thread_failed(faults: Faults, what: threading.ExceptHookArgs) -> None:
+    if what.exc_value is not None:
+        faults.tell(what.exc_value)
 
 
 def _uncaught(faults: Faults, error: BaseException) -> None:
@@ -160,10 +176,9 @@ def _vtk_heard() -> Iterator[None]:
 
         def says(_window: object, _event: str, text: str, level: int = level) -> None:
             logger.log(level, "VTK: %s", " ".join(text.split()))
-            heard.Initialize()
 
         says.CallDataType = "string0"  # type: ignore[attr-defined]
-        heard.AddObserver(event, says)
+        heard.AddObserver(event, says)  # type: ignore[arg-type]  # a name is taken, too
     vtkOutputWindow.SetInstance(heard)
     try:
         yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QObject
-from qtpy.QtWidgets import QFormLayout, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes
@@ -17,7 +17,10 @@ class FieldWatch(QObject):
     def __init__(self, panel: QWidget, store: Store, place: Place) -> None:
         super().__init__(panel)
         self.panel, self.store, self.place = panel, store, place
-        self._fields = [*panel.findChildren(NumberField), *panel.findChildren(NumberBox)]
+        self._fields: list[NumberField | NumberBox] = [
+            *panel.findChildren(NumberField),
+            *panel.findChildren(NumberBox),
+        ]
         for field in self._fields:
             field.marked.connect(self.look)
         # Another motion or method may hide a field or switch it off.
@@ -44,11 +47,12 @@ class FieldWatch(QObject):
 def _title(field: QWidget, panel: QWidget) -> str:
     """Return what a form calls a field, or the row that it is in, with its own name there."""
     # Numbers that are not valid together are the row's fault.
-    own, part = field.accessibleName() if getattr(field, "problem", "") else "", field
-    while part is not panel:
+    own = field.accessibleName() if getattr(field, "problem", "") else ""
+    part: QWidget | None = field
+    while part is not None and part is not panel:
         for form in panel.findChildren(QFormLayout):
             label = form.labelForField(part)
-            if label is not None:
+            if isinstance(label, QLabel):
                 return f"{label.text()} {own}".rstrip()
         part = part.parentWidget()
     return field.accessibleName() or field.objectName()

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from qtpy.QtCore import QEvent, QLocale, Qt, QTimer, Signal
+from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QWheelEvent
 from qtpy.QtWidgets import (
     QApplication,
     QCheckBox,
@@ -45,7 +46,8 @@ def short_text(value: float, scale: float = 0.0) -> str:
 
 def is_stray(event: QEvent, letters: str = "eE") -> bool:
     """Tell whether a key is a letter that is in no number: it belongs to the window's shortcuts."""
-    if event.type() not in (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress):
+    kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
+    if not isinstance(event, QKeyEvent) or event.type() not in kinds:
         return False
     plain = Qt.KeyboardModifier.ShiftModifier
     return event.text().isalpha() and event.text() not in letters and not event.modifiers() & ~plain
@@ -130,26 +132,26 @@ class NumberField(QLineEdit):
         if not exact:
             self.setCursorPosition(0)
 
-    def event(self, event) -> bool:
+    def event(self, event: QEvent) -> bool:
         if is_stray(event):
             event.ignore()
             return False
         return super().event(event)
 
-    def focusInEvent(self, event) -> None:
+    def focusInEvent(self, event: QFocusEvent) -> None:
         if not self.problem:
             self._before = self._value
             self._write()
         super().focusInEvent(event)
 
-    def mouseDoubleClickEvent(self, event) -> None:
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         # Qt takes a word, and a point ends one: half of a decimal number would be replaced.
         if event.button() == Qt.MouseButton.LeftButton:
             self.selectAll()
             self._whole = True
             self._twice_ms = event.timestamp()
 
-    def mousePressEvent(self, event) -> None:
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         # Who clicks three times wants all of it, too.
         soon = event.timestamp() - self._twice_ms < QApplication.doubleClickInterval()
         if event.button() == Qt.MouseButton.LeftButton and soon:
@@ -158,15 +160,15 @@ class NumberField(QLineEdit):
             return
         super().mousePressEvent(event)
 
-    def mouseMoveEvent(self, event) -> None:
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if not self._whole:  # a hand that trembles in a double click selects less again
             super().mouseMoveEvent(event)
 
-    def mouseReleaseEvent(self, event) -> None:
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self._whole = False
         super().mouseReleaseEvent(event)
 
-    def focusOutEvent(self, event) -> None:
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         self.setModified(False)
         if not self.problem:
@@ -218,13 +220,13 @@ class NumberBox(QSpinBox):
         for change in (self.lineEdit().textChanged, self.editingFinished, self.valueChanged):
             change.connect(lambda *_: self._look())
 
-    def event(self, event) -> bool:
+    def event(self, event: QEvent) -> bool:
         if is_stray(event, self.letters):
             event.ignore()
             return False
         return super().event(event)
 
-    def wheelEvent(self, event) -> None:
+    def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
     def show_value(self, value: int) -> None:

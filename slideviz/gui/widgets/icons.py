@@ -9,7 +9,7 @@ from qtpy.QtCore import QByteArray, QRectF, QSize, Qt
 from qtpy.QtGui import QIcon, QPainter, QPixmap
 from qtpy.QtSvg import QSvgRenderer
 
-from slideviz.terms import ROLES
+from slideviz.terms import ROLES, Role
 
 STROKES = {
     "open": '<path d="M3 19V5h6l2 3h8v3"/><path d="M3 19l3-8h16l-3 8z"/>',
@@ -107,7 +107,7 @@ def icon(name: str, colour: str = "#3b4652") -> QIcon:
 
 
 @lru_cache(maxsize=16)
-def role_icon(role: str) -> QIcon:
+def role_icon(role: Role) -> QIcon:
     """Return the icon of a role: a white sign on its colour, so that shape tells it too."""
     body = _ROLE_STROKES[role].format(c="#ffffff")
     sign = _SVG.format(c="#ffffff", w=2.4, body=body)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 from qtpy.QtCore import Qt, QTimer, Signal
-from qtpy.QtGui import QColor, QImage, QPainter
+from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
 from slideviz.color_scheme import LIGHT, Look
@@ -21,6 +21,7 @@ from slideviz.gui.responsiveness.settings import LOOK_MS, MOST_REST, REST_MS, RE
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
+from slideviz.gui.widgets.services import main_window
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.written import figure_bytes
@@ -107,8 +108,8 @@ class PlotCanvas(QWidget):
         if self._stale:
             return
         ratio = self.devicePixelRatioF()
-        size = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
-        paper = Paper(*size, ratio, self.style_)
+        wide, high = (max(1, round(ratio * side)) for side in (self.width(), self.height()))
+        paper = Paper(wide, high, ratio, self.style_)
         self._coming = draw_beside(self.drawing(), paper, self._picture.place)
         self._look_after.start()
 
@@ -157,12 +158,12 @@ class PlotCanvas(QWidget):
 
     # Qt --------------------------------------------------------------------------------
 
-    def resizeEvent(self, event) -> None:
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._last = 0.0  # what is shown meanwhile is stretched
         self.ask()
 
-    def paintEvent(self, event) -> None:
+    def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         painter = QPainter(self)
         pixels = self._picture.pixels
@@ -172,7 +173,7 @@ class PlotCanvas(QWidget):
             painter.setPen(QColor(self.look.text))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "Drawing…")
         elif wide > 1:
-            image = QImage(pixels, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
+            image = QImage(pixels.data, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
             painter.drawImage(self.rect(), image)
         else:
             painter.fillRect(self.rect(), QColor(self.look.background))
@@ -184,10 +185,10 @@ class PlotCanvas(QWidget):
 class PlotArea(QStackedWidget):
     """A plot, or words that say why there is none."""
 
-    def __init__(self, drawing: Callable[[], Draw], canvas: type[PlotCanvas] = PlotCanvas) -> None:
+    def __init__(self, canvas: PlotCanvas) -> None:
         super().__init__()
         self.words = words_label()
-        self.canvas = canvas(drawing)
+        self.canvas = canvas
         self.addWidget(self.words)
         self.addWidget(self.canvas)
         self.setMinimumHeight(100)
@@ -259,16 +260,3 @@ def ask_and_write(
     if window is not None:
         window.settings.setValue("folder", str(path.parent))
         window.say(f"Saved {path}")
-
-
-def main_window(widget: QWidget | None):
-    """Return slideviz's window around a widget, also where its dock floats."""
-    while widget is not None and not hasattr(widget, "banner"):
-        widget = widget.parentWidget()
-    return widget
-
-
-def folder_of(widget: QWidget) -> Path:
-    """Return where file dialogs start."""
-    window = main_window(widget)
-    return window.files.folder() if window is not None else Path.home()

@@ -40,7 +40,7 @@ class Place:
     """Where the axes are (left, bottom, width, height), as long as ``key`` is the same."""
 
     key: tuple[object, ...] = ()
-    bounds: tuple[float, ...] = ()
+    bounds: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,9 @@ def _arrange(figure: Figure, place: Place) -> Place:
     labels = axes.get_xlabel(), axes.get_ylabel(), axes.get_title(), axes.get_yscale()
     key = (*figure.bbox.size, figure.dpi, *labels, *digits)
     if key != place.key:
-        figure.get_layout_engine().execute(figure)
+        engine = figure.get_layout_engine()
+        assert engine is not None
+        engine.execute(figure)
         place = Place(key, axes.get_position().bounds)
     figure.set_layout_engine("none")
     axes.set_position(place.bounds)

@@ -232,7 +232,8 @@ class Banner(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("banner")
-        row = QHBoxLayout(self)
+        self._full = ""
+        self._row = row = QHBoxLayout(self)
         row.setContentsMargins(10, 6, 6, 6)
         self.text = QLabel()
         self.text.setWordWrap(True)
@@ -292,13 +293,13 @@ class Banner(QFrame):
             button = QPushButton(name)
             button.clicked.connect(lambda _=False, function=function: function())
             self.answers[name] = button
-            self.layout().insertWidget(self.layout().count() - 1, button)
+            self._row.insertWidget(self._row.count() - 1, button)
         self._later = later
         self.tell(text, full)
 
     def _forget_answers(self) -> None:
         for button in self.answers.values():
-            self.layout().removeWidget(button)
+            self._row.removeWidget(button)
             button.hide()
             button.deleteLater()
         self.answers = {}

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from qtpy.QtCore import QRectF, Qt
-from qtpy.QtGui import QPainter, QPalette
+from qtpy.QtGui import QPainter, QPaintEvent, QPalette
 from qtpy.QtWidgets import QWidget
 
 from slideviz.plots.ticks import ticks
@@ -52,7 +52,7 @@ class Ruler(QWidget):
                 found = closer
         return found
 
-    def paintEvent(self, _event) -> None:
+    def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setPen(self.palette().color(QPalette.ColorRole.WindowText))
         font = painter.font()

@@ -147,8 +147,14 @@ def resolved(theme: str) -> str:
     """Return ``light`` or ``dark`` for a theme; ``system`` asks the desktop."""
     if theme in _COLOURS:
         return theme
-    scheme = QApplication.instance().styleHints().colorScheme()
+    scheme = _app().styleHints().colorScheme()
     return "dark" if scheme == Qt.ColorScheme.Dark else "light"
+
+
+def _app() -> QApplication:
+    app = QApplication.instance()
+    assert isinstance(app, QApplication)
+    return app
 
 
 def apply(theme: str) -> Look:
@@ -161,7 +167,7 @@ def apply(theme: str) -> Look:
     for role in ("WindowText", "Text", "ButtonText"):
         group = QPalette.ColorGroup.Disabled
         palette.setColor(group, getattr(QPalette.ColorRole, role), QColor(colours["disabled"]))
-    app = QApplication.instance()
+    app = _app()
     app.setStyle("Fusion")
     app.setPalette(palette)
     # Tool tips keep a palette of their own, which no change of the application's reaches.
@@ -170,7 +176,7 @@ def apply(theme: str) -> Look:
     outline = QColor(_EXTRA[name]["frame"]).lighter(_OUTLINE)
     framed.setColor(QPalette.ColorRole.Window, outline)
     for kind in FRAMED:
-        app.setPalette(framed, kind)
+        app.setPalette(framed, kind)  # type: ignore[arg-type]  # a str is taken, too
     tip = {"tip": colours["ToolTipBase"], "tip_text": colours["ToolTipText"]}
     signs = {"name": name, "signs": Path(__file__).with_name("dock_signs").as_posix()}
     app.setStyleSheet(_SHEET.format(**_EXTRA[name], **tip, **signs))

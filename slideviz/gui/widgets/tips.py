@@ -37,7 +37,7 @@ def wrapped(text: str) -> str:
     is shown as it is written.
     """
     short = all(len(line) <= LETTERS + 10 for line in text.splitlines())
-    if short and not Qt.mightBeRichText(text):
+    if short and not Qt.mightBeRichText(text):  # type: ignore[attr-defined]  # not in PySide's stubs
         return text
     width = round(1.05 * LETTERS * QFontMetrics(QToolTip.font()).averageCharWidth())
     lines = html.escape(text, quote=False).replace("\n", "<br>")

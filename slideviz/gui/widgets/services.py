@@ -1,0 +1,78 @@
+"""What panels and dialogs use of the window that they are in, without knowing it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from qtpy.QtCore import QSettings
+from qtpy.QtWidgets import QMainWindow, QWidget
+
+from slideviz.gui.responsiveness.worker import JobRunner
+from slideviz.gui.widgets.questions import Banner
+from slideviz.session.store import Store
+
+if TYPE_CHECKING:
+    from slideviz.gui.docks import Docks
+    from slideviz.gui.files import Files
+    from slideviz.gui.viewport.cutting import Cutting
+    from slideviz.gui.viewport.viewing import Viewing
+
+
+class Services(QMainWindow):
+    """The window, as panels and dialogs see it; `slideviz.gui.window.MainWindow` is the one.
+
+    Attributes
+    ----------
+    store : Store
+        What is open and shown; everything is changed through it.
+    settings : QSettings
+        What is kept from one start to the next.
+    banner : Banner
+        Tells what went wrong.
+    runner : JobRunner
+        Whether a job runs; `start_job` starts one.
+    files : Files
+        Where file dialogs start, and what the files that they offer begin with.
+    viewing, cutting
+        The views of the mesh, and of the section that is laid flat.
+    docks_ : Docks
+        The panels.
+    """
+
+    store: Store
+    settings: QSettings
+    banner: Banner
+    runner: JobRunner
+    files: Files
+    viewing: Viewing
+    cutting: Cutting
+    docks_: Docks
+
+    def say(self, text: str) -> None:
+        """Show a short message in the status bar; an empty one takes it away."""
+        raise NotImplementedError
+
+    def start_job(
+        self,
+        text: str,
+        finish: Callable[[Any], object],
+        function: Callable[..., Any],
+        *values: object,
+    ) -> None:
+        """Start a job beside the window; ``finish`` takes what it returns."""
+        raise NotImplementedError
+
+
+def main_window(widget: QWidget | None) -> Services | None:
+    """Return slideviz's window around a widget, also where its dock floats."""
+    while widget is not None and not isinstance(widget, Services):
+        widget = widget.parentWidget()
+    return widget
+
+
+def folder_of(widget: QWidget) -> Path:
+    """Return where file dialogs start."""
+    window = main_window(widget)
+    return window.files.folder() if window is not None else Path.home()
