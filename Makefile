@@ -65,5 +65,5 @@ study: setup ## the thesis's cases into study/: tables, plots, pictures (ARGS=--
 
 clean: ## remove what was built, the virtual environment and demo/ included
 	rm -rf .venv demo study build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
-		.import_linter_cache tests/golden/new
+		.import_linter_cache tests/golden/new docs/gallery docs/reference/{keys,commands}.md
 	find slideviz tests -name __pycache__ -prune -exec rm -rf {} +
