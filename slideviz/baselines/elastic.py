@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.baselines.conditions import Body, conditions, rigid_motions
-from slideviz.baselines.multigrid import Found, solve
+from slideviz.baselines.multigrid import LinearSolution, solve
 from slideviz.baselines.stiffness import assemble
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
@@ -20,7 +20,7 @@ from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
 
 HOPELESS = 1e-3
-"""Fall of the residual that must be reached; what is between it and the tolerance is told."""
+"""Fall of the residual that must be reached; from it to the tolerance there is a warning."""
 
 ASSEMBLING = 0.2
 """The part of the phase ``solve`` that the matrix takes."""
@@ -39,7 +39,7 @@ def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
         move differently.
     """
     nodes, values = problem.known, problem.values
-    displacement, told = _equilibrium(problem, watch, body, nodes, values)
+    displacement, warnings = _equilibrium(problem, watch, body, nodes, values)
     sliding = np.concatenate([problem.edge, problem.surface])
     if len(sliding):
         free = within(problem, sliding, displacement[sliding])
@@ -48,7 +48,7 @@ def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
         nodes, values = np.concatenate([nodes, sliding]), np.concatenate([values, slid])
         if np.abs(slid - free).max() > AGREE * problem.basis.radius:
             start = displacement
-            displacement, told = _equilibrium(problem, watch, body, nodes, values, start)
+            displacement, warnings = _equilibrium(problem, watch, body, nodes, values, start)
     displacement[nodes] = values
     return Solution(
         displacement,
@@ -56,7 +56,7 @@ def deform_elastic(problem: Problem, watch: Watch, body: Body) -> Solution:
         0.0,
         np.empty(0, np.int64),
         float("nan"),
-        warnings=told,
+        warnings=warnings,
     )
 
 
@@ -68,7 +68,7 @@ def _equilibrium(
     values: FloatArray,
     start: FloatArray | None = None,
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the displacement of all nodes in the frame (n, d), and what to tell of the solver."""
+    """Return the displacement of all nodes in the frame (n, d), and warnings of the solver."""
     with watch.phase("solve") as tick:
         points = body.frame.points(problem.coords)
         given = conditions(problem, body, nodes, values)
@@ -86,16 +86,16 @@ def _equilibrium(
             guess.ravel(),
             lambda f: tick(ASSEMBLING + (1.0 - ASSEMBLING) * f),
         )
-        told = _told(found)
+        warnings = _warnings(found)
         shift = given.known.copy()
         unknown = found.x.reshape(guess.shape)[given.place[inside]]
         shift[inside] = np.einsum("mij,mj->mi", given.turn[inside], unknown)
         displacement = body.frame.difference(points, shift)
-    return displacement, told
+    return displacement, warnings
 
 
-def _told(found: Found) -> tuple[str, ...]:
-    """Return what to tell of the solver.
+def _warnings(found: LinearSolution) -> tuple[str, ...]:
+    """Return a warning where the solver did not reach its tolerance.
 
     Raises
     ------

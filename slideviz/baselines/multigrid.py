@@ -45,7 +45,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "fastmath": True}
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class LinearSolution:
     """A solution (n,), the iterations it took, and how far the residual fell."""
 
     x: FloatArray
@@ -78,7 +78,7 @@ def solve(
     modes: FloatArray,
     start: FloatArray,
     tick: Tick = no_tick,
-) -> Found:
+) -> LinearSolution:
     """Return the solution of a symmetric positive definite system.
 
     Parameters
@@ -91,7 +91,7 @@ def solve(
         What costs next to no energy: the rigid motions.
     """
     if not np.any(right):
-        return Found(np.zeros_like(right), 0, 0.0)
+        return LinearSolution(np.zeros_like(right), 0, 0.0)
     levels = _while_ticking(lambda: _levels(matrix, modes), tick)
     return _conjugate_gradients(levels, right, start, tick)
 
@@ -191,7 +191,7 @@ def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
 
 def _conjugate_gradients(
     levels: list[Level], right: FloatArray, start: FloatArray, tick: Tick
-) -> Found:
+) -> LinearSolution:
     """Return the solution; Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1."""
     matrix = levels[0].matrix
     first = float(right @ _cycle(levels, right))
@@ -202,7 +202,7 @@ def _conjugate_gradients(
     for count in range(MAX_ITERATIONS + 1):
         fall = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
         if not fall > TOLERANCE or count == MAX_ITERATIONS:
-            return Found(x, count, fall)
+            return LinearSolution(x, count, fall)
         tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(fall, 1.0)) / np.log(TOLERANCE)))
         image = _product(matrix, along)
         size = energy / float(along @ image)

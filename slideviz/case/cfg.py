@@ -138,7 +138,7 @@ def _parsed(path: Path, text: str) -> tuple[Case, list[Problem], tuple[str, ...]
     for keys, sentence in contradictions(case):
         if doubtful.intersection(keys):
             continue
-        # A key that could not be read is told already; what follows from it is not worth telling.
+        # A key that could not be read is reported already; what follows from it need not be.
         if all(key in values for key in keys if key in rows):
             problems.append((next(rows[key].line for key in keys if key in rows), sentence))
     return case, problems, tuple(remarks)

@@ -66,12 +66,12 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
     """
     found: list[tuple[tuple[str, ...], str]] = []
     moving = case.markers_with("moving")
-    told: set[str] = set()
+    seen: set[str] = set()
     for place, motion in enumerate(case.motions, start=1):
         for name in named(motion.marker):
-            if name in moving or name in told:
+            if name in moving or name in seen:
                 continue
-            told.add(name)
+            seen.add(name)
             sentence = (
                 f"motion {place} names {name!r}, which does not move: MARKER_MOVING= "
                 f"({', '.join(moving)}) does not have it; one of the two is wrong"

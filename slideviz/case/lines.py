@@ -42,7 +42,7 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
         It cannot be read, is empty, too large, or not text. ``what`` is one of ``LARGEST``.
     """
     try:
-        with suppress(FileNotFoundError):  # told below
+        with suppress(FileNotFoundError):  # reported below
             require_length(path, CaseError, what, LARGEST[what])
         data = path.read_bytes()
     except FileNotFoundError as problem:

@@ -36,7 +36,7 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
     dim : int
         Dimensions of the mesh; in 3D a rotation has an axis.
     extent : float
-        Size of the mesh: of a point, what rounding left of zero beside it is told as 0.
+        Size of the mesh: of a point, what rounding left of zero beside it is written as 0.
     """
     return f"{target_words(motion.marker)}: {_in_full(motion, dim, extent)}"
 
@@ -72,7 +72,7 @@ def deformation(case: Case) -> tuple[object, ...]:
 def motion_labels(cases: Sequence[Case]) -> list[str]:
     """Return for each case its motions in few words; empty texts where all have the same.
 
-    A boundary is named where several move; points, axes and folders are told where the rest
+    A boundary is named where several move; points, axes and folders are given where the rest
     would read alike.
     """
     if len({case.motions for case in cases}) < 2:
@@ -92,8 +92,8 @@ def _label(case: Case, several: bool, exact: bool) -> str:
     parts = []
     for motion in case.motions:
         words = _exactly(motion) if exact else _briefly(motion)
-        told = several and bool(motion.marker)
-        parts.append(f"{target_words(motion.marker)}: {words}" if told else words)
+        with_target = several and bool(motion.marker)
+        parts.append(f"{target_words(motion.marker)}: {words}" if with_target else words)
     return " + ".join(parts) or "no motion"
 
 

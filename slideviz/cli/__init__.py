@@ -22,7 +22,7 @@ def run(argv: Sequence[str]) -> int:
     with terminal():
         code = _run(argv)
         try:
-            sys.stdout.flush()  # here, where it can still be told that it fails
+            sys.stdout.flush()  # here, where a failure can still be reported
         except BrokenPipeError:
             return DONE
         except SlidevizError as problem:
@@ -36,14 +36,14 @@ def _run(argv: Sequence[str]) -> int:
     try:  # also around the imports, which take long enough to be interrupted
         from slideviz.cli.parser import parse
         from slideviz.cli.places import inputs_of
-        from slideviz.cli.progress import compiling_noted
+        from slideviz.cli.progress import note_compilation
         from slideviz.mesh.io.file_checks import protected
 
         arguments = parse(argv)
         arguments.inputs = inputs_of(arguments)
         with (
             protected(lambda: arguments.inputs),
-            compiling_noted(getattr(arguments, "quiet", False)),
+            note_compilation(getattr(arguments, "quiet", False)),
         ):
             return int(arguments.command(arguments))
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2

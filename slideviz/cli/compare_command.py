@@ -171,7 +171,7 @@ def _computed(
     table, histories = folder / TABLE, folder / HISTORY
     files = [table]
     rows: list[Row] = []
-    told: list[str] = []
+    reasons: list[str] = []
     count = len(wanted) - len(cannot)
     bars: list[Bar] = []
     rows_one_by_one = compare(case, mesh, wanted, lambda _, now: bars[-1](now))
@@ -187,8 +187,8 @@ def _computed(
         if any(row.result is not None and row.result.history for row in rows):
             save_text(histories, history_text(rows))
             files = [table, histories]
-        if tried not in cannot:  # those were told before
-            _say(arguments, terminal_line(rows[-1], told))
+        if tried not in cannot:  # those were announced before
+            _say(arguments, terminal_line(rows[-1], reasons))
     return rows, files
 
 

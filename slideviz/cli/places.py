@@ -37,7 +37,7 @@ class Output:
     option : str
         What names it: an option, or a key of the case.
     named : bool
-        Whether it stands on the command line; if not, it is told that an older file is replaced.
+        Whether it stands on the command line; if not, a note says that an older file is replaced.
     files : str
         Of a folder: the regular expression of the names of the files in it.
     is_mesh : bool
@@ -108,14 +108,14 @@ def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
 
 def _tell_replaced(unnamed: list[Output]) -> None:
     """Say before the work which older files it will replace, in one line."""
-    told = []
+    old_files = []
     for one in unnamed:
         old = [path for path in _paths(one) if path.exists()]
         if old:
             more = f" and {len(old) - 1} more" if len(old) > 1 else ""
-            told.append(f"{old[0]}{more} ({one.option})")
-    if told:
-        words = f"there already, and replaced by this run: {', '.join(told)}"
+            old_files.append(f"{old[0]}{more} ({one.option})")
+    if old_files:
+        words = f"there already, and replaced by this run: {', '.join(old_files)}"
         print(f"slideviz: note: {words}", file=sys.stderr, flush=True)
 
 

@@ -27,7 +27,7 @@ _WIPE = "\r\033[K"
 
 
 @contextmanager
-def compiling_noted(quiet: bool) -> Iterator[None]:
+def note_compilation(quiet: bool) -> Iterator[None]:
     """Say on stderr when Numba begins to compile, once; never where its cache has everything."""
     if quiet:
         yield

@@ -44,16 +44,16 @@ class Terminal:
 
     def control(self, text: str) -> None:
         """Write text as it is, with its control characters."""
-        with self._told():
+        with self._reporting_failure():
             self._stream.write(_encodable(text, self._stream.encoding or "utf-8"))
 
     def flush(self) -> None:
         """Send what was written."""
-        with self._told():
+        with self._reporting_failure():
             self._stream.flush()
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _reporting_failure(self) -> Iterator[None]:
         try:
             yield
         except OSError as problem:

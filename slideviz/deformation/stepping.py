@@ -149,7 +149,7 @@ class Stepping:
         ahead = [(k / count, 0) for k in range(1, count + 1)]
         coords, done, index, folded = setup.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *setup.warnings]
-        told: list[str] = []
+        remarks: list[str] = []
         worst = 0.0
         seconds = dict(self.seconds)
         before: Solution | None = None
@@ -180,11 +180,11 @@ class Stepping:
             before = solution
             ahead.pop(0)
             if solution.short and solution.max_error > worst:
-                told, worst = [_short_warning(setup, solution, index)], solution.max_error
-            elif not told:
-                told = _dropped_warning(solution, index, mesh)
+                remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
+            elif not remarks:
+                remarks = _dropped_warning(solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
-            yield self._made(index, total, points, solution, watch, [*warnings, *told])
+            yield self._made(index, total, points, solution, watch, [*warnings, *remarks])
             seconds = {}
 
     def _report(self, index: int, total: int) -> Callable[[str, float], None]:

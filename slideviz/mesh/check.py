@@ -128,7 +128,7 @@ def check_size(mesh: Mesh) -> None:
     MeshError
         One is larger than ``LARGEST``.
     """
-    # What is not finite is told elsewhere, or makes its cells inverted.
+    # What is not finite is reported elsewhere, or makes its cells inverted.
     bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)
     if bad.any():
         k = int(np.argmax(bad))

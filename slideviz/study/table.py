@@ -113,17 +113,17 @@ def terminal_head() -> str:
     return "  ".join([f"{'method':<7} {'periodic':<8}", *shown])
 
 
-def terminal_line(row: Row, told: list[str] | None = None) -> str:
+def terminal_line(row: Row, given: list[str] | None = None) -> str:
     """Return a row for a terminal; the reason where there is no result.
 
-    ``told`` has the reasons given so far, and gets those given here: each is written once, and
+    ``given`` has the reasons given so far, and gets those given here: each is written once, and
     later by its number.
     """
     tried = row.combination
     begin = f"{tried.method:<7} {tried.periodic:<8}"
     if row.result is None:
         steps = _cell(str(tried.steps or "auto"), COLUMNS["steps_made"])
-        return f"{begin}  {steps}  not possible {_reason(row.problem, told)}"
+        return f"{begin}  {steps}  not possible {_reason(row.problem, given)}"
     shown = [
         _cell(format(column.value(row.result), column.form), column)
         for column in COLUMNS.values()
@@ -132,13 +132,13 @@ def terminal_line(row: Row, told: list[str] | None = None) -> str:
     return "  ".join([begin, *shown])
 
 
-def _reason(problem: str, told: list[str] | None) -> str:
-    """Return a number and the reason, or the number alone where it was told before."""
-    told = [] if told is None else told
-    if problem in told:
-        return f"[{told.index(problem) + 1}]"
-    told.append(problem)
-    return f"[{len(told)}]: {' '.join(problem.split())}"
+def _reason(problem: str, given: list[str] | None) -> str:
+    """Return a number and the reason, or the number alone where it was given before."""
+    given = [] if given is None else given
+    if problem in given:
+        return f"[{given.index(problem) + 1}]"
+    given.append(problem)
+    return f"[{len(given)}]: {' '.join(problem.split())}"
 
 
 def _cell(text: str, column: Column) -> str:

@@ -47,14 +47,14 @@ def refused(case: Case, mesh: Mesh, wanted: Iterable[Combination]) -> dict[Combi
 
     Nothing is computed: others may turn out to be impossible later.
     """
-    told: dict[tuple[str, str], str] = {}
+    problems: dict[tuple[str, str], str] = {}
     found = {}
     for one in wanted:
         kind = one.method, one.periodic
-        if kind not in told:
-            told[kind] = "; ".join(dict.fromkeys(check_case(one.applied(case), mesh)))
-        if told[kind]:
-            found[one] = told[kind]
+        if kind not in problems:
+            problems[kind] = "; ".join(dict.fromkeys(check_case(one.applied(case), mesh)))
+        if problems[kind]:
+            found[one] = problems[kind]
     return found
 
 

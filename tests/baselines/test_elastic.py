@@ -10,7 +10,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.baselines import elastic, multigrid
-from slideviz.baselines.multigrid import Found
+from slideviz.baselines.multigrid import LinearSolution
 from slideviz.baselines.shapes import _CORNERS, blocks, shape
 from slideviz.baselines.stiffness import Conditions, assemble
 from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
@@ -443,7 +443,7 @@ def test_what_the_solver_does_not_reach_is_told(monkeypatch):
     warnings = last(box_case(2), mesh).warnings
     assert any("only, in 1 iterations" in text for text in warnings)
     with pytest.raises(DeformError, match="not solved"):
-        elastic._told(Found(np.zeros(1), 3, float("nan")))
+        elastic._warnings(LinearSolution(np.zeros(1), 3, float("nan")))
 
 
 def test_progress_rises_and_a_callback_that_raises_ends_the_run(monkeypatch):

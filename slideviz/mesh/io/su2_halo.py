@@ -3,7 +3,7 @@
 The marker with ``SEND_TO= 1`` lists donors, the one with ``SEND_TO= -1`` receivers, in the same
 order; a row is ``1 node k``, k the ``PERIODIC_INDEX`` of a centre of rotation, angles and a
 translation. Files differ in direction, order and unit of these, so the undeformed coordinates of
-both decide. What does not fit is no error, for the mesh can be used all the same: it is told.
+both decide. What does not fit is no error, for the mesh can be used all the same, but a remark.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from slideviz.mesh.io.su2_scan import Lines
 from slideviz.mesh.io.su2_zone import SendRows, Zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
-Found = tuple[Halo | None, tuple[str, ...]]
+HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
 
 
-def find_halo(lines: Lines, zone: Zone, mesh: Mesh) -> Found:
+def find_halo(lines: Lines, zone: Zone, mesh: Mesh) -> HaloAndRemarks:
     """Return the halo that a zone's markers describe, if they do, and what is odd about it."""
     if not zone.sends:
         return None, ()
@@ -44,7 +44,9 @@ def _unused(why: str) -> str:
     )
 
 
-def _tied(mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]) -> Found:
+def _tied(
+    mesh: Mesh, donors: IntArray, receivers: IntArray, given: dict[int, FloatArray]
+) -> HaloAndRemarks:
     """Return the halo of pairs whose motion is found, and what is odd."""
     remarks: list[str] = []
     motions: list[RigidMotion] = []
