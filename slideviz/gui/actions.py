@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction, QActionGroup
@@ -15,7 +16,11 @@ from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.state import Session
+from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY, SHOWN, labels
+
+if TYPE_CHECKING:
+    from slideviz.gui.window import MainWindow
 
 
 class Actions:
@@ -28,7 +33,7 @@ class Actions:
     bar : ToolBar
     """
 
-    def __init__(self, window: Any) -> None:
+    def __init__(self, window: MainWindow) -> None:
         self.window = window
         self.by_name: dict[str, QAction] = {}
         self.menus: dict[str, QMenu] = {}
@@ -85,7 +90,7 @@ class ToolBar(QToolBar):
     range : QToolButton
     """
 
-    def __init__(self, window: Any, actions: Actions) -> None:
+    def __init__(self, window: MainWindow, actions: Actions) -> None:
         super().__init__("Tools")
         self.setObjectName("tools")
         self.setMovable(False)
@@ -109,7 +114,7 @@ class ToolBar(QToolBar):
     def _add(self, *names: str) -> None:
         self.addActions([self._actions.by_name[name] for name in names])
 
-    def _add_colour(self, store) -> None:
+    def _add_colour(self, store: Store) -> None:
         self.addWidget(QLabel(" Colour by "))
         self.colour = Choice(labels(COLOUR_BY))
         self.colour.setObjectName("colour_by")
@@ -129,7 +134,7 @@ class ToolBar(QToolBar):
         self.addWidget(self.range)
         self.addSeparator()
 
-    def _add_zone(self, open_zone) -> None:
+    def _add_zone(self, open_zone: Callable[[int], object]) -> None:
         self.zone = Choice({})
         self.zone.setObjectName("zone")
         self.zone.setToolTip("Which zone of the file is open.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu
@@ -22,6 +22,9 @@ from slideviz.session import changes
 from slideviz.session.colors import usual_range
 from slideviz.session.state import Session
 from slideviz.terms import SHOWN, Shown, ShownTerm
+
+if TYPE_CHECKING:
+    from slideviz.gui.window import MainWindow
 
 KEY = QKeySequence.StandardKey
 Keys = str | QKeySequence.StandardKey
@@ -78,7 +81,7 @@ class Command:
         """Return its title, as it is now if it is offered now."""
         return (self.title_now(now) if self.title_now else "") or self.title
 
-    def action(self, window: Any) -> QAction:
+    def action(self, window: MainWindow) -> QAction:
         """Return an action that does it; `show` keeps it up to date."""
         act = QAction(self.title, window)
         act.setObjectName(self.name)
@@ -210,28 +213,29 @@ def _why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
 # What they do ------------------------------------------------------------------------------
 
 
-def _again(window: Any, step: Callable[[], None], words: str, done: str) -> None:
+def _again(window: MainWindow, step: Callable[[], None], words: str, done: str) -> None:
     """Undo or redo, and say in the status bar what that was."""
     step()
     if words:
         window.say(f"{done}: {words}")
 
 
-def _switch(name: Shown, window: Any) -> None:
+def _switch(name: Shown, window: MainWindow) -> None:
     drawn = window.store.session.view.drawn
     window.store.change(changes.set_view, **{name: name not in drawn})
 
 
-def _show_all(window: Any) -> None:
+def _show_all(window: MainWindow) -> None:
     window.store.change(changes.show, window.store.session.mesh.marker_names)
 
 
-def _add_section(kind: str, window: Any) -> None:
+def _add_section(kind: str, window: MainWindow) -> None:
     window.docks_.lead_to("sections")
-    window.docks_.panels["sections"].add[kind].click()
+    panel: Any = window.docks_.panels["sections"]  # a panel, which commands do not know
+    panel.add[kind].click()
 
 
-def _fill_recent(window: Any, menu: QMenu) -> None:
+def _fill_recent(window: MainWindow, menu: QMenu) -> None:
     menu.clear()
     for path in window.files.recent():
         act = menu.addAction(str(path))
@@ -240,7 +244,7 @@ def _fill_recent(window: Any, menu: QMenu) -> None:
         menu.addAction("(none yet)").setEnabled(False)
 
 
-def _fill_samples(window: Any, menu: QMenu) -> None:
+def _fill_samples(window: MainWindow, menu: QMenu) -> None:
     for name, text in window.files.samples.items():
         act = menu.addAction(f"{name}: {text}")
         act.setStatusTip(menu.menuAction().statusTip())
@@ -248,7 +252,7 @@ def _fill_samples(window: Any, menu: QMenu) -> None:
     menu.addSeparator()
 
 
-def _fill_panels(window: Any, menu: QMenu) -> None:
+def _fill_panels(window: MainWindow, menu: QMenu) -> None:
     for dock in window.docks.values():
         act = dock.toggleViewAction()
         act.setStatusTip(f"Show or hide the panel {dock.windowTitle()}.")

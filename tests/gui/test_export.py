@@ -589,14 +589,14 @@ def test_shortcuts_are_those_of_the_actions_and_can_be_found(opened):
     assert {("Run", "F5"), ("Copy picture", "Ctrl+Shift+C"), ("Undo", "Ctrl+Z")} <= said
     keys = {row.text(1) for row in rows}
     assert {one.shortcut().toString() for one in window.actions_.by_name.values()} - {""} <= keys
-    dialog.find.setText("whole mesh fill")
+    dialog.search.setText("whole mesh fill")
     assert [row.text(0) for row in rows if not row.isHidden()] == ["Fit all"]
 
 
 def test_case_keys_can_be_searched(opened):
     opened.window.actions_.by_name["case_keys"].trigger()
     dialog = opened.window.help._shown["keys"]
-    dialog.find.setText("periodic_mode")
+    dialog.search.setText("periodic_mode")
     assert dialog.text.textCursor().selectedText().lower() == "periodic_mode"
     assert dialog.count.text() != "0 found"
     first = dialog.text.textCursor().position()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 
 from qtpy.QtCore import QObject, QSize, Qt
 from qtpy.QtGui import QFontDatabase, QKeySequence, QTextCursor, QTextDocument
@@ -24,6 +25,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui.commands import MENUS, Now
 from slideviz.gui.widgets.faults import versions
 from slideviz.gui.widgets.icons import logo
+from slideviz.gui.widgets.services import Services
 
 LOG_LINES = 40
 MOUSE = (
@@ -46,7 +48,7 @@ MOUSE = (
 class Help(QObject):
     """The help of a window."""
 
-    def __init__(self, window) -> None:
+    def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.window = window
         self._shown: dict[str, QDialog] = {}
@@ -70,7 +72,7 @@ class Help(QObject):
         QApplication.clipboard().setText(details(self.window))
         self.window.say("Copied; paste it into the report and say what you did")
 
-    def _show(self, name: str, make) -> None:
+    def _show(self, name: str, make: Callable[[], QDialog]) -> None:
         dialog = self._shown.get(name)
         if dialog is None:
             dialog = self._shown[name] = make()
@@ -82,16 +84,16 @@ class Help(QObject):
 class ShortcutsDialog(QDialog):
     """Every action with its keys, by menu, and the mouse; a field finds some."""
 
-    def __init__(self, window) -> None:
+    def __init__(self, window: Services) -> None:
         super().__init__(window)
         self.setWindowTitle("Keyboard and mouse")
         self.resize(1060, 700)
         column = QVBoxLayout(self)
-        self.find = QLineEdit()
-        self.find.setPlaceholderText("Find an action or a key")
-        self.find.setClearButtonEnabled(True)
-        self.find.textChanged.connect(self._filter)
-        column.addWidget(self.find)
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Find an action or a key")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(self._filter)
+        column.addWidget(self.search)
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
         self.tree.setRootIsDecorated(False)
@@ -107,7 +109,7 @@ class ShortcutsDialog(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)
         column.addWidget(buttons)
-        self.find.setFocus()
+        self.search.setFocus()
 
     def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
         top = QTreeWidgetItem(self.tree, [title])
@@ -141,12 +143,12 @@ class TextDialog(QDialog):
         self.setWindowTitle(title)
         self.resize(860, 640)
         column, row = QVBoxLayout(self), QHBoxLayout()
-        self.find = QLineEdit()
-        self.find.setPlaceholderText("Find (Enter: the next one)")
-        self.find.setClearButtonEnabled(True)
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Find (Enter: the next one)")
+        self.search.setClearButtonEnabled(True)
         self.count = QLabel()
         self.count.setProperty("hint", True)
-        row.addWidget(self.find, 1)
+        row.addWidget(self.search, 1)
         row.addWidget(self.count)
         column.addLayout(row)
         self.text = QPlainTextEdit(text)
@@ -159,9 +161,9 @@ class TextDialog(QDialog):
         buttons.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         buttons.rejected.connect(self.reject)
         column.addWidget(buttons)
-        self.find.textChanged.connect(self._typed)
-        self.find.returnPressed.connect(self.next)
-        self.find.setFocus()
+        self.search.textChanged.connect(self._typed)
+        self.search.returnPressed.connect(self.next)
+        self.search.setFocus()
 
     def _typed(self, wanted: str) -> None:
         self.text.moveCursor(QTextCursor.MoveOperation.Start)
@@ -171,7 +173,7 @@ class TextDialog(QDialog):
 
     def next(self) -> None:
         """Go to the next place where the words are; from the end on at the beginning."""
-        wanted = self.find.text()
+        wanted = self.search.text()
         if wanted and not self.text.find(wanted, QTextDocument.FindFlag(0)):
             self.text.moveCursor(QTextCursor.MoveOperation.Start)
             self.text.find(wanted, QTextDocument.FindFlag(0))
@@ -210,7 +212,7 @@ class AboutDialog(QDialog):
         column.addWidget(buttons)
 
 
-def shortcut_rows(window) -> list[tuple[str, list[tuple[str, str, str]]]]:
+def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
     """Return for each menu the commands that have keys: title, keys, what they do."""
     # What would be undone just now is not told.
     now, native = Now(window.store.session), QKeySequence.SequenceFormat.NativeText
@@ -229,7 +231,7 @@ def _plain(title: str) -> str:
     return title.replace("&", "").rstrip("…")
 
 
-def details(window) -> str:
+def details(window: Services) -> str:
     """Return what a bug report needs: versions, graphics, mesh, settings, the last messages."""
     session = window.store.session
     lines = [versions(), _graphics(window)]
@@ -244,12 +246,14 @@ def details(window) -> str:
             f"sliding {case.sliding}, periodic {case.periodic}, steps {case.steps or 'automatic'}",
             f"runs: {len(session.runs)}, steps shown: {max(len(session.frames) - 1, 0)}",
         ]
-    messages = window.docks_.panels["log"].toPlainText().splitlines()[-LOG_LINES:]
+    log = window.docks_.panels["log"]
+    assert isinstance(log, QPlainTextEdit)
+    messages = log.toPlainText().splitlines()[-LOG_LINES:]
     return "\n".join([*lines, "", "last messages:", *(messages or ["(none)"]), ""])
 
 
-def _graphics(window) -> str:
+def _graphics(window: Services) -> str:
     """Return who draws, as OpenGL tells it."""
-    said = window.view.render_window.ReportCapabilities().splitlines()
+    said = window.viewing.view.render_window.ReportCapabilities().splitlines()
     kept = [" ".join(line.split()) for line in said if line.startswith("OpenGL")]
     return "\n".join(kept[:3]) or "OpenGL: not known yet"
