@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.shots_wait import settle
+from slideviz.gui.shots_states import settle
 from slideviz.mesh.io.cleanup import draft, ended
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks
 from slideviz.gui.files import Files
 from slideviz.gui.panels.boundaries import BoundariesPanel
-from slideviz.gui.panels.intersection_check import ClashWatch
+from slideviz.gui.panels.intersection_check import IntersectionCheck
 from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
@@ -100,7 +100,7 @@ class MainWindow(Services):
         self._restore()
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
-        self.clash_watch = ClashWatch(self.store, self)
+        self.clash_watch = IntersectionCheck(self.store, self)
         self.warm_up = WarmUp(self)
         self.warm_up.compiling.connect(self.preparing.setVisible)
         self._keep_session(kept)

@@ -31,7 +31,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui import shots, shots_states
-from slideviz.gui.shots_wait import settle
+from slideviz.gui.shots_states import settle
 from slideviz.gui.widgets import questions
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
@@ -251,7 +251,7 @@ def answered(desk: Desk) -> Iterator[None]:
 
 def keep_dialog(desk: Desk, dialog: QDialog) -> None:
     """Write down the words of a dialog, and keep its picture if it has fields."""
-    from slideviz.gui.shots_wait import wait
+    from slideviz.gui.shots_states import wait
 
     if isinstance(dialog, QMessageBox):
         desk.say(f"message {dialog.windowTitle()} | {dialog.text()} | {dialog.informativeText()}")

@@ -6,8 +6,8 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.handle import PlaneHandle
-from slideviz.gui.viewport.handle_round import RoundHandle
+from slideviz.gui.viewport.axis_handle import RoundHandle
+from slideviz.gui.viewport.plane_handle import PlaneHandle
 from slideviz.samples.table import write_sample
 from slideviz.scene.pick import to_display
 from slideviz.session import changes

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.viewport.cutting import place_for
 from slideviz.gui.viewport.flats import stack
-from slideviz.gui.viewport.handle import PlaneHandle
+from slideviz.gui.viewport.plane_handle import PlaneHandle
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.samples.table import write_sample

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from slideviz.errors import SlidevizError
-from slideviz.gui import shots, shots_states, shots_wait
+from slideviz.gui import shots, shots_states
 
 
 @pytest.fixture(autouse=True)
@@ -124,9 +124,9 @@ def test_a_picture_that_cannot_be_written(window, tmp_path):
 
 
 def test_what_never_gets_ready(qapp, monkeypatch):
-    monkeypatch.setattr(shots_wait, "PATIENCE", 0.05)
+    monkeypatch.setattr(shots_states, "PATIENCE", 0.05)
     with pytest.raises(SlidevizError, match="the window did not get ready within 0 s"):
-        shots_wait.wait(lambda: False)
+        shots_states.wait(lambda: False)
 
 
 def test_no_display_and_no_xvfb(monkeypatch):

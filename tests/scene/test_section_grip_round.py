@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slideviz.scene.cylinder_handle import (
+from slideviz.scene.axis_handle import (
     frame_of,
     patch_in,
     pull,

@@ -14,7 +14,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionStyle, Shown, laid_flat, section_picture
-from slideviz.scene.cylinder_handle import frame_of, pulled_size
+from slideviz.scene.axis_handle import frame_of, pulled_size
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.cut import Cutter

@@ -16,7 +16,7 @@ from slideviz.session.store import Store
 log = logging.getLogger("slideviz")
 
 
-class ClashWatch(QObject):
+class IntersectionCheck(QObject):
     """Keeps ``Session.clash`` up to date; what was found last stays until the next is known."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:

@@ -20,8 +20,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.case.motion_words import direction_words, target_words
-from slideviz.gui.panels.motion_form import ABOUT, MotionForm
-from slideviz.gui.panels.motion_kinds import new_motion
+from slideviz.gui.panels.motion_form import ABOUT, MotionForm, new_motion
 from slideviz.session.motions import Axis, radial
 
 Z = (0.0, 0.0, 1.0)

@@ -29,7 +29,7 @@ from slideviz.color_scheme import Look
 from slideviz.errors import SlidevizError
 from slideviz.gui.dialogs.motion_table import ask_table
 from slideviz.gui.panels.motion_editor import MotionEditor
-from slideviz.gui.panels.motion_kinds import KINDS, new_motion
+from slideviz.gui.panels.motion_form import KINDS, new_motion
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.icons import icon

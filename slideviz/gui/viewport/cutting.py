@@ -14,7 +14,7 @@ from slideviz.gui.viewport.section_curve import CurveView
 from slideviz.gui.viewport.unrolled import FlatView
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.mesh.model import Mesh
-from slideviz.scene.cylinder_handle import points_near
+from slideviz.scene.axis_handle import points_near
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
 from slideviz.session import changes

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.color_scheme import Look
+from slideviz.gui.viewport.axis_handle import RoundHandle
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.handle import Bounds, PlaneHandle
-from slideviz.gui.viewport.handle_flat import FlatHandle
-from slideviz.gui.viewport.handle_round import RoundHandle
+from slideviz.gui.viewport.line_handle import FlatHandle
+from slideviz.gui.viewport.plane_handle import Bounds, PlaneHandle
 from slideviz.mesh.model import Mesh
-from slideviz.scene.cylinder_handle import patch_in
+from slideviz.scene.axis_handle import patch_in
 from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section, Triple
 

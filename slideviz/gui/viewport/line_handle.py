@@ -11,8 +11,8 @@ from qtpy.QtCore import QPoint
 
 from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.handle import HANDLE_COLOUR
-from slideviz.gui.viewport.pulled import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, Pulled
+from slideviz.gui.viewport.mouse_handle import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, MouseHandle
+from slideviz.gui.viewport.plane_handle import HANDLE_COLOUR
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, nearest
@@ -22,13 +22,13 @@ from slideviz.sections.model import Section
 NAMES = ("handle:rim", "handle:points", "handle:held")
 
 
-class FlatHandle(Pulled[tuple[Section, Box]]):
+class FlatHandle(MouseHandle[tuple[Section, Box]]):
     """Points on a line or circle that the mouse moves it by.
 
     Parameters
     ----------
     view, *others
-        As for `slideviz.gui.viewport.pulled.Pulled`.
+        As for `slideviz.gui.viewport.mouse_handle.MouseHandle`.
     """
 
     def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:

@@ -24,7 +24,7 @@ Grasp = TypeVar("Grasp")
 """What was when the mouse took it, the section first."""
 
 
-class Pulled(QObject, Generic[Grasp]):
+class MouseHandle(QObject, Generic[Grasp]):
     """A handle of a section in a view; who draws it says what the mouse takes and does.
 
     Parameters
