@@ -53,6 +53,7 @@ def weighted_means(
     sources: FloatArray,
     values: FloatArray,
     weights: FloatArray,
+    *,
     power: float,
     tick: Tick = no_tick,
 ) -> FloatArray:
@@ -151,8 +152,8 @@ def _at(
             features[:, nodes],
             values,
             own,
-            weights.power,
-            tick,
+            power=weights.power,
+            tick=tick,
         )
 
 

@@ -68,13 +68,13 @@ def alikeness(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
 def prescribed(
     case: Case,
     mesh: Mesh,
+    moved: Displacements,
+    alike: float,
     *,
-    frame: Frame,
     boundary: Boundary,
     fans: Fans,
     classes: Classes,
-    moved: Displacements,
-    alike: float,
+    frame: Frame,
 ) -> tuple[IntArray, FloatArray, tuple[str, ...]]:
     """Return the known nodes, their displacement in the frame, and warnings.
 

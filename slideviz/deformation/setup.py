@@ -162,23 +162,16 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
     pairs, frame, stands = find_period(case, mesh, boundary)
     beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
     coords = frame.coords(mesh.points)
-    free = case.periodic in ("fixed", "moving")
-    classes = find_classes(case, mesh, boundary, fans, frame, stands)
-    classes = replace(classes, beyond=beyond)
+    classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    moved, alike = displaced(asked, mesh), alikeness(case, mesh, pairs)
     known, target, warnings = prescribed(
-        case,
-        mesh,
-        frame=frame,
-        boundary=boundary,
-        fans=fans,
-        classes=classes,
-        moved=displaced(asked, mesh),
-        alike=alikeness(case, mesh, pairs),
+        case, mesh, moved, alike, boundary=boundary, fans=fans, classes=classes, frame=frame
     )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     reduction = _reduction(case, mesh.extent)
+    loose = _loose(case, reduction, largest, mesh.extent)
     tracks = find_tracks(
         boundary,
         fans,
@@ -186,18 +179,16 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
         lambda nodes: corners_of(coords, nodes, axis),
         roles=case.roles,
         feature_angle_deg=case.feature_angle_deg,
-        shift=frame.shift() if free and pairs else None,
+        shift=frame.shift() if case.periodic in ("fixed", "moving") and pairs else None,
         reach=REACH * largest,
     )
     second = np.flatnonzero(stands != np.arange(len(stands)))
     images = np.stack([stands[second], second], axis=1)
+    angle = frame.period if frame.cylindrical else 0.0
+    basis = Basis(case.influence_factor * mesh.extent, angle, case.kernel)
     return Setup(
         frame=frame,
-        basis=Basis(
-            case.influence_factor * mesh.extent,
-            frame.period if frame.cylindrical else 0.0,
-            case.kernel,
-        ),
+        basis=basis,
         coords=coords,
         classes=classes,
         known=known,
@@ -213,13 +204,7 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
         pairs=pairs,
         solve=_method(case, without_halo(mesh)[0], frame, axis),
         halo=mesh.halo,
-        warnings=(
-            *mesh.remarks,
-            *notes,
-            *warnings,
-            *_loose(case, reduction, largest, mesh.extent),
-            *idle_settings(case),
-        ),
+        warnings=(*mesh.remarks, *notes, *warnings, *loose, *idle_settings(case)),
     )
 
 

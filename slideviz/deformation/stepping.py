@@ -201,16 +201,16 @@ class Stepping:
     ) -> Step:
         setup = self.setup
         return Step(
-            index,
-            total,
-            self.mesh.with_points(points),
-            solution.control_nodes,
-            solution.max_error,
-            solution.condition,
-            setup.classes.counts(),
-            watch.seconds,
-            tuple(warnings),
-            solution.history,
+            index=index,
+            total=total,
+            mesh=self.mesh.with_points(points),
+            control_nodes=solution.control_nodes,
+            max_error=solution.max_error,
+            condition=solution.condition,
+            node_counts=setup.classes.counts(),
+            seconds=watch.seconds,
+            warnings=tuple(warnings),
+            history=solution.history,
             control=solution.control,
             periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
         )

@@ -202,15 +202,15 @@ def _match_kind(
     one_to_one &= kind == "rotational" or not len(np.intersect1d(a, b))
     trivial = max(float(np.linalg.norm(vector)) / mesh.extent, abs(angle)) <= 10 * TOLERANCE
     pair = Pair(
-        first,
-        second,
-        "translational" if kind == "translational" else "rotational",
-        frozen_array(vector, np.float64),
-        angle,
-        tuple(float(v) for v in axis),  # type: ignore[arg-type]
-        tuple(float(v) for v in origin),  # type: ignore[arg-type]
-        frozen_array(np.stack([a, b[partner]], axis=1), np.int64),
-        float(distance.max()),
+        first=first,
+        second=second,
+        kind="translational" if kind == "translational" else "rotational",
+        vector=frozen_array(vector, np.float64),
+        angle=angle,
+        axis=tuple(float(v) for v in axis),  # type: ignore[arg-type]
+        origin=tuple(float(v) for v in origin),  # type: ignore[arg-type]
+        nodes=frozen_array(np.stack([a, b[partner]], axis=1), np.int64),
+        mismatch=float(distance.max()),
     )
     return pair, float(distance.max()) if one_to_one and not trivial else np.inf
 

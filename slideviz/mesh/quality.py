@@ -204,13 +204,13 @@ def quality(
                 # 1 is the bound of every formula; rounding must not leave the histogram.
                 skew[here] = np.where(good, np.minimum(skew_of(edges, alpha), 1.0), 0.0)
     return Quality(
-        frozen_array(np.sqrt(size) * skew, np.float64),
-        frozen_array(size, np.float64),
-        frozen_array(skew, np.float64),
-        frozen_array(status, np.uint8),
-        frozen_array(signs, np.int8),
-        metric,
-        None if mesh.halo is None else mesh.halo.cells,
+        values=frozen_array(np.sqrt(size) * skew, np.float64),
+        size=frozen_array(size, np.float64),
+        skew=frozen_array(skew, np.float64),
+        status=frozen_array(status, np.uint8),
+        signs=frozen_array(signs, np.int8),
+        metric=metric,
+        halo=None if mesh.halo is None else mesh.halo.cells,
     )
 
 

@@ -276,14 +276,14 @@ def _collect(
     slid, per_node = np.unique(cluster_node, return_counts=True)
     on_surface = (per_node == 1) if dim == 3 else np.zeros(len(slid), bool)
     return Classes(
-        np.flatnonzero(moving),
-        np.flatnonzero(fixed),
-        slid[~on_surface],
-        slid[on_surface],
-        cluster_node,
-        rows[:, 0],
-        np.cumsum(new) - 1,
-        stands,
+        moving=np.flatnonzero(moving),
+        fixed=np.flatnonzero(fixed),
+        edge=slid[~on_surface],
+        surface=slid[on_surface],
+        cluster_node=cluster_node,
+        row_fan=rows[:, 0],
+        row_cluster=np.cumsum(new) - 1,
+        stands=stands,
     )
 
 

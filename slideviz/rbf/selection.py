@@ -96,14 +96,11 @@ def newton(
         What remains of the pool's matrix after the nodes chosen before, block after block.
     residual : (p, m)
         Of all rows of the pool, those of a block together, p the sum of all p_k.
-    nodes : (p,)
-        The node of each row; all rows of a node are picked together.
-    factor : (p,)
-        What the error of each row is multiplied with, to decide between equal ones (`favour`).
-    count
-        Number of nodes to pick.
-    floor
-        The error below which to stop (the first node is always taken).
+    nodes, factor : (p,), (p,)
+        The node of each row; all rows of a node are picked together. And what its error is
+        multiplied with, to decide between equal ones (`favour`).
+    count, floor
+        Number of nodes, and the error below which to stop (the first is always taken).
 
     Returns
     -------

@@ -161,7 +161,17 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> Counts:
     below = (size - beside) // 2
     nose, tail = round(beside * shares.nose), round(beside * shares.tail)
     above = size - beside - below
-    return Counts(ahead, along, behind, below, beside, above, layers, nose, tail)
+    return Counts(
+        ahead=ahead,
+        along=along,
+        behind=behind,
+        below=below,
+        beside=beside,
+        above=above,
+        layers=layers,
+        nose=nose,
+        tail=tail,
+    )
 
 
 def channel_numbers(n: Counts) -> IntArray:

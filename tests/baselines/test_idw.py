@@ -50,7 +50,7 @@ def test_the_compiled_means_are_the_literal_ones(dim, power):
     targets, sources = cloud(30, dim), cloud(20, dim, 1)
     values = np.random.default_rng(2).normal(size=(20, dim))
     weights = np.random.default_rng(3).uniform(0.5, 4.0, 20)
-    found = weighted_means(Basis(2.5), targets.T, sources.T, values, weights, power)
+    found = weighted_means(Basis(2.5), targets.T, sources.T, values, weights, power=power)
     wanted = weighting.means(targets, sources, values, power, weights)
     np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-13)
 
@@ -66,7 +66,7 @@ def test_periodic_distances_are_those_of_the_frame(dim, kind):
     values, ones = np.random.default_rng(2).normal(size=(15, dim)), np.ones(15)
     features = [frame.features(frame.coords(p)) for p in (targets, sources)]
     basis = Basis(2.5, frame.period if frame.cylindrical else 0.0)
-    found = weighted_means(basis, *features, values, ones, 3.0)
+    found = weighted_means(basis, *features, values, ones, power=3.0)
     if kind == "translational":
         wanted = weighting.means(
             targets, sources, values, 3.0, distance=radial.translational(1.3, 1)
@@ -80,7 +80,7 @@ def test_periodic_distances_are_those_of_the_frame(dim, kind):
 def test_a_source_has_its_value_even_beside_a_near_one():
     sources = np.array([[0.5, 0.5], [0.5 + 1e-7, 0.5], [0.9, 0.1]])
     values = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
-    found = weighted_means(Basis(1.0), sources.T, sources.T, values, np.ones(3), 2.0)
+    found = weighted_means(Basis(1.0), sources.T, sources.T, values, np.ones(3), power=2.0)
     np.testing.assert_allclose(found, values, rtol=1e-9)
 
 
@@ -88,9 +88,9 @@ def test_chunks_and_progress_do_not_change_the_result(monkeypatch):
     targets, sources = cloud(101, 3), cloud(7, 3, 1)
     data = np.random.default_rng(2).normal(size=(7, 3)), np.ones(7)
     heard = []
-    whole = weighted_means(Basis(1.0), targets.T, sources.T, *data, 3.0)
+    whole = weighted_means(Basis(1.0), targets.T, sources.T, *data, power=3.0)
     monkeypatch.setattr("slideviz.baselines.idw.CHUNK", 70)
-    parts = weighted_means(Basis(1.0), targets.T, sources.T, *data, 3.0, heard.append)
+    parts = weighted_means(Basis(1.0), targets.T, sources.T, *data, power=3.0, tick=heard.append)
     np.testing.assert_array_equal(whole, parts)
     assert heard == sorted(heard)
     assert len(heard) == 11

@@ -183,7 +183,15 @@ class _Walk:
         self.rows.none(heads["NMARK"])
         markers, sends, kept = self._walk()
         self._check_markers(heads["NMARK"], markers, len(sends))
-        return Zone(self.bounds, dim, elements, points, markers, sends, kept)
+        return Zone(
+            bounds=self.bounds,
+            dim=dim,
+            elements=elements,
+            points=points,
+            markers=markers,
+            sends=sends,
+            kept=kept,
+        )
 
     def _only(self, key: str) -> Section:
         """Return the section of that key, which must stand once."""
