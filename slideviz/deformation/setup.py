@@ -45,7 +45,7 @@ REACH = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """Everything that stays the same over the steps.
+    """The arrays of a deformation, made of case and mesh, that stay the same over its steps.
 
     Attributes
     ----------

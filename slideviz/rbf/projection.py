@@ -28,7 +28,7 @@ Place = Callable[[IntArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """All tracks, and which one each sliding node is on.
+    """The tracks, curves and surfaces on which nodes slide, and the one of each sliding node.
 
     Attributes
     ----------

@@ -90,7 +90,7 @@ def _spread(curve: FloatArray, edges: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Shares:
-    """Numbers of cells for 36 along the inflow, and how the O-grid is turned against the hole.
+    """Shares of the cells (as for 36 along the inflow), and how the O-grid is turned in its hole.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ PASSAGE_SHARES = Shares()
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of cells.
+    """Numbers of cells of the channel and of the O-grid around the blade.
 
     Attributes
     ----------

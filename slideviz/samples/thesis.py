@@ -97,7 +97,7 @@ def _polar_shift(points: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Layout:
-    """Which nodes and cells of an n x n (x n) grid there are.
+    """The nodes and cells of an n x n (x n) grid with a block taken out.
 
     Attributes
     ----------

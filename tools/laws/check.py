@@ -42,7 +42,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one seed.
+    """The result of one seed: how its run ended, and the laws that it breaks.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a maker of meshes knows of its mesh."""
+"""A random mesh with what its maker knows of it: bodies, sides and periods."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def is_alive(pid: str) -> bool:
 
 
 def _owned(pid: int | str) -> str:
-    """Return what the names of a process's drafts begin with."""
+    """Return the beginning of the names of a process's drafts."""
     return f"{PREFIX}{_machine()}-{pid}-"
 
 
