@@ -243,5 +243,8 @@ def describe_keys() -> str:
                 lines += textwrap.wrap(
                     key.meaning, 90, initial_indent="      ", subsequent_indent="      "
                 )
-                lines += [f"        {line}" for line in key.kind.details]
+                for line in key.kind.details:
+                    lines += textwrap.wrap(
+                        line, 100, initial_indent="        ", subsequent_indent="            "
+                    )
     return "\n".join(lines)
