@@ -70,8 +70,8 @@ def test_another_number_at_an_axis_is_found():
 @pytest.mark.parametrize(
     ("folder", "name", "box", "what"),
     [
-        ("pictures", "passage", (425, 68, 440, 250), "the colour bar"),
-        ("pictures", "passage", (440, 124, 458, 134), "a number beside it"),
+        ("pictures", "passage", (413, 62, 428, 249), "the colour bar"),
+        ("pictures", "passage", (431, 134, 451, 144), "a number beside it"),
         ("pictures", "passage", (10, 6, 240, 14), "the title"),
         ("pictures", "inverted", (425, 240, 440, 250), "the box for inverted cells"),
         ("sections", "line_curve", (130, 145, 145, 151), "some cells of a section"),
