@@ -248,10 +248,10 @@ def test_motions_are_pasted_from_a_case_file(opened):
 
 def test_the_menu_of_the_motions_offers_what_can_be_done(opened):
     panel = opened.window.motions
-    able = {name: act.isEnabled() for name, act in panel.menu_actions.items()}
+    able = {name: act.isEnabled() for name, act in panel.actions_.items()}
     assert able == dict.fromkeys(able, False) | {"paste": True}
     opened.window.store.change(changes.set_case, motions=(Translate("airfoil", (0.1, 0.0)),) * 2)
     panel.list.setCurrentRow(0)
-    able = {name for name, act in panel.menu_actions.items() if act.isEnabled()}
+    able = {name for name, act in panel.actions_.items() if act.isEnabled()}
     assert able == {"duplicate", "copy", "paste", "later", "remove"}
     assert [act.text() for act in panel.list.actions()][:3] == ["Duplicate", "Copy", "Paste"]

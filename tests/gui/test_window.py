@@ -364,14 +364,14 @@ def test_motions_are_reordered_changed_and_removed(opened):
     opened.add_motion(Translate)
     opened.add_motion(Rotate)
     assert panel.list.currentRow() == 1
-    opened.click(panel.up)
+    opened.click(panel.buttons["up"])
     assert [type(motion) for motion in opened.session.case.motions] == [Rotate, Translate]
     assert panel.list.currentRow() == 0
     opened.choose(panel.editor.kind, Scale)
     assert [type(motion) for motion in opened.session.case.motions] == [Scale, Translate]
-    opened.click(panel.remove)
+    opened.click(panel.buttons["remove"])
     assert [type(motion) for motion in opened.session.case.motions] == [Translate]
-    opened.click(panel.remove)
+    opened.click(panel.buttons["remove"])
     assert not opened.session.case.motions
     assert not panel.editor.isVisible()
 

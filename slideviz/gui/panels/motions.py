@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -67,7 +67,8 @@ class MotionPanel(QWidget):
         self.list.setAlternatingRowColors(True)
         elide_items(self.list)
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
-        self._make_menu()
+        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self.list.addActions(list(self.actions_.values()))
         layout.addWidget(self.list, 4)
         self.editor = MotionEditor()
         self.editor.changed.connect(self._edited)
@@ -101,47 +102,41 @@ class MotionPanel(QWidget):
         self.add.setMenu(menu)
         row.addWidget(self.add)
         row.addStretch(1)
-        self.up, self.down, self.remove = (
-            self._button("up", "Perform it earlier", lambda: self._move(-1)),
-            self._button("down", "Perform it later", lambda: self._move(1)),
-            self._button("remove", "Remove the motion (Del)", self._remove),
-        )
-        for button in (self.up, self.down, self.remove):
+        for button in self._make_actions():
             row.addWidget(button)
         return row
 
-    def _make_menu(self) -> None:
-        """Give the list its menu; the keys of it work while the list has the focus."""
-        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self.menu_actions: dict[str, QAction] = {}
-        for name, text, keys, function in (
-            ("duplicate", "Duplicate", "Ctrl+D", self._duplicate),
-            ("copy", "Copy", "Ctrl+C", self._copy),
-            ("paste", "Paste", "Ctrl+V", self._paste),
-            ("earlier", "Perform it earlier", "Ctrl+Up", lambda: self._move(-1)),
-            ("later", "Perform it later", "Ctrl+Down", lambda: self._move(1)),
-            ("remove", "Remove", "Del", self._remove),
+    def _make_actions(self) -> Iterator[QToolButton]:
+        """Make what the menu of the list offers, and yield buttons of what has an icon."""
+        self.actions_: dict[str, QAction] = {}
+        self.buttons: dict[str, QToolButton] = {}
+        for name, text, keys, function, image, tip in (
+            ("duplicate", "Duplicate", "Ctrl+D", self._duplicate, "", ""),
+            ("copy", "Copy", "Ctrl+C", self._copy, "", ""),
+            ("paste", "Paste", "Ctrl+V", self._paste, "", ""),
+            ("earlier", "Perform it earlier", "Ctrl+Up", lambda: self._move(-1), "up", ""),
+            ("later", "Perform it later", "Ctrl+Down", lambda: self._move(1), "down", ""),
+            ("remove", "Remove", "Del", self._remove, "remove", "Remove the motion (Del)"),
         ):
-            act = QAction(text, self.list)
+            act = self.actions_[name] = QAction(text, self)
             act.setShortcut(QKeySequence(keys))
+            # The keys work while the list has the focus.
             act.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
             act.triggered.connect(lambda _=False, function=function: function())
-            self.menu_actions[name] = act
-            self.list.addAction(act)
-
-    def _button(self, name: str, tip: str, function: Callable[[], object]) -> QToolButton:
-        button = QToolButton()
-        button.setObjectName(f"motion_{name}")
-        button.setIcon(icon(name))
-        button.setToolTip(tip)
-        button.clicked.connect(function)
-        return button
+            if image:
+                button = self.buttons[image] = QToolButton()
+                button.setObjectName(f"motion_{image}")
+                button.setIcon(icon(image))
+                button.setToolTip(tip or text)
+                button.clicked.connect(act.trigger)
+                act.enabledChanged.connect(button.setEnabled)
+                yield button
 
     def take_theme(self, _look: Look, colour: str) -> None:
         """Redraw the icons in another colour."""
         self.add.setIcon(icon("add", colour))
-        for button, name in ((self.up, "up"), (self.down, "down"), (self.remove, "remove")):
-            button.setIcon(icon(name, colour))
+        for image, button in self.buttons.items():
+            button.setIcon(icon(image, colour))
 
     # State to widgets ------------------------------------------------------------------
 
@@ -192,14 +187,15 @@ class MotionPanel(QWidget):
 
     def _sync_buttons(self, session: Session, moving: tuple[str, ...]) -> None:
         row, count = self.list.currentRow(), self.list.count()
-        self.up.setEnabled(row > 0)
-        self.down.setEnabled(0 <= row < count - 1)
-        self.remove.setEnabled(row >= 0)
-        for name, button in (("earlier", self.up), ("later", self.down), ("remove", self.remove)):
-            self.menu_actions[name].setEnabled(button.isEnabled())
-        for name in ("duplicate", "copy"):
-            self.menu_actions[name].setEnabled(row >= 0)
-        self.menu_actions["paste"].setEnabled(bool(moving))
+        for name, able in (
+            ("duplicate", row >= 0),
+            ("copy", row >= 0),
+            ("paste", bool(moving)),
+            ("earlier", row > 0),
+            ("later", 0 <= row < count - 1),
+            ("remove", row >= 0),
+        ):
+            self.actions_[name].setEnabled(able)
         self.add.setEnabled(bool(moving))
         if session.mesh is None:
             why = "Open a mesh first."
