@@ -1,0 +1,36 @@
+"""The table of commands: complete, in words, and no key twice."""
+
+import pytest
+from qtpy.QtGui import QKeySequence
+
+from slideviz.gui.commands import COMMANDS, MENUS, Now
+from slideviz.gui.widgets.icons import STROKES
+from slideviz.session import changes
+from slideviz.session.state import Session
+from slideviz.terms import SHOWN
+
+EVERY = [one for menu in MENUS for one in menu.commands()]
+
+
+def test_no_name_and_no_key_stands_for_two_commands(qtbot):
+    assert len(COMMANDS) == len(EVERY)
+    keys = [QKeySequence(keys).toString() for one in EVERY for keys in (*one.keys, one.button_key)]
+    keys = [text for text in keys if text]
+    assert len(set(keys)) == len(keys)
+
+
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_each_command_says_what_it_does_and_has_the_icon_it_names(one):
+    assert one.tip.endswith(".")
+    assert len(one.tip.split()) >= 3
+    assert one.image in {"", *STROKES}
+    assert one.called(Now(Session()))
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_each_toggle_of_the_view_is_a_command_that_says_whether_it_is_on(session, name):
+    assert COMMANDS[name].checked(Now(session)) == SHOWN[name].at_first
+    switched = changes.set_view(session, **{name: not SHOWN[name].at_first})
+    assert COMMANDS[name].checked(Now(switched)) != SHOWN[name].at_first
+    assert COMMANDS[name].enabled(Now(session)) == (not SHOWN[name].not_in_2d)
+    assert not COMMANDS[name].enabled(Now(Session()))
