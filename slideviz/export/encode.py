@@ -10,7 +10,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -122,7 +122,7 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
             except OSError:
                 _raise_ffmpeg(file, process, log)
 
-        with ended(process):
+        with closed(pipe), ended(process):
             yield add
             try:
                 pipe.close()
@@ -130,6 +130,16 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
                 _raise_ffmpeg(file, process, log)
             if process.wait():
                 _raise_ffmpeg(file, process, log)
+
+
+@contextmanager
+def closed(pipe: IO[bytes]) -> Iterator[None]:
+    """Close a pipe at the end; what is still in it is lost where nobody reads it any more."""
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            pipe.close()
 
 
 def _start_ffmpeg(
