@@ -48,7 +48,7 @@ def offscreen(size: tuple[int, int]) -> Iterator[Any]:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     plotter = pv.Plotter(off_screen=True, window_size=list(size))
     try:
-        plotter.set_background("white")
+        plotter.set_background("white")  # type: ignore[arg-type]  # the decorator loses self
         plotter.enable_anti_aliasing("msaa", multi_samples=8)
         yield plotter
     finally:

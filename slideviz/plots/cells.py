@@ -80,7 +80,7 @@ def draw_cells(
         shaded = np.array(shapes.get_facecolor())
         shaded[:, :3] *= (_AMBIENT + (1.0 - _AMBIENT) * facing)[:, None]
         shapes.set_array(None)
-        shapes.set_facecolor(shaded)
+        shapes.set_facecolor(shaded)  # type: ignore[arg-type]  # an array is taken, too
     shapes.set_joinstyle("round")
     # Moved to whole pixels, each by its own line's width, neighbours would not meet.
     shapes.set_snap(False)

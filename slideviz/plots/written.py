@@ -94,7 +94,7 @@ def figure_bytes(figure: Any, kind: str, dpi: float = 300.0, transparent: bool =
 
     data = BytesIO()
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with rc_context(SETTINGS):
+    with rc_context(SETTINGS):  # type: ignore[arg-type]  # keys are names
         figure.savefig(data, format=kind, dpi=dpi, metadata=metadata, transparent=transparent)
     return data.getvalue()
 

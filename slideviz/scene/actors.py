@@ -84,7 +84,7 @@ def part_shape(mesh: Mesh, cells: IntArray) -> Any:
     """
     offsets, corners, nodes = _corners_of(mesh, cells)
     points = lifted(mesh.points[nodes], 0.0)
-    table = pv.CellArray.from_arrays(offsets, corners)
+    table = pv.CellArray.from_arrays(offsets, corners)  # type: ignore[arg-type]
     if mesh.dim == 2 or not len(cells):
         shape = pv.PolyData()
         shape.points = points

@@ -69,7 +69,7 @@ def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
     """Return polygons, or lines, as PolyData with room for the numbers of their cells."""
     shape = pv.PolyData()
     shape.points = polygons.points + np.array([0.0, 0.0, lift])
-    table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)
+    table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)  # type: ignore[arg-type]
     if len(polygons) and polygons.sizes.max() == 2:
         shape.SetLines(table)
     else:

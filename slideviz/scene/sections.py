@@ -272,5 +272,5 @@ def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:
     offsets = np.concatenate([[0], np.cumsum(sizes)])
     shape = pv.PolyData()
     shape.points = np.column_stack([points, np.full(len(points), lift)])
-    shape.SetLines(pv.CellArray.from_arrays(offsets, np.arange(len(points))))
+    shape.SetLines(pv.CellArray.from_arrays(offsets, np.arange(len(points))))  # type: ignore[arg-type]
     return shape

@@ -140,7 +140,7 @@ class HandleMark:
         self._shapes = {name: pv.PolyData() for name in (RIM, BALL)}
         self._actors = {name: _overlay(shape) for name, shape in self._shapes.items()}
         for name, actor in self._actors.items():
-            view.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)
+            view.add_actor(actor, name=name, reset_camera=False, render=False, pickable=False)  # type: ignore[arg-type]
         # The ball is drawn after what sets it off.
         self._actors[BALL].SetLayerNumber(1)
         self._placed: tuple[float, ...] = ()
@@ -149,7 +149,7 @@ class HandleMark:
     def remove(self) -> None:
         """Leave the view."""
         for name in (FRAME, RIM, BALL):
-            self.view.remove_actor(name, reset_camera=False, render=False)
+            self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
 
     def colour(self, look: Look, held: bool) -> None:
         """Take the colours of a look, and that of what the mouse holds."""

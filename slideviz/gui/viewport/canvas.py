@@ -133,7 +133,9 @@ class View3D(QtInteractor):
     def set_flat(self, flat: bool) -> None:
         """Choose the mouse for a 2D mesh (drag moves it) or a 3D one (drag turns it)."""
         self.flat = flat
-        self.enable_custom_trackball_style(left="pan" if flat else "rotate", shift_left="pan")
+        self.enable_custom_trackball_style(  # type: ignore[call-arg]  # the decorator loses self
+            left="pan" if flat else "rotate", shift_left="pan"
+        )
 
     # Keys belong to the window's actions, not to VTK's w, s, r, f, p, j, t and 3.
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -48,7 +48,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         """Leave the view for ever."""
         self.view.camera.RemoveObserver(self._watching)
         for name in NAMES:
-            self.view.remove_actor(name, reset_camera=False, render=False)
+            self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
         super().close()
 
     # Drawing ---------------------------------------------------------------------------

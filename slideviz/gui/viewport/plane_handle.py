@@ -60,9 +60,9 @@ class PlaneHandle:
         self._soon.setInterval(0)
         self._soon.timeout.connect(self.tell)
         self._observers = [
-            self.widget.AddObserver("StartInteractionEvent", lambda *_: self._grab(True)),
-            self.widget.AddObserver("InteractionEvent", lambda *_: self._soon.start()),
-            self.widget.AddObserver("EndInteractionEvent", lambda *_: self._grab(False)),
+            self.widget.AddObserver("StartInteractionEvent", lambda *_: self._grab(True)),  # type: ignore[arg-type]
+            self.widget.AddObserver("InteractionEvent", lambda *_: self._soon.start()),  # type: ignore[arg-type]
+            self.widget.AddObserver("EndInteractionEvent", lambda *_: self._grab(False)),  # type: ignore[arg-type]
         ]
 
     def show(self, section: Section, bounds: Bounds, look: Look) -> None:
@@ -90,7 +90,7 @@ class PlaneHandle:
         for observer in self._observers:
             self.widget.RemoveObserver(observer)
         self._observers = []
-        self.widget.SetInteractor(None)
+        self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
 
     def tell(self) -> None:
         """Tell where the plane is now."""
