@@ -86,7 +86,8 @@ def test_a_plane_section_tells_the_numbers_of_its_cells(folder, capsys):
     assert found["section"]["radius"] is None
     assert (found["cells"], found["inverted"], found["passages"]) == (36, 0, 1)
     assert (found["min"], found["mean"]) == pytest.approx((1.0, 1.0))
-    assert Image.open(folder / "x.png").size == (1600, 1000)
+    with Image.open(folder / "x.png") as image:
+        assert image.size == (1600, 1000)
 
 
 def test_numbers_are_those_of_the_cut_cells_against_the_undeformed_mesh(folder, capsys):
@@ -200,7 +201,8 @@ def test_all_kinds_of_pictures(folder, name):
 def test_options_of_the_picture(folder, capsys):
     options = ("--cylinder", "0.7,z", "--whole", "--size", "640x400", "--range", "0.2,0.9")
     assert call(folder, "passage.su2", *options, "--color", "skew") == 0
-    assert Image.open(folder / "x.png").size == (640, 400)
+    with Image.open(folder / "x.png") as image:
+        assert image.size == (640, 400)
     out = capsys.readouterr().out
     assert "passage.su2: cylinder r = 0.7 about z" in out
     assert re.search(r"skew: min \d\.\d{4}, mean \d\.\d{4}; \d+ cells cut, worst is cell \d+", out)

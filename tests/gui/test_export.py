@@ -458,7 +458,7 @@ def test_quality_of_the_step_that_is_shown_as_csv(ran, answers, tmp_path):
     ran.window.store.change(changes.show_frame, 1)
     ran.window.actions_.by_name["export_quality"].trigger()
     ran.settle()
-    rows = list(csv.DictReader(path.open()))
+    rows = list(csv.DictReader(path.read_text().splitlines()))
     frame = ran.session.frames[1]
     mesh = frame.mesh
     assert list(rows[0]) == ["cell", "type", "size", "skew", "size_skew", "status", "x", "y"]
