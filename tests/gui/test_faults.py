@@ -185,6 +185,7 @@ def log_text(window):
     return window.docks_.panels["log"].toPlainText()
 
 
+@pytest.mark.filterwarnings("default:old option")
 def test_what_qt_and_vtk_and_python_complain_of_stands_in_the_log(caught, qtbot):
     import warnings
 
