@@ -19,7 +19,7 @@ another processor chooses the same nodes.
 
 Every selection ends: a cycle without a new row is the last, and levels, which may choose the
 same rows again, are given up when the error no longer falls from one to the next, or when they
-have chosen as many rows as there are (`selection.StoppingRule`). Then one last level takes all it
+have chosen as many rows as there are (`selection.LevelLimit`). Then one last level takes all it
 needs. If an error stays above the tolerance, ``short`` says why, and what was found at the lowest
 error is kept where that is clearly better.
 """
@@ -37,7 +37,7 @@ from slideviz.rbf.evaluate import matrix
 from slideviz.rbf.exact import gathered, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
-from slideviz.rbf.selection import GrowingFactor, StoppingRule, favour, newton, pool
+from slideviz.rbf.selection import GrowingFactor, LevelLimit, favour, newton, pool
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
 STALE = 0.3
@@ -125,7 +125,7 @@ class GreedyFit:
             self._take(again, target)
             residual = target - self._values(self._now)
             errors = self._errors(residual)
-        rule, given_up = StoppingRule(errors.max(initial=0.0), len(self._rows.nodes)), False
+        rule, given_up = LevelLimit(errors.max(initial=0.0), len(self._rows.nodes)), False
         best = errors, self.found
         while True:
             self._record(errors)

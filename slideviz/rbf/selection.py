@@ -1,7 +1,7 @@
 """Parts of the greedy selection: its pool of candidates, picking in the pool, Cholesky factors.
 
 `pool` says which candidates a cycle looks at and how many of them it picks, `newton` picks them,
-`GrowingFactor` takes them into the system, and `StoppingRule` ends levels that lower no error.
+`GrowingFactor` takes them into the system, and `LevelLimit` ends levels that lower no error.
 """
 
 from __future__ import annotations
@@ -214,13 +214,16 @@ def _double(
     return 2, np.sort([worst, second])
 
 
-class StoppingRule:
-    """Rule that stops cycles once the error no longer falls, or costs too much to lower.
+class LevelLimit:
+    """When a selection in levels gives up: its error no longer falls, or it chose too many nodes.
+
+    What ends a selection otherwise (tolerance, number of nodes, a singular system) is in
+    `slideviz.rbf.greedy.GreedyFit`.
 
     Attributes
     ----------
     budget : float
-        What all cycles may cost, in the caller's unit.
+        How many rows all levels together may choose.
     """
 
     def __init__(self, error: float, budget: float) -> None:
@@ -228,12 +231,17 @@ class StoppingRule:
         self._lowest, self._losses, self._spent = error, 0, 0.0
 
     def ends(self, error: float, cost: float) -> bool:
-        """Tell, after one more cycle, whether it should be the last.
+        """Tell, after one more level, whether the next one should be the last.
+
+        It should where the error did not fall `LOSSES` times in a row, or where more rows were
+        chosen than ``budget``.
 
         Parameters
         ----------
-        error, cost
-            The error after this cycle, and what the cycle cost.
+        error : float
+            The largest error after this level, in the mesh's length unit.
+        cost : float
+            How many rows it chose.
         """
         fell = error < FALL * self._lowest
         self._lowest = error if fell else self._lowest

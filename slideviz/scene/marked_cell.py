@@ -1,4 +1,4 @@
-"""The marked cell: its outline in front of everything, wherever in the mesh it is."""
+"""Layer of the scene that outlines the marked cell, in front of everything else."""
 
 from __future__ import annotations
 

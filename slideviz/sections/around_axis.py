@@ -115,7 +115,7 @@ class Patch:
 
     @property
     def whole(self) -> bool:
-        """Tell whether it goes all the way round."""
+        """Tell whether the part goes all the way round."""
         return self.angles[1] - self.angles[0] > _WHOLE
 
 
@@ -128,7 +128,7 @@ class AboutAxis(Shape):
 
     @abstractmethod
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return weights (3,) and a number: weighted squares in its frame have that sum on it."""
+        """Return w (3,) and c: the surface is where w · (x², y², z²) = c in its frame."""
 
     @abstractmethod
     def laid(self, section: Section, opened: Unrolled, ahead: float | None) -> FloatArray:
@@ -136,7 +136,7 @@ class AboutAxis(Shape):
 
     @abstractmethod
     def places(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return where points (n, 3) are on it: angle in radians and length along it, (n, 2)."""
+        """Return the places of points (n, 3): angle in radians and length, (n, 2)."""
 
     @abstractmethod
     def surface(self, section: Section, places: FloatArray, size: float) -> FloatArray:
@@ -144,28 +144,28 @@ class AboutAxis(Shape):
 
     @abstractmethod
     def lean(self, section: Section) -> float:
-        """Return the angle in radians between its lines and the axis."""
+        """Return the angle in radians between the lines of the surface and its axis."""
 
     @abstractmethod
     def lever(self, section: Section, along: float) -> float:
-        """Return how far a place at a length along it goes for a unit of size."""
+        """Return how far a place at a length along the surface moves for one unit of size."""
 
     @abstractmethod
     def girth(self, section: Section, along: float) -> float:
-        """Return how far it is from its axis, at a length along it."""
+        """Return the radius at a length along the surface."""
 
     # What follows ----------------------------------------------------------------------
 
     @property
     def size(self) -> Size:
-        """Return what is known of its number."""
+        """Return the row of the size: label, unit and range."""
         assert self.terms.size is not None
         return self.terms.size
 
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross it, (k,).
+        """Return where edges cross the surface, (k,).
 
         Along an edge the weighted squares are a parabola, so the crossing is known exactly. Of
         its two roots, the distance changes its sign at one as it does from end to end.
@@ -186,15 +186,15 @@ class AboutAxis(Shape):
         return np.asarray(np.clip(np.nan_to_num(found), 0.0, 1.0))
 
     def position(self, section: Section) -> float:
-        """Return its size."""
+        """Return the size: a radius, or a half angle."""
         return section.size
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return it with another size; CaseError where there is none such."""
+        """Return the section with another size; CaseError where there is no such size."""
         return section.sized(value)
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return it with a round size about in the middle of points (n, 3)."""
+        """Return a section of a round size, through about the middle of points (n, 3)."""
         return section.sized(round_middle(self.positions(section, points)) or self.size.usual)
 
     def flatten(
@@ -217,7 +217,7 @@ class AboutAxis(Shape):
         return unrolled(section, polygons, near).middle if len(polygons) else None
 
     def ways(self, section: Section, angle: float) -> FloatArray:
-        """Return unit vectors outwards, around and along it, at an angle, (3, 3)."""
+        """Return unit vectors outwards, around and along the surface at an angle, (3, 3)."""
         cos, sin, lean = np.cos(angle), np.sin(angle), self.lean(section)
         side, high = np.array([cos, sin, 0.0]), np.array([0.0, 0.0, 1.0])
         outwards = np.cos(lean) * side - np.sin(lean) * high

@@ -46,7 +46,7 @@ class Cone(AboutAxis):
     directed = True
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return how far points are outside of it, (n,); behind its apex, how far from that."""
+        """Return distances of points outwards from the cone, (n,); behind the apex, from it."""
         sin, cos = _lines(section)
         radius, height = np.hypot(along(0), along(1)), along(2)
         gap = radius * cos - height * sin
@@ -68,7 +68,7 @@ class Cone(AboutAxis):
         return np.asarray(np.clip(angle, *_ENDS))
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return it through the middle of points (n, 3), from their one end to their other."""
+        """Return a cone through the middle of points (n, 3), from one end of them to the other."""
         local = section.frame(points)
         radius, height = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
         length = float(np.ptp(height))
@@ -83,7 +83,7 @@ class Cone(AboutAxis):
         return replace(section, origin=triple(apex), half_angle_deg=angle)
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far its apex goes; infinity where it opens to the other side then."""
+        """Return how far the apex is moved; infinity where the cone then opens backwards."""
         return float(np.linalg.norm(step)) if turned @ section.basis[2] > 0 else np.inf
 
     def describe(self, section: Section) -> str:
@@ -91,7 +91,7 @@ class Cone(AboutAxis):
         return self._words(section, DIGITS, "from apex")
 
     def brief(self, section: Section) -> str:
-        """Return the same in few words."""
+        """Return half angle, axis and apex in few words."""
         return self._words(section, FEW, "from")
 
     def _words(self, section: Section, digits: int, apex: str) -> str:
@@ -102,7 +102,7 @@ class Cone(AboutAxis):
         return f"cone {section.half_angle_deg:.6g}° about {where} {apex} {at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return under which half angles it would cut."""
+        """Return between which half angles a cone would cut."""
         angles = self.positions(section, points)
         return (
             f"misses the mesh, which its apex sees at {angles.min():.4g} to {angles.max():.4g} "
@@ -128,7 +128,7 @@ class Cone(AboutAxis):
         return float(np.mean(patch_of(section, points).angles))
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return what the coordinates are by s, the length from the apex, and theta."""
+        """Return the labels of the developed coordinates, by s (length from the apex) and theta."""
         return Label("s cos(θ sin α)", "s cos"), Label("s sin(θ sin α)", "s sin")
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
@@ -162,5 +162,5 @@ class Cone(AboutAxis):
         return float(np.radians(abs(along))) or 1.0
 
     def girth(self, section: Section, along: float) -> float:
-        """Return how far it is from its axis, at a length from its apex."""
+        """Return the radius at a length from the apex."""
         return abs(along) * _lines(section)[0]

@@ -45,7 +45,7 @@ class Circle(InPlane):
         return f"circle r = {section.radius:.6g} about {at}" if self.can_cut(section) else ""
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return its arcs in a box."""
+        """Return the arcs of the circle inside a box."""
         angle = np.linspace(0.0, 2.0 * np.pi, _CHORDS + 1)
         ring = section.radius * np.column_stack([np.cos(angle), np.sin(angle)])
         ring += section.origin[:2]
@@ -55,11 +55,11 @@ class Circle(InPlane):
         return [part for part, kept in parts if kept[0] and len(part) > 1]
 
     def middle(self, section: Section) -> FloatArray:
-        """Return its centre (2,)."""
+        """Return the centre of the circle (2,)."""
         return np.asarray(section.origin)[:2]
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return where it is held: in its centre, and at a point of it."""
+        """Return the handle points of a circle: its centre, and one point on it."""
         longest = max(parts, key=len)
         ends = longest[None, len(longest) // 2 if len(parts) > 1 else len(longest) // 8]
         return HandleParts(within(self.middle(section)[None], box), ends, parts)
@@ -67,7 +67,7 @@ class Circle(InPlane):
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return it moved by its centre, or with another radius by the rest."""
+        """Return the circle moved by its centre, or with another radius by the rest."""
         start, now = way
         size = float((box[1] - box[0]).max())
         if part == "middle":
@@ -88,7 +88,7 @@ class Circle(InPlane):
         return np.column_stack([start - turn, end - turn])
 
     def position_label(self, section: Section) -> Label:
-        """Return that they are angles."""
+        """Return the label of angles."""
         return Label("angle [°]", "θ [°]")
 
 
@@ -100,11 +100,11 @@ class Cylinder(AboutAxis):
     directed = False
 
     def distance(self, section: Section, along: Callable[[int], FloatArray]) -> FloatArray:
-        """Return how far points are outside of it, (n,)."""
+        """Return the distances of points outwards from the cylinder, (n,)."""
         return np.asarray(np.hypot(along(0), along(1)) - section.radius)
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return that the squared radius is the same on it."""
+        """Return the weights of the squared radius, and the squared radius of the cylinder."""
         return np.array([1.0, 1.0, 0.0]), section.radius**2
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
@@ -113,7 +113,7 @@ class Cylinder(AboutAxis):
         return np.asarray(np.hypot(local[:, 0], local[:, 1]))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far it goes across its axis."""
+        """Return how far a transformation moves the axis sideways."""
         return float(np.linalg.norm(np.cross(step, section.basis[2])))
 
     def describe(self, section: Section) -> str:
@@ -121,7 +121,7 @@ class Cylinder(AboutAxis):
         return self._words(section, axis_word(section.direction), " through", DIGITS)
 
     def brief(self, section: Section) -> str:
-        """Return the same in few words."""
+        """Return radius and axis in few words."""
         return self._words(section, axis_word(section.direction, FEW), " at", FEW)
 
     def _words(self, section: Section, where: str, point: str, digits: int) -> str:
@@ -130,7 +130,7 @@ class Cylinder(AboutAxis):
         return f"cylinder r = {section.radius:.6g} about {where}{at}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return between which radii it would cut."""
+        """Return between which radii a cylinder would cut."""
         radii = self.positions(section, points)
         return (
             f"misses the mesh, which has radii {radii.min():.6g} to {radii.max():.6g} about this "
@@ -149,7 +149,7 @@ class Cylinder(AboutAxis):
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return the axis, and r theta."""
+        """Return the labels of the position along the axis, and of r theta."""
         return direction_label(section.basis[2]), Label("r θ", "r θ")
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:

@@ -84,7 +84,7 @@ class Line(InPlane):
         return True
 
     def describe(self, section: Section) -> str:
-        """Return it in words: its place on an axis, or slope and point."""
+        """Return the line in words: its place on an axis, or slope and point."""
         where = axis_word(section.direction)
         if where == "z":
             return ""
@@ -95,12 +95,12 @@ class Line(InPlane):
         return f"line at {(slope + 90.0) % 180.0 - 90.0:.4g}° through {at}"
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return both its ends in a box."""
+        """Return the part of the line inside a box, a list of one (2, 2) array; empty beside it."""
         ends = line_ends(section, box)
         return [] if ends is None else [ends]
 
     def middle(self, section: Section) -> FloatArray:
-        """Return its point (2,) in z = 0 that is nearest to its origin."""
+        """Return the point (2,) of the line in z = 0 that is nearest to the section's point."""
         origin, normal = np.asarray(section.origin), np.asarray(section.direction)
         flat = normal[:2] @ normal[:2]
         if not flat > 0:
@@ -109,13 +109,13 @@ class Line(InPlane):
         return np.asarray(origin[:2] + origin[2] * normal[2] / flat * normal[:2])
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return where it is held: at its ends, and at the point it turns about."""
+        """Return the handle points of a line: its ends, and the point it turns about."""
         return HandleParts(self._pivot(section, box)[None], parts[0], parts)
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
     ) -> Section:
-        """Return it turned by an end, or moved by the rest."""
+        """Return the line turned by an end, or moved by the rest."""
         start, now = way
         if part == "end":
             centre = self._pivot(section, box)
@@ -128,13 +128,13 @@ class Line(InPlane):
         return replace(section, origin=rounded_place(self.middle(section) + shift, size))
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return coordinates along it."""
+        """Return coordinates along the line."""
         way = along(section)
         assert way is not None
         return np.asarray(corners @ way)
 
     def position_label(self, section: Section) -> Label:
-        """Return its direction."""
+        """Return the label of the direction of the line."""
         way = along(section)
         assert way is not None
         return direction_label(np.append(way, 0.0))

@@ -93,12 +93,12 @@ class Section:
 
     @property
     def shape(self) -> Shape:
-        """Return what it is, and can do."""
+        """Return the shape: what the section can do."""
         return SHAPES[self.kind]
 
     @property
     def in_plane(self) -> InPlane:
-        """Return what it is in the plane of a 2D mesh that it can cut."""
+        """Return the line or circle that the section is in a 2D mesh."""
         seen = self.shape.in_plane
         assert seen is not None
         return seen

@@ -34,7 +34,7 @@ _STEEP = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """How a plane is looked at.
+    """The camera's axes for a look at a plane.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Axes:
 
 
 def plane_axes(section: Section) -> Axes:
-    """Return how a plane section is looked at: z up, or y where z points to the eye; x right."""
+    """Return the camera's axes: z up, or y where z points to the eye; x to the right."""
     normal = section.basis[2]
     up = np.eye(3)[1 if abs(normal[2]) > _STEEP else 2]
     up = up - (up @ normal) * normal
@@ -76,26 +76,26 @@ class Plane(Shape):
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross it, (k,): the distance is linear along them."""
+        """Return where edges cross the plane, (k,): the distance is linear along them."""
         before, after = level
         return np.asarray(before / (before - after))
 
     def position(self, section: Section) -> float:
-        """Return its distance from 0 along its normal."""
+        """Return the distance of the plane from the origin, along its normal."""
         return float(np.asarray(section.origin) @ section.basis[2])
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return it moved along its normal."""
+        """Return the plane moved along its normal."""
         shift = (value - self.position(section)) * section.basis[2]
         return replace(section, origin=triple(np.asarray(section.origin) + shift))
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return how far points are from 0 along its normal, (n,)."""
+        """Return the distances of points from the origin along the normal, (n,)."""
         # Measured along the basis, whose normal has no other sign than the section's.
         return np.asarray(section.frame(points)[:, 2] + self.position(section))
 
     def first(self, section: Section, points: FloatArray) -> Section:
-        """Return it at a round number across the longest extent of points (n, 3)."""
+        """Return a plane across the longest extent of points (n, 3), at a round number."""
         low, high = points.min(axis=0), points.max(axis=0)
         axis = int(np.argmax(high - low))
         origin = (low + high) / 2.0
@@ -103,25 +103,25 @@ class Plane(Shape):
         return replace(section, origin=triple(origin), direction=triple(np.eye(3)[axis]))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far it goes along its normal."""
+        """Return how far a transformation moves the plane along its normal."""
         return float(abs(step @ section.basis[2]))
 
     def describe(self, section: Section) -> str:
-        """Return it in words: its place on an axis, or normal and point."""
+        """Return the plane in words: its place on an axis, or normal and point."""
         where = axis_word(section.direction)
         if where in "xyz":
             return f"plane {where} = {section.origin['xyz'.index(where)]:.6g}"
         return f"plane with normal {where} through {triple_words(section.origin)}"
 
     def brief(self, section: Section) -> str:
-        """Return it in few words."""
+        """Return the plane in few words."""
         where = axis_word(section.direction, FEW)
         if where in "xyz":
             return self.describe(section)
         return f"plane ⊥ {where} at {self.position(section):.3g}"
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return between which coordinates or shifts it would cut."""
+        """Return between which coordinates or shifts the plane would cut."""
         normal = np.abs(section.basis[2])
         if not normal[: points.shape[1]].any():
             return "does not cut this 2D mesh; give a normal in x and y, as in y=0"
@@ -151,15 +151,15 @@ class Plane(Shape):
         return None
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return None: it lies as it is seen."""
+        """Return None: a plane needs no turn to lie level."""
         return None
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return what is to the right and up."""
+        """Return the labels of the coordinates in the plane."""
         return plane_axes(section).labels
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the transformation as it is seen along the normal."""
+        """Return the matrix (4, 4) in the coordinates of the flat plane."""
         rows, flat = plane_axes(section).rows, np.eye(4)
         flat[:3, :3] = rows @ matrix[:3, :3] @ rows.T
         flat[:3, 3] = rows @ matrix[:3, 3]
@@ -167,9 +167,9 @@ class Plane(Shape):
         return flat
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return how it is looked at along its normal."""
+        """Return the camera's axes along the normal, (3, 3)."""
         return plane_axes(section).rows
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the same."""
+        """Return the axes of `facing`: a plane is looked at straight in space, too."""
         return plane_axes(section).rows

@@ -64,10 +64,10 @@ class Shape(Protocol):
     # Its numbers -----------------------------------------------------------------------
 
     def position(self, section: Section) -> float:
-        """Return what a slider shows."""
+        """Return the number that a slider moves: a distance, a radius, an angle."""
 
     def at_position(self, section: Section, value: float) -> Section:
-        """Return the section with another position; CaseError where there is none such."""
+        """Return the section at another position; CaseError where there is no such section."""
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the positions (n,) at which the section would go through points (n, 3)."""
@@ -79,7 +79,7 @@ class Shape(Protocol):
         """
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
-        """Return how far a transformation takes the section away from itself, in lengths.
+        """Return how far a transformation moves the section off itself, in the length unit.
 
         ``turned`` (3,) is what becomes of its unit direction, which is the same or the opposite;
         ``step`` (3,) how far its point goes.
@@ -94,7 +94,7 @@ class Shape(Protocol):
         """Return the section in few words."""
 
     def miss(self, section: Section, points: FloatArray) -> str:
-        """Return why a section cuts no cell of these points (n, d), and where it would."""
+        """Return why a section misses points (n, d), and between which positions it would cut."""
 
     # Laid flat, and looked at ----------------------------------------------------------
 
@@ -110,25 +110,29 @@ class Shape(Protocol):
     def middle(
         self, section: Section, polygons: Polygons, near: float | None = None
     ) -> float | None:
-        """Return the middle angle of polygons laid flat so; None where there is no seam."""
+        """Return the middle angle of polygons, in radians; None for a shape without a seam."""
 
     def ahead(self, section: Section, points: FloatArray) -> float | None:
-        """Return the angle at which what has these points (n, 3) lies level; None: any."""
+        """Return the angle, in radians, whose line is drawn level; None where any will do."""
 
     def flat_labels(self, section: Section) -> tuple[Label, Label]:
-        """Return what the first two flat coordinates are."""
+        """Return the axis labels of the section laid flat: to the right, and up."""
 
     def flat_matrix(self, section: Section, matrix: FloatArray, angle: float) -> FloatArray:
-        """Return the transformation (4, 4) of the flat section that one in space is, (4, 4).
+        """Return the matrix that moves the flat section as ``matrix`` does in space, (4, 4).
 
-        ``angle`` is that about the section's direction; the matrix takes it onto itself.
+        ``angle`` is the turn about the section's direction, in radians; ``matrix`` takes the
+        section onto itself.
         """
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return how what is cut, with points (n, 3), is looked at: right, up and to the eye."""
+        """Return the camera's axes for a straight look, (3, 3): right, up, to the eye.
+
+        ``points`` (n, 3) are those of the cut.
+        """
 
     def aslant(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return to the side, up, and straight to the eye that looks at it in space, (3, 3)."""
+        """Return the camera's axes for a look from aside, (3, 3), in the same order."""
 
     handle: Literal["push", "pull"]
     """Whether it is pushed and turned as a plane, or a ball on it pulls its size."""
@@ -141,16 +145,16 @@ class InPlane(Protocol):
         """Tell whether a section can cut 2D meshes."""
 
     def describe(self, section: Section) -> str:
-        """Return the section in words; empty where it does not lie so."""
+        """Return the section in words; empty where it is no line or circle."""
 
     def trace(self, section: Section, box: Box) -> list[FloatArray]:
-        """Return the parts of it that are in a box, as polylines (k, 2) each."""
+        """Return the parts of the line or circle inside a box, as polylines (k, 2) each."""
 
     def middle(self, section: Section) -> FloatArray:
-        """Return the point (2,) by which it is moved."""
+        """Return the point (2,) by which the mouse moves the section."""
 
     def handle_parts(self, section: Section, parts: list[FloatArray], box: Box) -> HandleParts:
-        """Return where it can be held within a box that its ``parts`` are in."""
+        """Return the handle points inside a box; ``parts`` are the section's polylines there."""
 
     def dragged(
         self, section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box
@@ -158,10 +162,10 @@ class InPlane(Protocol):
         """Return the section after its part was dragged (see `slideviz.sections.handles`)."""
 
     def positions(self, section: Section, corners: FloatArray) -> FloatArray:
-        """Return where lines (q, 2, 2) of the section begin and end along it, (q, 2)."""
+        """Return the positions of both ends of lines (q, 2, 2) along the section, (q, 2)."""
 
     def position_label(self, section: Section) -> Label:
-        """Return what these positions are."""
+        """Return the axis label of `positions`."""
 
 
 # Words that the shapes share -----------------------------------------------------------

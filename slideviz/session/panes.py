@@ -27,7 +27,7 @@ def panes(session: Session) -> tuple[int | None, int | None]:
 
 
 def show_in(session: Session, pane: int, number: int) -> Session:
-    """Return the session with another run, or the undeformed mesh, in one of the two views.
+    """Return the session with a run (its number, or ``UNDEFORMED``) shown in one view.
 
     What the other view shows already changes places with what this one showed. The step stays,
     as a part of the displacement.

@@ -47,7 +47,7 @@ class BrushCanvas(PlotCanvas):
         return float(np.clip(self.to_value(x_px), *self.figure.axes[0].get_xlim()))
 
     def pixel_of(self, value: float) -> float:
-        """Return where a value is, in pixels of the widget."""
+        """Return the x of a value in pixels of the widget, within the axis."""
         return self.to_pixel(float(np.clip(value, *self.figure.axes[0].get_xlim())))
 
     def show_band(self, band: Range | None) -> None:

@@ -98,7 +98,7 @@ class KeyForm(QFormLayout):
         self.addRow(label, field)
 
     def sync(self, case: Case, spare: Case, reasons: Mapping[str, str]) -> None:
-        """Show the settings of a case, and of a spare one those that the case has not.
+        """Fill the fields from a case; where a setting is None there, from ``spare``.
 
         ``reasons`` has more reasons, by the field, for which it is not available.
         """

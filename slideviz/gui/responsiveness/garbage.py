@@ -25,7 +25,7 @@ class GarbageCollector(QObject):
         self._timer.timeout.connect(self.look)
 
     def start(self) -> None:
-        """Take over."""
+        """Switch Python's automatic collection off, and collect from this timer instead."""
         gc.disable()
         self._timer.start()
 

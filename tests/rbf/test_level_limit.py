@@ -10,7 +10,7 @@ from slideviz.case.model import Case, Reduction, Translate
 from slideviz.cli import run
 from slideviz.errors import DeformError
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.rbf.selection import LOSSES, StoppingRule
+from slideviz.rbf.selection import LOSSES, LevelLimit
 from slideviz.samples.table import write_sample
 from tests import builders
 
@@ -37,14 +37,14 @@ def hexahedron(tmp_path, **settings):
 
 
 def test_a_selection_stops_when_nothing_falls():
-    rule = StoppingRule(1.0, 1e9)
+    rule = LevelLimit(1.0, 1e9)
     assert [rule.ends(1.0 - 0.005 * k, 1.0) for k in range(LOSSES)] == [False] * 7 + [True]
-    rule = StoppingRule(1.0, 1e9)
+    rule = LevelLimit(1.0, 1e9)
     assert not any(rule.ends(0.98**k, 1.0) for k in range(100))
 
 
 def test_a_selection_stops_when_the_budget_is_spent():
-    rule = StoppingRule(1.0, 100.0)
+    rule = LevelLimit(1.0, 100.0)
     assert [rule.ends(0.1**k, 30.0) for k in range(4)] == [False, False, False, True]
 
 
