@@ -217,7 +217,7 @@ def _halo_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 
 def idle_settings(case: Case) -> tuple[str, ...]:
-    """Return sentences about settings that the chosen method, or none, uses."""
+    """Return sentences about settings without effect: not used by this method, or by none."""
     usual = type(case)()
     idle = [
         _with_switch(key, case)

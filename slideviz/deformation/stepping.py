@@ -31,7 +31,7 @@ class Progress:
     step, total : int
         The step in work (from 1), and all steps.
     phase : str
-        ``classify``, ``solve``, ``evaluate`` or ``project``.
+        ``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``.
     fraction : float
         Of the phase, 0 to 1.
     """

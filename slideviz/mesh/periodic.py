@@ -1,4 +1,7 @@
-"""Periodic pairs: two boundaries that are images of each other, matched node by node."""
+"""Periodic pairs: two boundaries that are images of each other, matched node by node.
+
+What becomes of all images of one node in a deformation is in `slideviz.rbf.images`.
+"""
 
 from __future__ import annotations
 

@@ -3,7 +3,8 @@
 Whatever a node one period away would find for itself differs by rounding at least, and by more
 where only one of them sees a corner, a normal or the end of a curve. So one of them stands for
 all, its displacement in the frame is copied to the others, and every step measures on the mesh
-that it made whether they moved alike.
+that it made whether they moved alike. Which markers are pairs is found in
+`slideviz.mesh.periodic`.
 """
 
 from __future__ import annotations
