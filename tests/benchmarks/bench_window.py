@@ -126,7 +126,7 @@ def test_opening(benchmark, bench):
 
 def test_colouring(benchmark, bench):
     def work():
-        for name in ("size_skew", "size", "displacement", "role"):
+        for name in ("size-skew", "size", "displacement", "role"):
             bench.change(colour_by=name)
 
     measure(benchmark, bench, work)
