@@ -579,7 +579,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     (moved,) = sections(window)
     assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
     assert moved.direction == line.direction
-    end = window.cutting.handles.of(window.view)._grips.ends[1]
+    end = window.cutting.handles.of(window.view)._handle_parts.ends[1]
     drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
     (turned,) = sections(window)
     assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
@@ -603,7 +603,7 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     centre = np.array(circle.origin[:2])
     drag_in_view(
         window.view,
-        window.cutting.handles.of(window.view)._grips.ends[0],
+        window.cutting.handles.of(window.view)._handle_parts.ends[0],
         centre + np.array([0.2, 0.0]),
     )
     assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)
@@ -619,13 +619,13 @@ def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
     handle = window.cutting.handles.of(window.view)
     # What is dragged beside it moves the view, as ever.
     camera = window.scene.camera.place
-    beside = handle._grips.ends[0] + 0.2
+    beside = handle._handle_parts.ends[0] + 0.2
     drag_in_view(window.view, beside, beside + 0.1)
     assert window.scene.camera.place != camera
     # Wherever one looks, it is in reach.
     (x, y, _), half = sections(window)[0].origin, 0.02
     window.scene.camera.aim((x, y + 0.3, 0.0), half, 1.0)
-    for point in (*handle._grips.ends, *handle._grips.middle):
+    for point in (*handle._handle_parts.ends, *handle._handle_parts.middle):
         assert abs(point[1] - y - 0.3) < half
     flat_panel.handle.click()
     assert not any(name.startswith("handle:") for name in window.view.actors)

@@ -35,7 +35,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         super().__init__(view, *others)
         self._look: Look | None = None
         self._lift = 0.0
-        self._grips: HandleParts | None = None
+        self._handle_parts: HandleParts | None = None
         self._placed: tuple[object, ...] = ()
         self._watching = view.camera.AddObserver("ModifiedEvent", lambda *_: self.put())
 
@@ -72,12 +72,16 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         if key == self._placed:
             return
         self._placed = key
-        self._grips = handle_parts(self.section, seen)
+        self._handle_parts = handle_parts(self.section, seen)
         empty = np.empty((0, 2))
         points = empty
-        if self._grips is not None:
-            points = np.concatenate([self._grips.middle, self._grips.ends])
-        held = {"middle": self._grips.middle, "end": self._grips.ends} if self._grips else {}
+        if self._handle_parts is not None:
+            points = np.concatenate([self._handle_parts.middle, self._handle_parts.ends])
+        held = (
+            {"middle": self._handle_parts.middle, "end": self._handle_parts.ends}
+            if self._handle_parts
+            else {}
+        )
         look = self._look
         assert look is not None
         # Points are balls to VTK: one above another must be more than its radius higher.
@@ -115,12 +119,12 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
 
     def part_at(self, where: QPoint) -> str | None:
         """Return what the mouse would take at a position of the widget."""
-        if self._grips is None or self.section is None:
+        if self._handle_parts is None or self.section is None:
             return None
         shown: list[tuple[Part, FloatArray]] = [
-            ("end", self._pixels(self._grips.ends)),
-            ("middle", self._pixels(self._grips.middle)),
-            *(("line", self._pixels(line)) for line in self._grips.lines),
+            ("end", self._pixels(self._handle_parts.ends)),
+            ("middle", self._pixels(self._handle_parts.middle)),
+            *(("line", self._pixels(line)) for line in self._handle_parts.lines),
         ]
         reach = REACH_PX * self.view.devicePixelRatioF()
         return nearest(shown, np.array(self.view.to_pixels(where)), reach)
