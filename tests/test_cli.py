@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,9 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
+from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
+from slideviz.deformation.stepping import Trial
+from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 
 SECONDS = {
@@ -64,6 +68,12 @@ def test_run_writes_mesh_and_report(square, tmp_path, capsys):
         sv.read(square / "square_deformed.su2"), reference=sv.read(square / "mesh.su2")
     )
     assert found.min == report["quality"]["min"]
+
+
+def test_a_report_has_every_field_of_trials_and_cycles():
+    # A field more: name it there, or here as one that reports leave out.
+    for kind, keys in ((Trial, TRIAL_KEYS), (Cycle, CYCLE_KEYS)):
+        assert tuple(field.name for field in fields(kind)) == keys
 
 
 def test_json_dash_prints_only_json(square, capsys):

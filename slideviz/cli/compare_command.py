@@ -74,7 +74,7 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.cli.options import read_case
     from slideviz.cli.places import Output, make_folder, require_places
     from slideviz.errors import CaseError
-    from slideviz.study.combinations import METHODS, MODES, warm
+    from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
     from slideviz.study.table import terminal_head
     from slideviz.study.wanted import announcement, refused
 
@@ -89,7 +89,7 @@ def compare(arguments: argparse.Namespace) -> int:
     require_places(arguments, *(Output(table, "compare", named=False) for table in tables))
     cannot = refused(case, mesh, wanted)
 
-    known = {"methods": tuple(METHODS), "periodic": tuple(MODES)}
+    known = {"methods": tuple(COMPARED_METHODS), "periodic": tuple(MODES)}
     more = {option: names for option, names in known.items() if getattr(arguments, option) is None}
     _say(
         arguments,
@@ -121,7 +121,7 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
         A name is unknown, or a number of steps is none.
     """
     from slideviz.errors import CaseError
-    from slideviz.study.combinations import AUTO, METHODS
+    from slideviz.study.combinations import AUTO, COMPARED_METHODS
     from slideviz.study.wanted import combinations, wanted_methods, wanted_modes
     from slideviz.terms import PERIODIC_MODES
 
@@ -137,7 +137,7 @@ def _wanted(arguments: argparse.Namespace, case: Case) -> tuple[Combination, ...
             raise CaseError(f"--{option} names none of {', '.join(known)}")
         return found
 
-    methods = names("methods", tuple(METHODS), wanted_methods(case))
+    methods = names("methods", tuple(COMPARED_METHODS), wanted_methods(case))
     modes = names("periodic", tuple(PERIODIC_MODES), wanted_modes(case))
     steps = list(STEPS)
     if arguments.steps is not None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -26,16 +25,22 @@ PHASES = (
     *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
     *("quality", "write"),
 )
+TRIAL_KEYS = ("planned", "steps", "min", "mean", "inverted")
+"""The fields of `Trial` that a report has, under the same keys."""
+CYCLE_KEYS = ("cycle", "level", "error", "control_nodes", "seconds")
+"""The fields of `Cycle` that a report has, under the same keys."""
 
 
 def run_report(
     case: Case,
     mesh: Mesh,
     steps: Sequence[Step],
-    quality: Quality,
     seconds: Mapping[str, float],
+    *,
+    quality: Quality,
+    undeformed: Quality,
 ) -> dict[str, Any]:
-    """Return the JSON object of ``run --json``."""
+    """Return the JSON object of ``run --json``; ``quality`` is that of the last step."""
     last = steps[-1]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
@@ -57,8 +62,9 @@ def run_report(
             "inverted_at_step": folded_at(
                 steps, mesh, np.array(inverted_cells(quality), np.int64)
             ).tolist(),
+            "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
-        "tried": [asdict(trial) for trial in last.tried],
+        "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
         "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),
@@ -70,9 +76,15 @@ def run_report(
         "node_counts": dict(last.node_counts),
         "warnings": list(last.warnings),
         "convergence": [
-            {"step": step.index, **asdict(cycle)} for step in steps for cycle in step.history
+            {"step": step.index, **_fields(cycle, CYCLE_KEYS)}
+            for step in steps
+            for cycle in step.history
         ],
     }
+
+
+def _fields(value: object, keys: Iterable[str]) -> dict[str, Any]:
+    return {key: getattr(value, key) for key in keys}
 
 
 def inverted_cells(quality: Quality) -> list[int]:
@@ -158,7 +170,7 @@ def save_json(path: Path, report: Mapping[str, Any]) -> str | None:
 
 def save_history(path: Path, report: Mapping[str, Any]) -> None:
     """Write the convergence of the data reduction, a row for each cycle."""
-    columns = ("step", "cycle", "level", "error", "control_nodes", "seconds")
+    columns = ("step", *CYCLE_KEYS)
     rows = [",".join(columns)]
     rows += [",".join(repr(row[name]) for name in columns) for row in report["convergence"]]
     with atomic_write(path, CaseError) as file:

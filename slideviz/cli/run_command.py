@@ -84,8 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         session = of_runs(Frame(mesh, before), [Run(1, case, (named,), "done")])
         picture(session, arguments.picture, arguments.picture_size or SIZE, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
-    report = run_report(case, mesh, steps, found, seconds)
-    report["quality"]["undeformed"] = {"min": before.min, "mean": before.mean}
+    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before)
     if arguments.history:
         save_history(arguments.history, report)
     text = save_json(arguments.json, report) if arguments.json else None

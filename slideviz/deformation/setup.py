@@ -32,7 +32,7 @@ from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import COINCIDENT
-from slideviz.rbf.methods import METHODS
+from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 
@@ -217,7 +217,7 @@ def _method(
         return partial(deform_idw, weights=Weights(power, case.idw_fixed_weight))
     if case.method == "elastic":
         return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
-    return METHODS[case.sliding]
+    return SLIDING_METHODS[case.sliding]
 
 
 def _require_finite(mesh: Mesh) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deformation.bounds import unsoundness
+from slideviz.deformation.growth import unsoundness
 from slideviz.deformation.setup import Setup
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.halo import Halo

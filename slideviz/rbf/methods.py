@@ -122,7 +122,7 @@ def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
     return within
 
 
-METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
+SLIDING_METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
     "none": regular,
     "ps": pseudo_sliding,
     "ds": direct_sliding,

@@ -27,7 +27,7 @@ from slideviz.samples.table import sample
 from slideviz.session.jit_warmup import warm_up
 from slideviz.terms import PeriodicMode
 
-METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
+COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     sliding: (term.name, {"method": "rbf", "sliding": sliding})
     for sliding, term in terms.SLIDING.items()
 } | {
@@ -51,7 +51,7 @@ class Combination:
     Attributes
     ----------
     method : str
-        One of ``METHODS``.
+        One of ``COMPARED_METHODS``.
     periodic : PeriodicMode
     steps : int
         ``AUTO`` for as many as it takes.
@@ -64,11 +64,13 @@ class Combination:
     @property
     def label(self) -> str:
         """Return method and mode in words."""
-        return f"{METHODS[self.method][0]}, {MODES[self.periodic]}"
+        return f"{COMPARED_METHODS[self.method][0]}, {MODES[self.periodic]}"
 
     def applied(self, case: Case) -> Case:
         """Return the case with this method, mode and number of steps."""
-        return case.change(periodic=self.periodic, steps=self.steps, **METHODS[self.method][1])
+        return case.change(
+            periodic=self.periodic, steps=self.steps, **COMPARED_METHODS[self.method][1]
+        )
 
 
 @dataclass(frozen=True, eq=False)

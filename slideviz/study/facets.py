@@ -16,7 +16,7 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.plots.spanwise import Profile, along, along_radius
-from slideviz.study.combinations import METHODS, MODES, Result, Row
+from slideviz.study.combinations import COMPARED_METHODS, MODES, Result, Row
 
 Span = Literal["r", "x", "y", "z"]
 
@@ -58,7 +58,7 @@ def facets(rows: Sequence[Row]) -> tuple[Facet, ...]:
 
 def _titles(row: Row) -> tuple[str, str]:
     """Return what method and mode of a row are called."""
-    return METHODS[row.combination.method][0], MODES[row.combination.periodic]
+    return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
 Profiler = Callable[[Line], Profile]

@@ -16,7 +16,7 @@ from slideviz.plots.cells import color_scale
 from slideviz.plots.style import PRINT
 from slideviz.plots.written import SMALLEST, empty_figure, fitted, trim
 from slideviz.session.state import Frame
-from slideviz.study.combinations import METHODS, MODES, Result, Row
+from slideviz.study.combinations import COMPARED_METHODS, MODES, Result, Row
 from slideviz.study.plots import WIDTH
 from slideviz.study.wanted import TITLES, reasons, words_for
 
@@ -89,7 +89,11 @@ def _axis(rows: Sequence[Row], done: Sequence[Row], what: str) -> dict[str, tupl
 
     The name is empty where no other was asked for.
     """
-    words = {name: title for name, (title, _) in METHODS.items()} if what == "method" else MODES
+    words = (
+        {name: title for name, (title, _) in COMPARED_METHODS.items()}
+        if what == "method"
+        else MODES
+    )
     asked, shown = (
         dict.fromkeys(getattr(row.combination, what) for row in group) for group in (rows, done)
     )

@@ -8,7 +8,7 @@ from itertools import product
 from slideviz.case.check import check_case
 from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
-from slideviz.study.combinations import METHODS, MODES, Combination
+from slideviz.study.combinations import COMPARED_METHODS, MODES, Combination
 from slideviz.terms import SLIDING, PeriodicMode
 
 Names = tuple[Callable[[str], str], Callable[[str], str]]
@@ -17,7 +17,7 @@ Names = tuple[Callable[[str], str], Callable[[str], str]]
 KEYS: Names = (lambda method: f"method {method}", lambda mode: f"periodic {mode}")
 """As the options of the command call them."""
 
-TITLES: Names = (lambda method: METHODS[method][0], lambda mode: MODES[mode])  # type: ignore[index]
+TITLES: Names = (lambda method: COMPARED_METHODS[method][0], lambda mode: MODES[mode])  # type: ignore[index]
 """As figures call them."""
 
 

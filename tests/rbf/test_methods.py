@@ -13,7 +13,7 @@ from slideviz.case.model import Case, Rotate, Translate
 from slideviz.errors import DeformError
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import Basis
-from slideviz.rbf.methods import METHODS
+from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import Problem, Watch
 from tests import builders
 from tests.oracles import radial, sliding
@@ -205,26 +205,26 @@ def test_coinciding_nodes_that_agree_are_one_control_node():
     nodes, values = merge(one, one.known, one.values)
     assert nodes.tolist() == [0, 2]
     np.testing.assert_array_equal(values, [[1, 0], [0, 1]])
-    for method in METHODS.values():
+    for method in SLIDING_METHODS.values():
         assert method(one, SILENT).control_nodes == 2
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SLIDING_METHODS)
 def test_coinciding_nodes_that_disagree_are_named(method):
     one = problem([0, 1, 2], [[1, 0], [1, 0.5], [0, 1]], [0, 0, 2, 3, 4, 5], [(4, (0.0, 1.0))])
     with pytest.raises(DeformError, match=r"nodes [01] and [01] .* by 0\.5; a moving boundary"):
-        METHODS[method](one, SILENT)
+        SLIDING_METHODS[method](one, SILENT)
 
 
 def test_a_known_node_may_not_leave_the_plane_in_which_its_image_slides():
     # Node 0 is moved off the plane in which node 1, in the same place, may slide.
     one = problem([0], [[0.0, 0.3]], [0, 0, 2, 3, 4, 5], [(1, (0.0, 1.0))])
     with pytest.raises(DeformError, match=r"nodes 1 and 0 coincide .* by 0\.3"):
-        METHODS["ds"](one, SILENT)
+        SLIDING_METHODS["ds"](one, SILENT)
 
 
 def test_a_known_node_may_move_along_the_plane_in_which_its_image_slides():
     one = problem([0], [[0.3, 0.0]], [0, 0, 2, 3, 4, 5], [(1, (0.0, 1.0))])
-    found = METHODS["ds"](one, SILENT)
+    found = SLIDING_METHODS["ds"](one, SILENT)
     np.testing.assert_allclose(found.displacement[0], [0.3, 0.0])
     assert found.control_nodes == 1

@@ -12,7 +12,7 @@ from slideviz.errors import Cancelled, DeformError
 from slideviz.samples.table import sample
 from slideviz.study import combinations as comparing
 from slideviz.study.combinations import (
-    METHODS,
+    COMPARED_METHODS,
     Combination,
     bounded,
     compare,
@@ -72,7 +72,7 @@ def test_what_contradicts_the_case_is_known_before_anything_is_computed(square, 
     found = refused(square.case, square.mesh, wanted)
     assert set(found) == {Combination("none", "moving", n) for n in (1, 4)}
     assert all("needs a sliding method" in text for text in found.values())
-    text = announcement(wanted, found, {"methods": tuple(METHODS)})
+    text = announcement(wanted, found, {"methods": tuple(COMPARED_METHODS)})
     first, methods, modes, steps, left_out = text.splitlines()
     assert first == "6 combinations"
     assert methods.split("(")[0].split() == ["methods", "none,", "ps"]
@@ -117,7 +117,7 @@ def test_a_reason_is_written_once(rows):
     assert terminal_line(other, told).endswith("not possible [2]: out of memory")
 
 
-@pytest.mark.parametrize("method", list(METHODS))
+@pytest.mark.parametrize("method", list(COMPARED_METHODS))
 def test_a_row_is_what_a_single_run_gives(square, method):
     (_, row) = compare(square.case, square.mesh, combinations((method,), ("fixed",), (1, 3)))
     *steps, last = sv.deform(row.combination.applied(square.case), square.mesh)
@@ -132,9 +132,9 @@ def test_a_row_is_what_a_single_run_gives(square, method):
 
 
 def test_methods_really_differ(square):
-    wanted = combinations(tuple(METHODS), ("none",), (3,))
+    wanted = combinations(tuple(COMPARED_METHODS), ("none",), (3,))
     means = [row.result.quality.mean for row in compare(square.case, square.mesh, wanted)]
-    assert len({round(mean, 6) for mean in means}) == len(METHODS)
+    assert len({round(mean, 6) for mean in means}) == len(COMPARED_METHODS)
 
 
 def test_the_plan_is_made_once_for_all_numbers_of_steps(square, monkeypatch):

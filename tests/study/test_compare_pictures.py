@@ -12,7 +12,7 @@ from PIL import Image
 from slideviz.case.model import Reduction, Translate
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
-from slideviz.study.combinations import METHODS, MODES, compare
+from slideviz.study.combinations import COMPARED_METHODS, MODES, compare
 from slideviz.study.facets import facets, profiler
 from slideviz.study.montage import NOT_KEPT, montage
 from slideviz.study.plots import figures, save_figure, steps_name
@@ -55,7 +55,7 @@ def test_where_modes_are_fewer_than_methods_they_are_the_facets(rows):
     ]
     fixed, moving = facets([*group, *third])
     assert (fixed.title, moving.title) == (MODES["fixed"], MODES["moving"])
-    names = [METHODS[name][0] for name in ("none", "ps", "ds")]
+    names = [COMPARED_METHODS[name][0] for name in ("none", "ps", "ds")]
     assert list(dict.fromkeys(line.label for line in fixed.lines)) == names
     assert {line.label: line.series for line in moving.lines} == {names[1]: 1, names[2]: 2}
 
@@ -228,13 +228,13 @@ def test_many_methods_stand_beside_each_other(rows, square):
     for modes, rising in ((("moving",), "columns"), (("fixed", "moving"), "columns")):
         group = [
             replace(row, combination=replace(row.combination, method=method, periodic=mode))
-            for method in METHODS
+            for method in COMPARED_METHODS
             for mode in modes
         ]
         figure = montage(group, square.mesh)
         assert overlaps(figure) == [], rising
         spots = {text.get_text(): text.get_window_extent() for text in texts_of(figure)}
-        heights = [spots[title].y0 for title, _ in METHODS.values()]
+        heights = [spots[title].y0 for title, _ in COMPARED_METHODS.values()]
         assert np.ptp(heights) < 1.0, "in one line"
         width, height = figure.get_size_inches()
         assert height < width

@@ -24,7 +24,7 @@ SAME = {"rbf": 1e-9, "idw": 1e-9, "elastic": 1e-7}
 """Linear elasticity is solved by iteration, to 1e-8 (``multigrid.TOLERANCE``) of the displacement;
 where it was not solved so far, the run says it and nothing is asked."""
 
-# The like of `slideviz.deformation.bounds`, written again so that each checks the other.
+# The like of `slideviz.deformation.growth`, written again so that each checks the other.
 GROWTH = 5.0
 """Times what the motion of boundaries carries over the mesh."""
 

@@ -1,4 +1,4 @@
-"""Bounds of results: nodes that go far beyond the motion, and systems that were not solved.
+"""Growth of results: nodes that go far beyond the motion, and systems that were not solved.
 
 A smooth function that has to turn from one displacement to another within a thin layer overshoots
 behind it: a wall that moves along itself beside a wall that stays, with cells of 1e-6 between them.
@@ -54,21 +54,19 @@ def unsoundness(
     if length.max() <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     # Sliding nodes first, for what they do is data to all others.
-    limit = np.full(
-        len(length), GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding"))
-    )
+    reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
     slid = setup.classes.sliding
-    limit[slid] = GROWTH * _reach(setup, shift, largest, ("moving",))
-    beyond = length > limit
+    reach[slid] = _reach(setup, shift, largest, ("moving",))
+    beyond = length > GROWTH * reach
     if not beyond.any():
         return None
     on = slid[beyond[slid]]
     node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
     where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
     return (
-        f"node {node} at ({where}) would go {length[node]:.3g} far, {length[node] / largest:.3g} "
-        f"times the largest displacement that is asked for ({largest:.3g}): "
-        f"{_cause(setup, mesh, moved)}"
+        f"node {node} at ({where}) would go {length[node]:.3g} far, more than {GROWTH:g} times the "
+        f"{reach[node]:.3g} that the motion reaches, whose largest displacement so far is "
+        f"{largest:.3g}: {_cause(setup, mesh, moved)}"
     )
 
 
