@@ -1,64 +1,56 @@
 """All keys of a case file, one row each: the table reads, checks, writes and explains them.
 
-The rows are applied in the order of the table, whatever their order in the file.
+The rows are applied in the order of the table, whatever their order in the file. Groups with many
+rows have a module each.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
-from slideviz.case.key import (
-    BOUNDARIES,
-    FILES,
-    METHOD,
-    MOTION,
-    PERIODICITY,
-    QUALITY,
-    REDUCTION,
-    Key,
-    get_direction,
-    get_file,
-    get_motions,
-    greedy,
-    no_levels,
-    no_pair,
-    nothing_slides,
-    put_boundaries,
-    put_direction,
-    put_double_edge,
-    put_file,
-    put_motions,
-    put_reduction,
-    role,
-    setting,
-)
+from slideviz.case.key import BOUNDARIES, FILES, MOTION, QUALITY, Key, role, setting
+from slideviz.case.method_keys import METHOD_ROWS
+from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
-from slideviz.case.values import (
-    AXIS,
-    NAMES,
-    PAIRS,
-    PATH,
-    POINT,
-    YES_NO,
-    choice,
-    one_of,
-    real,
-    steps_kind,
-    whole,
-)
+from slideviz.case.periodic_keys import PERIODIC_ROWS
+from slideviz.case.reduction_keys import REDUCTION_ROWS
+from slideviz.case.values import NAMES, PAIRS, PATH, YES_NO, one_of, whole
 from slideviz.case.view_keys import VIEW_ROWS
-from slideviz.terms import (
-    KERNELS,
-    LEVEL_CRITERIA,
-    METHODS,
-    METRICS,
-    PERIODIC_DIRECTIONS,
-    PERIODIC_MODES,
-    PERIODIC_TYPES,
-    SELECTIONS,
-    SLIDING,
-    names,
-)
+from slideviz.terms import METRICS
+
+
+def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
+    """Let markers slide that no other list has: RBF-SliDe's meaning of MARKER_BDRY."""
+    return case.change(roles={**dict.fromkeys(names, "sliding"), **case.roles})
+
+
+def _leading_file(case: Case) -> tuple[Motion, ...]:
+    """Return the displacement file of all moving markers, if the motions begin with one."""
+    return tuple(m for m in case.motions[:1] if isinstance(m, FromFile) and not m.marker)
+
+
+def put_file(case: Case, path: Path | None) -> Case:
+    """Return the case whose motions begin with this displacement file, or with none."""
+    rest = case.motions[len(_leading_file(case)) :]
+    return case.change(motions=rest if path is None else (FromFile(path), *rest))
+
+
+def get_file(case: Case) -> Path | None:
+    """Return the displacement file of all moving markers that the motions begin with."""
+    files = [motion.path for motion in _leading_file(case) if isinstance(motion, FromFile)]
+    return files[0] if files else None
+
+
+def put_motions(case: Case, motions: tuple[Motion, ...]) -> Case:
+    """Return the case with these motions after its displacement file."""
+    return case.change(motions=(*_leading_file(case), *motions))
+
+
+def get_motions(case: Case) -> tuple[Motion, ...] | None:
+    """Return the motions after the displacement file, None if there are none."""
+    return case.motions[len(_leading_file(case)) :] or None
+
 
 _ROWS = (
     setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
@@ -100,314 +92,9 @@ _ROWS = (
         get_motions,
         label="Motion",
     ),
-    setting(
-        "PERIODIC_MODE",
-        PERIODICITY,
-        one_of(PERIODIC_MODES),
-        "periodic",
-        "How boundaries repeat: not, in the distance only, or also in the displacement with "
-        "fixed or moving vertices.",
-        label="Periodicity",
-        form="main",
-        tip="What the periodic boundaries do: nothing special (none), only the distance repeats "
-        "(periodic), or both sides deform alike with the corners of the domain held (fixed "
-        "vertices) or sliding along (moving vertices).",
-        rank=3,
-        said="",
-        unless=no_pair,
-    ),
-    setting(
-        "PERIODIC_TYPE",
-        PERIODICITY,
-        one_of(PERIODIC_TYPES, {"0": "translational", "1": "rotational"}),
-        "periodic_type",
-        "Shift (0) or rotation (1); auto finds out by matching the markers.",
-        label="Type",
-        form="main",
-        tip="Whether one side is the other one shifted or turned; automatic takes what matches.",
-        rank=3,
-        said="{} type",
-        unless=no_pair,
-    ),
-    Key(
-        "PERIODIC_DIRECTION",
-        PERIODICITY,
-        choice({word: word for word in PERIODIC_DIRECTIONS}),
-        "Without effect, but that x, y, r and theta imply PERIODIC_TYPE: the direction (0, 1, 2 "
-        "for x, y, z or r, theta, z) is found by matching the markers.",
-        put_direction,
-        get_direction,
-        field="direction",
-        said="",
-        no_effect="matching the periodic markers finds the direction",
-    ),
-    setting(
-        "PERIODIC_AXIS",
-        PERIODICITY,
-        AXIS,
-        "axis",
-        "Axis of rotational periodicity.",
-        label="Axis",
-        form="main",
-        tip="The axis that the mesh repeats about, for rotational periodicity.",
-        rank=3,
-        unless=no_pair,
-    ),
-    setting(
-        "PERIODIC_ORIGIN",
-        PERIODICITY,
-        POINT,
-        "origin",
-        "A point on that axis.",
-        label="Through",
-        form="main",
-        rank=3,
-        said="axis through {}",
-        unless=no_pair,
-    ),
-    setting(
-        "METHOD",
-        METHOD,
-        one_of(METHODS),
-        "method",
-        "Radial basis functions, or to compare with them: inverse distance weighting, or linear "
-        "elasticity with cells that are the stiffer the smaller they are (as SU2 by default). "
-        "With both, ps and ds do the same, and kernel, radius and data reduction nothing.",
-        label="Method",
-        form="main",
-        tip="How the inner nodes follow: by radial basis functions, or to compare with them, as "
-        "means weighted with the inverse distance to the boundary, or as an elastic body whose "
-        "cells are the stiffer the smaller they are (as SU2 deforms by default).",
-        rank=1,
-        said="",
-    ),
-    setting(
-        "SLIDING_MODE",
-        METHOD,
-        one_of(SLIDING),
-        "sliding",
-        "How nodes slide: not, pseudo sliding (ps) or direct sliding (ds).",
-        label="Sliding",
-        form="main",
-        tip="Whether the nodes of sliding boundaries stay (none), slide and are put back on the "
-        "boundary in stages (pseudo), or slide as part of the system itself (direct).",
-        rank=2,
-        said="",
-        unless=nothing_slides,
-    ),
-    setting(
-        "STEPS",
-        METHOD,
-        steps_kind(),
-        "steps",
-        "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
-        "halves steps that fold a cell, and takes the fewest that are enough.",
-        label="Steps",
-        form="main",
-        tip="Into how many equal parts the motion is divided: more keep large motions valid and "
-        "take longer; automatic (0) takes as few as give no inverted cell.",
-        rank=4,
-        said="",
-    ),
-    setting(
-        "STEPS_GAIN",
-        METHOD,
-        real(0.0, 1.0),
-        "steps_gain",
-        "With STEPS= auto, enough is when more steps raise the minimum quality by less than "
-        "this part.",
-        rank=30,
-        said="gain {}",
-    ),
-    setting(
-        "INFLUENCE_FACTOR",
-        METHOD,
-        real(1e-6, 1e6),
-        "influence_factor",
-        "Support radius of the radial function over the largest extent of the mesh.",
-        label="Support radius ×",
-        form="more",
-        tip="How far a boundary node reaches into the mesh, as a multiple of the mesh's largest "
-        "extent.",
-        rank=2,
-        said="radius × {}",
-        method="rbf",
-    ),
-    setting(
-        "RBF_KERNEL",
-        METHOD,
-        replace(
-            one_of(KERNELS),
-            allowed="one of the names below",
-            details=tuple(f"{name:<22}{kernel.label}" for name, kernel in KERNELS.items()),
-            words=names(KERNELS),
-        ),
-        "kernel",
-        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
-        label="Kernel",
-        form="more",
-        tip="The radial function; a global one reaches through the whole mesh whatever the "
-        "radius, and wants a smaller support radius.",
-        rank=1,
-        said="{}",
-        method="rbf",
-    ),
-    setting(
-        "IDW_POWER",
-        METHOD,
-        real(0.0, 20.0, closed=True),
-        "idw_power",
-        "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
-        "given.",
-        rank=30,
-        said="power {}",
-        method="idw",
-    ),
-    setting(
-        "IDW_FIXED_WEIGHT",
-        METHOD,
-        real(1e-12, 1e12),
-        "idw_fixed_weight",
-        "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
-        rank=30,
-        said="fixed weight {}",
-        method="idw",
-    ),
-    setting(
-        "CURVED",
-        METHOD,
-        YES_NO,
-        "curved",
-        "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
-        said="",
-        no_effect="curved boundaries are found and followed anyway",
-    ),
-    setting(
-        "FEATURE_ANGLE",
-        METHOD,
-        real(0.0, 180.0, closed=True),
-        "feature_angle_deg",
-        "Angle in degrees from which a bend within a boundary is an edge.",
-        label="Feature angle",
-        unit="°",
-        form="more",
-        tip="A boundary that turns by more than this angle has an edge there, which sliding nodes "
-        "do not cross.",
-        rank=20,
-    ),
-    Key(
-        "DATA_REDUCTION",
-        REDUCTION,
-        YES_NO,
-        "Interpolate with some of the boundary nodes only; without it the keys below do nothing.",
-        put_reduction,
-        lambda case: case.reduction is not None,
-        "NO",
-        field="reduction",
-        label="Data reduction",
-        form="main",
-        tip="Interpolate with some of the boundary nodes, as many as the tolerance needs, and "
-        "correct the rest: for meshes whose boundary has more than some thousand nodes.",
-        rank=5,
-        method="rbf",
-    ),
-    greedy(
-        "DATA_RED_TOLERANCE",
-        real(0.0),
-        "tolerance",
-        "Largest error left before the boundary is corrected, over all steps, in the mesh's unit.",
-        label="Tolerance",
-        form="main",
-        tip="The largest error at the boundary that the control nodes may leave to the "
-        "correction, in the mesh's length unit.",
-        rank=6,
-        said="",
-    ),
-    greedy(
-        "DATA_RED_RELATIVE",
-        real(0.0),
-        "relative",
-        "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
-        label="a relative tolerance of a case file,",
-        said="",
-    ),
-    greedy(
-        "MULTILEVEL",
-        YES_NO,
-        "multilevel",
-        "Select the control nodes in levels.",
-        label="Levels",
-        form="more",
-        tip="Whether data reduction selects in levels, each on what the ones before left, and "
-        "what ends a level.",
-        rank=60,
-        said="",
-    ),
-    greedy(
-        "MULTI_CRIT",
-        one_of(LEVEL_CRITERIA),
-        "criterion",
-        "What ends a level: its number of nodes, or the fall of its error.",
-        said="levels by {}",
-        unless=no_levels,
-    ),
-    greedy(
-        "LVL_TOL_CRIT",
-        real(0.0, 1.0),
-        "level_tolerance",
-        "Fall of the error that ends a level.",
-        said="a level ends at {}",
-        unless=no_levels,
-    ),
-    greedy(
-        "LVL_SIZE",
-        whole(1),
-        "level_size",
-        "Number of control nodes of a level.",
-        label="A level ends at",
-        form="more",
-        tip="Number of control nodes of a level, or the part of its error at which it ends.",
-        rank=60,
-        unless=no_levels,
-    ),
-    Key(
-        "DOUBLE_EDGE",
-        REDUCTION,
-        YES_NO,
-        "Select two nodes at a time, with opposite errors (YES), or one (NO); SELECTION says it "
-        "better.",
-        put_double_edge,
-        lambda _: None,
-    ),
-    greedy(
-        "SELECTION",
-        one_of(SELECTIONS),
-        "selection",
-        "Nodes taken in a cycle: a growing block (fastest), two with opposite errors, or one.",
-        label="Selection",
-        form="more",
-        tip="How many control nodes data reduction takes in a cycle: a growing block (fastest), "
-        "two with opposite errors, or the one with the largest error.",
-        rank=50,
-    ),
-    greedy(
-        "MAX_CONTROL_NODES",
-        whole(1),
-        "max_nodes",
-        "Stop at so many control nodes in any case.",
-        said="",
-    ),
-    greedy(
-        "GAMMA",
-        real(0.0),
-        "gamma",
-        "Radius of the correction over the largest error.",
-        label="Correction radius ×",
-        form="more",
-        tip="How far the last correction of the boundary reaches, as a multiple of the largest "
-        "error that the control nodes leave.",
-        rank=60,
-    ),
+    *PERIODIC_ROWS,
+    *METHOD_ROWS,
+    *REDUCTION_ROWS,
     setting(
         "GENERATE_QUALITY",
         QUALITY,
@@ -426,7 +113,6 @@ _ROWS = (
         form="more",
         tip="How cells are judged: Knupp's published size-skew, or as the program RBF-SliDe "
         "computes it for hexahedra.",
-        rank=40,
     ),
     *VIEW_ROWS,
 )
@@ -440,3 +126,12 @@ _RBF_SLIDE = {
 }
 
 KEYS: dict[str, Key] = {row.name: replace(row, rbf_slide=row.name in _RBF_SLIDE) for row in _ROWS}
+
+_FIRST = (
+    *("METHOD", "SLIDING_MODE", *(row.name for row in PERIODIC_ROWS), "STEPS"),
+    *("RBF_KERNEL", "INFLUENCE_FACTOR", "DATA_REDUCTION", "DATA_RED_TOLERANCE", "FEATURE_ANGLE"),
+    *("STEPS_GAIN", "IDW_POWER", "IDW_FIXED_WEIGHT", "QUALITY_METRIC"),
+    *("SELECTION", "MULTILEVEL", "LVL_SIZE", "GAMMA"),
+)
+BY_WEIGHT = tuple(KEYS[name] for name in dict.fromkeys((*_FIRST, *KEYS)))
+"""All rows, those that matter most first: the order of the forms and of the words of a run."""

@@ -134,29 +134,6 @@ def whole(low: int) -> Kind:
     return Kind(allowed, read, str, entry="whole", span=(low, LARGEST_WHOLE))
 
 
-def steps_kind() -> Kind:
-    """Return the kind of a number of steps: a whole number from 1, or auto (0 in the case)."""
-    counted = whole(1)
-    allowed = f"{counted.allowed}, or auto"
-
-    def read(text: str) -> int:
-        if text.lower() == "auto":
-            return 0
-        try:
-            return int(counted.read(text))
-        except CaseError as problem:
-            raise CaseError(f"{problem}, or auto") from None
-
-    return Kind(
-        allowed,
-        read,
-        lambda value: "auto" if value == 0 else str(value),
-        entry="whole",
-        words={0: "automatic"},
-        span=(0, MAX_STEPS),
-    )
-
-
 def real(low: float, high: float | None = None, closed: bool = False) -> Kind:
     """Return the kind of numbers above ``low`` and below ``high`` (up to it, if closed)."""
     allowed = f"a number above {low:g}"

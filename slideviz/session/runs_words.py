@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from slideviz.case.key import METHOD, PERIODICITY, QUALITY, REDUCTION, Key
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.model import Case
 from slideviz.case.motion_words import motion_labels
 from slideviz.session.state import Run
@@ -73,8 +73,8 @@ def control_nodes(run: Run) -> int | None:
 
 SETTINGS: tuple[Key, ...] = tuple(
     sorted(
-        (key for key in KEYS.values() if key.group in TOLD and key.said != ""),
-        key=lambda key: (TOLD[key.group], key.rank),
+        (key for key in BY_WEIGHT if key.group in TOLD and key.said != ""),
+        key=lambda key: TOLD[key.group],
     )
 )
 """Settings that tell runs apart; the motions, roles and others have their own words."""

@@ -8,7 +8,7 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFormLayout, QLabel
 
 from slideviz.case.key import Form, Key
-from slideviz.case.keys import KEYS
+from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.choice import Choice
@@ -80,7 +80,7 @@ class KeyForm(QFormLayout):
         self.fields: dict[str, Field] = {}
         self._rows: list[tuple[Key, Field]] = []
         self._own = own or {}
-        for key in sorted(KEYS.values(), key=lambda key: key.rank):
+        for key in BY_WEIGHT:
             if key.form == place:
                 self._add(key)
 

@@ -20,9 +20,11 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.case.key import Key, no_pair, nothing_slides
+from slideviz.case.key import Key
 from slideviz.case.keys import KEYS
+from slideviz.case.method_keys import nothing_slides
 from slideviz.case.model import Case, Reduction
+from slideviz.case.periodic_keys import no_pair
 from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.field_watch import FieldWatch

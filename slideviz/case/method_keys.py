@@ -1,0 +1,165 @@
+"""Keys of a case file about the method: how nodes slide and inner nodes follow, in which steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from slideviz.case.key import METHOD, setting
+from slideviz.case.model import Case
+from slideviz.case.values import MAX_STEPS, YES_NO, Kind, one_of, real, whole
+from slideviz.errors import CaseError
+from slideviz.terms import KERNELS, METHODS, SLIDING, names
+
+
+def nothing_slides(case: Case) -> str:
+    """Return why it does not matter in a case how nodes slide."""
+    slides = {"sliding", "periodic", "internal"}.intersection(case.roles.values())
+    return "" if slides else "no boundary has the role “sliding” or “periodic”"
+
+
+def steps_kind() -> Kind:
+    """Return the kind of a number of steps: a whole number from 1, or auto (0 in the case)."""
+    counted = whole(1)
+    allowed = f"{counted.allowed}, or auto"
+
+    def read(text: str) -> int:
+        if text.lower() == "auto":
+            return 0
+        try:
+            return int(counted.read(text))
+        except CaseError as problem:
+            raise CaseError(f"{problem}, or auto") from None
+
+    return Kind(
+        allowed,
+        read,
+        lambda value: "auto" if value == 0 else str(value),
+        entry="whole",
+        words={0: "automatic"},
+        span=(0, MAX_STEPS),
+    )
+
+
+METHOD_ROWS = (
+    setting(
+        "METHOD",
+        METHOD,
+        one_of(METHODS),
+        "method",
+        "Radial basis functions, or to compare with them: inverse distance weighting, or linear "
+        "elasticity with cells that are the stiffer the smaller they are (as SU2 by default). "
+        "With both, ps and ds do the same, and kernel, radius and data reduction nothing.",
+        label="Method",
+        form="main",
+        tip="How the inner nodes follow: by radial basis functions, or to compare with them, as "
+        "means weighted with the inverse distance to the boundary, or as an elastic body whose "
+        "cells are the stiffer the smaller they are (as SU2 deforms by default).",
+        said="",
+    ),
+    setting(
+        "SLIDING_MODE",
+        METHOD,
+        one_of(SLIDING),
+        "sliding",
+        "How nodes slide: not, pseudo sliding (ps) or direct sliding (ds).",
+        label="Sliding",
+        form="main",
+        tip="Whether the nodes of sliding boundaries stay (none), slide and are put back on the "
+        "boundary in stages (pseudo), or slide as part of the system itself (direct).",
+        said="",
+        unless=nothing_slides,
+    ),
+    setting(
+        "STEPS",
+        METHOD,
+        steps_kind(),
+        "steps",
+        "Steps in which the deformation is applied; auto tries 1, 2, 3, 5, 8, 13, 21 and 34, "
+        "halves steps that fold a cell, and takes the fewest that are enough.",
+        label="Steps",
+        form="main",
+        tip="Into how many equal parts the motion is divided: more keep large motions valid and "
+        "take longer; automatic (0) takes as few as give no inverted cell.",
+        said="",
+    ),
+    setting(
+        "STEPS_GAIN",
+        METHOD,
+        real(0.0, 1.0),
+        "steps_gain",
+        "With STEPS= auto, enough is when more steps raise the minimum quality by less than "
+        "this part.",
+        said="gain {}",
+    ),
+    setting(
+        "INFLUENCE_FACTOR",
+        METHOD,
+        real(1e-6, 1e6),
+        "influence_factor",
+        "Support radius of the radial function over the largest extent of the mesh.",
+        label="Support radius ×",
+        form="more",
+        tip="How far a boundary node reaches into the mesh, as a multiple of the mesh's largest "
+        "extent.",
+        said="radius × {}",
+        method="rbf",
+    ),
+    setting(
+        "RBF_KERNEL",
+        METHOD,
+        replace(
+            one_of(KERNELS),
+            allowed="one of the names below",
+            details=tuple(f"{name:<22}{kernel.label}" for name, kernel in KERNELS.items()),
+            words=names(KERNELS),
+        ),
+        "kernel",
+        "The radial function; those without compact support need a smaller INFLUENCE_FACTOR.",
+        label="Kernel",
+        form="more",
+        tip="The radial function; a global one reaches through the whole mesh whatever the "
+        "radius, and wants a smaller support radius.",
+        said="{}",
+        method="rbf",
+    ),
+    setting(
+        "IDW_POWER",
+        METHOD,
+        real(0.0, 20.0, closed=True),
+        "idw_power",
+        "With METHOD= idw, the power of the inverse distance; the number of dimensions if not "
+        "given.",
+        said="power {}",
+        method="idw",
+    ),
+    setting(
+        "IDW_FIXED_WEIGHT",
+        METHOD,
+        real(1e-12, 1e12),
+        "idw_fixed_weight",
+        "With METHOD= idw, what a boundary node that stays counts, where one that moves counts 1.",
+        said="fixed weight {}",
+        method="idw",
+    ),
+    setting(
+        "CURVED",
+        METHOD,
+        YES_NO,
+        "curved",
+        "Without effect: curved boundaries, RBF-SliDe's switch, are found and followed anyway.",
+        said="",
+        no_effect="curved boundaries are found and followed anyway",
+    ),
+    setting(
+        "FEATURE_ANGLE",
+        METHOD,
+        real(0.0, 180.0, closed=True),
+        "feature_angle_deg",
+        "Angle in degrees from which a bend within a boundary is an edge.",
+        label="Feature angle",
+        unit="°",
+        form="more",
+        tip="A boundary that turns by more than this angle has an edge there, which sliding nodes "
+        "do not cross.",
+    ),
+)

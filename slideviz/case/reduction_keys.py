@@ -1,0 +1,163 @@
+"""Keys of a case file about data reduction: which boundary nodes the interpolation takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from slideviz.case.key import NO_DEFAULT, REDUCTION, Key, other_method
+from slideviz.case.model import Case, Reduction
+from slideviz.case.values import YES_NO, Kind, one_of, real, whole
+from slideviz.terms import LEVEL_CRITERIA, SELECTIONS
+
+
+def no_reduction(case: Case) -> str:
+    """Return why settings of data reduction do nothing in a case."""
+    off = "" if case.reduction is not None else "data reduction is off"
+    return other_method(case, "rbf") or off
+
+
+def no_levels(case: Case) -> str:
+    """Return why settings of the levels of data reduction do nothing in a case."""
+    levels = case.reduction is not None and case.reduction.multilevel
+    return no_reduction(case) or ("" if levels else "there are no levels")
+
+
+def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Key:
+    """Return the row of a field of ``Reduction``; without data reduction it is checked only."""
+
+    def put(case: Case, value: Any) -> Case:
+        if case.reduction is None:
+            return case
+        return case.change(reduction=replace(case.reduction, **{field: value}))
+
+    def get(case: Case) -> Any:
+        return None if case.reduction is None else getattr(case.reduction, field)
+
+    value = getattr(Reduction(), field)
+    default = NO_DEFAULT if value is None else kind.write(value)
+    window = {"unless": no_reduction, **window}
+    return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
+
+
+def put_double_edge(case: Case, wanted: bool) -> Case:
+    """Return the case that selects two nodes at a time, or one: RBF-SliDe's DOUBLE_EDGE."""
+    if case.reduction is None:
+        return case
+    return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
+
+
+def put_reduction(case: Case, wanted: bool) -> Case:
+    """Return the case with data reduction (its settings kept) or without."""
+    return case.change(reduction=(case.reduction or Reduction()) if wanted else None)
+
+
+REDUCTION_ROWS = (
+    Key(
+        "DATA_REDUCTION",
+        REDUCTION,
+        YES_NO,
+        "Interpolate with some of the boundary nodes only; without it the keys below do nothing.",
+        put_reduction,
+        lambda case: case.reduction is not None,
+        "NO",
+        field="reduction",
+        label="Data reduction",
+        form="main",
+        tip="Interpolate with some of the boundary nodes, as many as the tolerance needs, and "
+        "correct the rest: for meshes whose boundary has more than some thousand nodes.",
+        method="rbf",
+    ),
+    greedy(
+        "DATA_RED_TOLERANCE",
+        real(0.0),
+        "tolerance",
+        "Largest error left before the boundary is corrected, over all steps, in the mesh's unit.",
+        label="Tolerance",
+        form="main",
+        tip="The largest error at the boundary that the control nodes may leave to the "
+        "correction, in the mesh's length unit.",
+        said="",
+    ),
+    greedy(
+        "DATA_RED_RELATIVE",
+        real(0.0),
+        "relative",
+        "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
+        label="a relative tolerance of a case file,",
+        said="",
+    ),
+    greedy(
+        "MULTILEVEL",
+        YES_NO,
+        "multilevel",
+        "Select the control nodes in levels.",
+        label="Levels",
+        form="more",
+        tip="Whether data reduction selects in levels, each on what the ones before left, and "
+        "what ends a level.",
+        said="",
+    ),
+    greedy(
+        "MULTI_CRIT",
+        one_of(LEVEL_CRITERIA),
+        "criterion",
+        "What ends a level: its number of nodes, or the fall of its error.",
+        said="levels by {}",
+        unless=no_levels,
+    ),
+    greedy(
+        "LVL_TOL_CRIT",
+        real(0.0, 1.0),
+        "level_tolerance",
+        "Fall of the error that ends a level.",
+        said="a level ends at {}",
+        unless=no_levels,
+    ),
+    greedy(
+        "LVL_SIZE",
+        whole(1),
+        "level_size",
+        "Number of control nodes of a level.",
+        label="A level ends at",
+        form="more",
+        tip="Number of control nodes of a level, or the part of its error at which it ends.",
+        unless=no_levels,
+    ),
+    Key(
+        "DOUBLE_EDGE",
+        REDUCTION,
+        YES_NO,
+        "Select two nodes at a time, with opposite errors (YES), or one (NO); SELECTION says it "
+        "better.",
+        put_double_edge,
+        lambda _: None,
+    ),
+    greedy(
+        "SELECTION",
+        one_of(SELECTIONS),
+        "selection",
+        "Nodes taken in a cycle: a growing block (fastest), two with opposite errors, or one.",
+        label="Selection",
+        form="more",
+        tip="How many control nodes data reduction takes in a cycle: a growing block (fastest), "
+        "two with opposite errors, or the one with the largest error.",
+    ),
+    greedy(
+        "MAX_CONTROL_NODES",
+        whole(1),
+        "max_nodes",
+        "Stop at so many control nodes in any case.",
+        said="",
+    ),
+    greedy(
+        "GAMMA",
+        real(0.0),
+        "gamma",
+        "Radius of the correction over the largest error.",
+        label="Correction radius ×",
+        form="more",
+        tip="How far the last correction of the boundary reaches, as a multiple of the largest "
+        "error that the control nodes leave.",
+    ),
+)
