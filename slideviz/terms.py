@@ -54,6 +54,18 @@ def tips(terms: Mapping[Any, Term]) -> dict[str, str]:
     return {value: term.tip for value, term in terms.items() if term.tip}
 
 
+PALETTE = {
+    "orange": "#e69f00",
+    "sky blue": "#56b4e9",
+    "green": "#009e73",
+    "yellow": "#f0e442",
+    "blue": "#0072b2",
+    "vermilion": "#d55e00",
+    "purple": "#cc79a7",
+    "black": "#000000",
+}
+"""Okabe and Ito's colours (2008), told apart by colour-blind people."""
+
 # Boundaries --------------------------------------------------------------------------------
 
 Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
@@ -68,19 +80,23 @@ class RoleTerm(Term):
 
 ROLES: dict[Role, RoleTerm] = {
     "moving": RoleTerm(
-        "moving", "is moved by the motions you list", "#d55e00", key="MARKER_MOVING"
+        "moving", "is moved by the motions you list", PALETTE["vermilion"], key="MARKER_MOVING"
     ),
     "fixed": RoleTerm("fixed", "stays where it is", "#7d8793", key="MARKER_FIXED"),
     "sliding": RoleTerm(
-        "sliding", "its nodes slide along the surface", "#0072b2", key="MARKER_SLIDING"
+        "sliding", "its nodes slide along the surface", PALETTE["blue"], key="MARKER_SLIDING"
     ),
-    "periodic": RoleTerm("periodic", "repeats another boundary", "#009e73", key="MARKER_PERIODIC"),
+    "periodic": RoleTerm(
+        "periodic", "repeats another boundary", PALETTE["green"], key="MARKER_PERIODIC"
+    ),
     "internal": RoleTerm(
-        "internal", "its nodes move freely with the cells inside", "#cc79a7", key="MARKER_INTERNAL"
+        "internal",
+        "its nodes move freely with the cells inside",
+        PALETTE["purple"],
+        key="MARKER_INTERNAL",
     ),
 }
-"""Colours: Okabe and Ito's palette (2008), told apart by colour-blind people, and a grey for what
-does nothing."""
+"""Colours of the palette, and a grey for what does nothing."""
 
 NodeType = Literal[
     "moving", "fixed", "sliding_surface", "sliding_edge", "periodic", "internal", "control"
@@ -89,7 +105,7 @@ NODE_TYPES: dict[NodeType, Term] = {
     "moving": Term("moving", colour=ROLES["moving"].colour),
     "fixed": Term("fixed", colour=ROLES["fixed"].colour),
     "sliding_surface": Term("sliding face", colour=ROLES["sliding"].colour),
-    "sliding_edge": Term("sliding edge", colour="#56b4e9"),
+    "sliding_edge": Term("sliding edge", colour=PALETTE["sky blue"]),
     "periodic": Term("periodic", colour=ROLES["periodic"].colour),
     "internal": Term("internal", colour=ROLES["internal"].colour),
     "control": Term("control", colour="#d81b60"),
@@ -190,38 +206,25 @@ LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
 # Periodicity -------------------------------------------------------------------------------
 
 PeriodicMode = Literal["none", "periodic", "fixed", "moving"]
-
-
-@dataclass(frozen=True)
-class PeriodicTerm(Term):
-    """A way to repeat; ``figure`` is what it is called in figures, which have little room."""
-
-    figure: str = ""
-
-
-PERIODIC_MODES: dict[PeriodicMode, PeriodicTerm] = {
-    "none": PeriodicTerm(
+PERIODIC_MODES: dict[PeriodicMode, Term] = {
+    "none": Term(
         "none",
         "Periodic boundaries are treated as sliding ones; distances do not repeat.",
         alone="not periodic",
-        figure="not periodic",
     ),
-    "periodic": PeriodicTerm(
+    "periodic": Term(
         "periodic distance",
         "Periodic boundaries are treated as sliding ones, and distances repeat: what moves near "
         "one side is felt at the other.",
-        figure="periodic distance",
     ),
-    "fixed": PeriodicTerm(
+    "fixed": Term(
         "periodic, fixed vertices",
         "Periodic boundaries move freely, both sides alike; the corners of the domain are held.",
-        figure="periodic, ends fixed",
     ),
-    "moving": PeriodicTerm(
+    "moving": Term(
         "periodic, moving vertices",
         "Periodic boundaries move freely, both sides alike; the corners of the domain slide in "
         "the periodic direction. Needs a sliding method.",
-        figure="periodic, ends moving",
     ),
 }
 

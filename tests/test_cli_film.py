@@ -17,6 +17,7 @@ from PIL import Image
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.samples.table import write_sample
+from slideviz.session.changes import seen_beside
 
 
 @pytest.fixture
@@ -75,6 +76,24 @@ def test_two_runs_stand_beside_each_other(case, tmp_path, capsys):
     assert "SLIDING_MODE= ps, PERIODIC_MODE= moving: 2 steps, min 0." in out.out
     assert "SLIDING_MODE= none, PERIODIC_MODE= none: 2 steps, min 0." in out.out
     assert "SLIDING_MODE= none: inflow, outflow will not slide" in out.err
+
+
+def test_each_run_judges_the_undeformed_mesh_by_its_own_metric(tmp_path, monkeypatch):
+    write_sample("cylindrical", tmp_path / "case", 8)
+    case = tmp_path / "case" / "cylindrical.cfg"
+    drawn = []
+
+    def draw(session, file, *_, **__):
+        drawn.extend((session, seen_beside(session)))
+        yield from ()
+
+    monkeypatch.setattr("slideviz.export.film.film", draw)
+    words = ["film", str(case), "-o", str(tmp_path / "a.gif"), "--set", "STEPS=2", "-q"]
+    run([*words, "--beside", "QUALITY_METRIC=rbf-slide"])
+    metrics = [[frame.quality.metric for frame in one.frames] for one in drawn]
+    assert metrics == [["knupp"] * 3, ["rbf-slide"] * 3]
+    left, right = (one.frames[0].quality.mean for one in drawn)
+    assert left != right
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def wendland_c2(distance):
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
 for axes, shape in ((left, lambda d: d), (right, wendland_c2)):
     axes.plot(difference, shape(difference), "--", color="0.5", label="plain distance")
-    axes.plot(difference, shape(periodic), color="#0072b2", label="periodic distance")
+    axes.plot(difference, shape(periodic), color="C0", label="periodic distance")
     axes.axvline(PERIOD, color="0.8", zorder=0)
     axes.set_xlabel("difference / period")
 left.set(title="distance", ylabel="distance / period")

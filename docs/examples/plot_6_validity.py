@@ -30,7 +30,7 @@ inverted = np.array([quality.inverted for quality in rated], bool)
 print(f"inverted up to {corners[inverted].max():.2f}")
 
 figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
-axes.axvspan(0.3, 0.5, color="#d55e00", alpha=0.2, label="inverted")
+axes.axvspan(0.3, 0.5, color="C3", alpha=0.2, label="inverted")
 axes.plot(corners, [quality.size[0] for quality in rated], label="size")
 axes.plot(corners, [quality.skew[0] for quality in rated], label="skew")
 axes.plot(corners, [quality.values[0] for quality in rated], "k", label="quality = √size · skew")

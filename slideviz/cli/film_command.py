@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -119,16 +120,23 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     mesh = read(case.mesh_file, zone=case.zone)
     require_detail(arguments.zoom, mesh)
-    first = Frame(mesh, quality(mesh, reference=mesh, metric=case.quality_metric))
+
+    def undeformed(one: Case) -> Frame:
+        return Frame(mesh, quality(mesh, reference=mesh, metric=one.quality_metric))
+
+    first = undeformed(case)
     if not arguments.beside:
         return first, [Run(1, case, _frames(arguments, case, mesh), "done")]
     if (other.mesh_file, other.zone) != (case.mesh_file, case.zone):
         raise CaseError("--beside: two runs beside each other must deform the same mesh")
     keys = [text.partition("=")[0].strip().upper() for text in arguments.beside]
-    return first, [
+    runs = [
         Run(number, one, _frames(arguments, one, mesh), "done", name=_words(one, keys))
         for number, one in enumerate((case, other), start=1)
     ]
+    if other.quality_metric != case.quality_metric:
+        runs[1] = replace(runs[1], undeformed=undeformed(other))
+    return first, runs
 
 
 def _words(case: Case, keys: list[str]) -> str:

@@ -7,13 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, Look
 from slideviz.plots.written import SMALLEST
+from slideviz.terms import PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_ON_LIGHT = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#56b4e9", "#e69f00")
-_ON_DARK = ("#56b4e9", "#e69f00", "#2bc49a", "#e39bc4", "#ffffff", "#f0e442", "#f08040")
-"""Okabe and Ito's palette (2008), which colour-blind people can tell apart; lighter on dark."""
+_ON_LIGHT = tuple(
+    PALETTE[name]
+    for name in ("blue", "vermilion", "green", "purple", "black", "sky blue", "orange")
+)
+_ON_DARK = (
+    *(PALETTE["sky blue"], PALETTE["orange"], "#2bc49a", "#e39bc4", "#ffffff"),
+    *(PALETTE["yellow"], "#f08040"),
+)
+"""Colours of the palette, those that are too dark for it made lighter on dark."""
 
 _DASHES: tuple[Any, ...] = (
     "solid",

@@ -63,6 +63,8 @@ class Run:
         Whether the mesh of its last step was written.
     name : str
         What the user calls it; empty as long as nobody did.
+    undeformed : Frame or None
+        The undeformed mesh, where the metric of this run judges it otherwise than the session's.
     """
 
     number: int
@@ -71,6 +73,7 @@ class Run:
     end: Literal["", "done", "cancelled", "failed"] = ""
     saved: bool = False
     name: str = ""
+    undeformed: Frame | None = None
 
     @property
     def label(self) -> str:

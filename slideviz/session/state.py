@@ -196,8 +196,8 @@ class Session:
     def frames(self) -> tuple[Frame, ...]:
         """Return the undeformed mesh and every step of the run that is shown."""
         run = self.run_shown
-        first = (self.first,) if self.first is not None else ()
-        return first + (run.frames if run is not None else ())
+        first = (run and run.undeformed) or self.first
+        return (() if first is None else (first,)) + (() if run is None else run.frames)
 
     @property
     def ran(self) -> Case | None:

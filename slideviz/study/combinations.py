@@ -37,7 +37,7 @@ COMPARED_METHODS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 """What each method is called, and what of a case it changes."""
 
-MODES = {mode: term.figure for mode, term in terms.PERIODIC_MODES.items()}
+MODES = terms.names(terms.PERIODIC_MODES)
 """What each PERIODIC_MODE is called."""
 
 AUTO = 0
