@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
     from slideviz.deformation.solver import Step, deform
     from slideviz.errors import SlidevizError
+    from slideviz.mesh.io.convert import convert
     from slideviz.mesh.io.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
@@ -32,6 +33,7 @@ _HOME = {
     "SlidevizError": "errors",
     "Step": "deformation.solver",
     "Translate": "case.model",
+    "convert": "mesh.io.convert",
     "deform": "deformation.solver",
     "quality": "mesh.quality",
     "read": "mesh.io.files",
@@ -53,6 +55,7 @@ __all__ = [
     "Step",
     "Translate",
     "__version__",
+    "convert",
     "deform",
     "quality",
     "read",

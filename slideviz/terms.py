@@ -66,6 +66,17 @@ PALETTE = {
 }
 """Okabe and Ito's colours (2008), told apart by colour-blind people."""
 
+# Files -------------------------------------------------------------------------------------
+
+FileFormat = Literal["su2", "su2b"]
+
+FILE_FORMATS: dict[FileFormat, Term] = {
+    "su2": Term("SU2", "SU2’s text"),
+    "su2b": Term("SU2B", "SU2’s binary mesh"),
+}
+"""The formats of SU2, by ending; the label is the value of MESH_FORMAT."""
+
+
 # Boundaries --------------------------------------------------------------------------------
 
 Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]

@@ -15,9 +15,9 @@ from slideviz.case.model import Case, FromFile, Motion
 from slideviz.case.motion_text import MOTIONS
 from slideviz.case.periodic_keys import PERIODIC_ROWS
 from slideviz.case.reduction_keys import REDUCTION_ROWS
-from slideviz.case.values import NAMES, PAIRS, PATH, YES_NO, one_of, whole
+from slideviz.case.values import NAMES, PAIRS, PATH, YES_NO, choice, one_of, whole
 from slideviz.case.view_keys import VIEW_ROWS
-from slideviz.terms import METRICS
+from slideviz.terms import FILE_FORMATS, METRICS
 
 
 def put_boundaries(case: Case, names: tuple[str, ...]) -> Case:
@@ -52,9 +52,25 @@ def get_motions(case: Case) -> tuple[Motion, ...] | None:
     return case.motions[len(_leading_file(case)) :] or None
 
 
+_FORMAT = choice({term.label: value for value, term in FILE_FORMATS.items()})
+
 _ROWS = (
     setting("MESH_FILENAME", FILES, PATH, "mesh_file", "The mesh to deform."),
     setting("MESH_OUT_FILENAME", FILES, PATH, "mesh_out", "Where the deformed mesh is written."),
+    setting(
+        "MESH_FORMAT",
+        FILES,
+        _FORMAT,
+        "mesh_format",
+        "SU2's text or binary; without it ending and content of the file tell.",
+    ),
+    setting(
+        "MESH_OUT_FORMAT",
+        FILES,
+        _FORMAT,
+        "mesh_out_format",
+        "SU2's text or binary, whatever the ending of the file.",
+    ),
     setting("ZONE", FILES, whole(1), "zone", "The zone to deform, from 1, of a mesh with several."),
     role("MARKER_MOVING", NAMES, "moving", "Boundaries whose displacement is prescribed."),
     role("MARKER_FIXED", NAMES, "fixed", "Boundaries that stay; so do those in no list."),

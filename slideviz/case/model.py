@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from slideviz.terms import (
+    FileFormat,
     LevelCriterion,
     Method,
     Metric,
@@ -133,7 +134,8 @@ class Case:
     """A deformation case, the content of a ``.cfg`` file.
 
     Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
-    thesis. Paths are absolute, or relative to the current folder. ``direction`` is the
+    thesis. Paths are absolute, or relative to the current folder; the formats of the meshes are
+    None where their endings tell. ``direction`` is the
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
     where none is given; it and ``curved`` are RBF-SliDe's and without effect, since the matching
     of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0 for as
@@ -158,6 +160,8 @@ class Case:
 
     mesh_file: Path | None = None
     mesh_out: Path | None = None
+    mesh_format: FileFormat | None = None
+    mesh_out_format: FileFormat | None = None
     zone: int | None = None
     roles: Mapping[str, Role] = field(default_factory=dict)
     motions: tuple[Motion, ...] = ()

@@ -83,7 +83,7 @@ def compare(arguments: argparse.Namespace) -> int:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
     wanted = _wanted(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
-    mesh = read(case.mesh_file, zone=case.zone)
+    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
     require_places(arguments, *(Output(table, "compare", named=False) for table in tables))

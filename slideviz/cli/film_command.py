@@ -118,7 +118,7 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
-    mesh = read(case.mesh_file, zone=case.zone)
+    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     require_detail(arguments.zoom, mesh)
 
     def undeformed(one: Case) -> Frame:

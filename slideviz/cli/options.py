@@ -44,7 +44,8 @@ def reference_of(
         return arguments.reference, read(arguments.reference, zone=arguments.zone)
     if case is None or case.mesh_file is None or not case.mesh_file.is_file():
         return None
-    base = read(case.mesh_file, zone=arguments.zone or case.zone)
+    zone = arguments.zone or case.zone
+    base = read(case.mesh_file, zone=zone, file_format=case.mesh_format)
     same = base.points.shape == mesh.points.shape and base.cells.same_as(mesh.cells)
     return (case.mesh_file, base) if same else None
 

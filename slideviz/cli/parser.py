@@ -9,6 +9,7 @@ from typing import NoReturn
 
 from slideviz import __version__
 from slideviz.cli.compare_command import add_compare
+from slideviz.cli.convert_command import add_convert
 from slideviz.cli.film_command import add_film
 from slideviz.cli.info_command import add_info
 from slideviz.cli.keys_command import add_keys
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[[argparse._SubParsersAction], None]] = {
     "film": add_film,
     "section": add_section,
     "compare": add_compare,
+    "convert": add_convert,
     "sample": add_sample,
     "keys": add_keys,
     "shots": add_shots,

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.mesh.model import Mesh
+    from slideviz.terms import FileFormat
 
 _READ = {
     "mesh": "the input mesh",
@@ -144,10 +146,30 @@ def _meet(one: Output, other: Output) -> bool:
 
 
 def _require_mesh_ending(file: Path) -> None:
-    if file.suffix.lower() not in (".su2", ".vtu"):
+    if file.suffix.lower() not in (".su2", ".su2b", ".vtu"):
         from slideviz.mesh.io.meshio_calls import formats_of
 
         formats_of(file)
+
+
+def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -> None:
+    """Say before the work what an SU2 binary file will not keep of a mesh.
+
+    Raises
+    ------
+    MeshError
+        It cannot hold the mesh at all.
+    """
+    from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
+
+    if (file_format or output.suffix.lower().removeprefix(".")) != "su2b":
+        return
+    require_binary(mesh)
+    lost = lost_in_binary(mesh)
+    if lost:
+        words = f"{output} is an SU2 binary mesh and will not have {' and '.join(lost)}"
+        remedy = f"of {mesh.name}; write a .su2 file to keep them"
+        print(f"slideviz: warning: {words} {remedy}", file=sys.stderr, flush=True)
 
 
 def make_folder(folder: Path) -> None:

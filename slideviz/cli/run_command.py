@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
+    from slideviz.terms import FileFormat
 
 KEPT_BYTES = 1_000_000_000
 """Meshes of steps are kept up to this size, to tell when cells were inverted."""
@@ -47,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write mesh, report, steps and picture."""
     from slideviz import quality, read, write
     from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.places import tell_lost
     from slideviz.cli.report import cell_data, run_report, save_history, save_json
     from slideviz.errors import CaseError
     from slideviz.scene.moved import require_detail
@@ -55,11 +57,13 @@ def run(arguments: argparse.Namespace) -> int:
     case = read_case(arguments)
     if case.mesh_file is None:
         raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
-    output = arguments.output or case.mesh_out or _default_output(case.mesh_file)
+    output = arguments.output or case.mesh_out or _default_output(case)
+    kind = _format_of(output, case)
     qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
     _require_places(arguments, case, output, qualities)
     seconds = {"read": -time.perf_counter()}
-    mesh = read(case.mesh_file, zone=case.zone)
+    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    tell_lost(output, mesh, kind)
     if arguments.picture:
         require_detail(arguments.zoom, mesh)
     seconds["read"] += time.perf_counter()
@@ -71,7 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
     seconds["quality"] += time.perf_counter()
     seconds["write"] = -time.perf_counter()
     data = cell_data(output, found)
-    write(output, last.mesh, overwrite=arguments.force, cell_data=data, base=mesh)
+    force = arguments.force
+    write(output, last.mesh, overwrite=force, cell_data=data, base=mesh, file_format=kind)
     if qualities:
         _write_qualities(qualities, found)
     seconds["write"] += time.perf_counter()
@@ -116,7 +121,7 @@ def _require_places(
         output,
         "-o" if arguments.output else "MESH_OUT_FILENAME" if case.mesh_out else "without -o",
         named=bool(arguments.output),
-        is_mesh=True,
+        is_mesh=_format_of(output, case) is None,
         replaces=case.mesh_file if arguments.force else None,
         remedy="choose another name with -o or MESH_OUT_FILENAME"
         + (", or say --force to write over it" if may_force else ""),
@@ -138,14 +143,22 @@ def _require_places(
             arguments.steps_dir,
             "--steps-dir",
             named=False,
-            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.su2",
+            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.su2b?",
         ),
     )
 
 
-def _default_output(mesh_file: Path) -> Path:
+def _default_output(case: Case) -> Path:
     """Return ``name_def.su2`` in the current folder for ``.../name.su2``."""
-    return Path(f"{mesh_file.stem}_def{mesh_file.suffix}")
+    assert case.mesh_file is not None
+    ending = f".{case.mesh_out_format}" if case.mesh_out_format else case.mesh_file.suffix
+    return Path(f"{case.mesh_file.stem}_def{ending}")
+
+
+def _format_of(output: Path, case: Case) -> FileFormat | None:
+    """Return the format that MESH_OUT_FORMAT asks for; an ending given on the command line wins."""
+    named = output.suffix.lower() in (".su2", ".su2b") and output != case.mesh_out
+    return None if named else case.mesh_out_format
 
 
 def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
@@ -160,7 +173,8 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))
-                name = f"{case.mesh_file.stem}_{step.index:0{width}d}.su2"
+                ending = ".su2" if mesh.binary is None else ".su2b"
+                name = f"{case.mesh_file.stem}_{step.index:0{width}d}{ending}"
                 write(folder / name, step.mesh)
             steps.append(step)
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:

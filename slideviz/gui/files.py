@@ -18,7 +18,7 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.session import changes, jobs
-from slideviz.session.formats import left_out
+from slideviz.session.formats import left_out, usual_ending
 from slideviz.session.keep import keep_view
 
 if TYPE_CHECKING:
@@ -223,8 +223,8 @@ class Files(QObject):
         if frame is None or self.window.runner.busy:
             return
         step = f"_step{session.view.frame}" if frame is not session.frames[-1] else "_deformed"
-        default = self.folder() / f"{self.stem()}{step}.su2"
         assert session.mesh is not None
+        default = self.folder() / f"{self.stem()}{step}{usual_ending(session.mesh)}"
         filters = questions.mesh_filters(session.mesh)
         path = questions.ask_save(self.window, "Save mesh", default, filters)
         if path is None:
@@ -272,7 +272,7 @@ class Files(QObject):
             return False
         session = self.window.store.session
         case = session.case
-        if self._saved_to is not None and self._saved_to.suffix == ".su2":
+        if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b"):
             case = case.change(mesh_out=self._saved_to)
         try:
             keep_view(replace(session, case=case), self.window.scene.camera.place).write(path)

@@ -17,6 +17,7 @@ from slideviz.mesh.elements import ELEMENTS
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
     from slideviz.mesh.io.su2 import Document
+    from slideviz.mesh.io.su2b import BinaryForm
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -152,6 +153,8 @@ class Mesh:
         Copies of cells beyond the periodic sides, which only follow the cells they copy.
     remarks : tuple of str
         What was found odd when reading, a sentence each.
+    binary : BinaryForm or None
+        How an SU2 binary file held it, kept for writing.
     """
 
     points: FloatArray
@@ -164,6 +167,7 @@ class Mesh:
     source: Path | None = None
     halo: Halo | None = None
     remarks: tuple[str, ...] = ()
+    binary: BinaryForm | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

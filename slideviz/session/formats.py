@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from slideviz.mesh.io.su2b_write import lost_in_binary
 from slideviz.mesh.model import Mesh
 
 
@@ -25,6 +26,7 @@ class MeshFormat:
 
 MESH_FORMATS: dict[str, MeshFormat] = {
     ".su2": MeshFormat("SU2 (keeps all markers and sections)", False, "names"),
+    ".su2b": MeshFormat("SU2 binary (keeps all markers)", False, "names"),
     ".vtu": MeshFormat("VTU for ParaView, with quality and displacement", True, "names"),
     ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
     ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),
@@ -43,6 +45,11 @@ def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
     return {end: row for end, row in MESH_FORMATS.items() if mesh.dim in row.dims}
 
 
+def usual_ending(mesh: Mesh) -> str:
+    """Return the ending that a mesh is offered to be saved with."""
+    return ".su2" if mesh.binary is None else ".su2b"
+
+
 def holds_quality(path: Path) -> bool:
     """Tell whether a file of that name can hold numbers of the cells."""
     row = MESH_FORMATS.get(path.suffix.lower())
@@ -54,6 +61,9 @@ def left_out(path: Path, mesh: Mesh) -> str:
     end = path.suffix.lower()
     if end == ".su2":
         return ""
+    if end == ".su2b":
+        few = lost_in_binary(mesh)
+        return f"{path.name} does not hold {' and '.join(few)}." if few else ""
     row = MESH_FORMATS.get(end)
     lost = []
     if row is None or row.boundaries == "numbers":

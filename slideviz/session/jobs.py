@@ -84,7 +84,8 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
         require_going(stopped)
         report(Doing(f"Reading {mesh_path.name}", fraction))
 
-    mesh = read(mesh_path, zone=zone, progress=reading)
+    kind = case.mesh_format if case is not None else None
+    mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
     return prepare(mesh, mesh_path, case, report, stopped)
 
 

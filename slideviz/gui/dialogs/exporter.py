@@ -17,6 +17,7 @@ from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services
 from slideviz.session import changes, jobs_export
+from slideviz.session.formats import usual_ending
 from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")
@@ -156,8 +157,9 @@ class Exports(QObject):
         run, mesh = session.run_shown, session.mesh
         if run is None or mesh is None or not run.frames or self.window.runner.busy:
             return
-        default = files.folder() / f"{files.stem()}_step.su2"
-        title = f"Save {len(run.frames)} steps: each name gets a number, as in NAME_1.su2"
+        ending = usual_ending(mesh)
+        default = files.folder() / f"{files.stem()}_step{ending}"
+        title = f"Save {len(run.frames)} steps: each name gets a number, as in NAME_1{ending}"
         filters = questions.mesh_filters(mesh)
         path = questions.ask_numbered(self.window, title, default, filters)
         if path is None:

@@ -46,7 +46,8 @@ def ask_open(parent: QWidget, folder: Path) -> Path | None:
     import meshio
 
     every = " ".join("*" + suffix for suffix in sorted(meshio.extension_to_filetypes))
-    filters = f"SU2 meshes and cases (*.su2 *.cfg);;All meshes (*.su2 {every});;All files (*)"
+    ours = "*.su2 *.su2b"
+    filters = f"SU2 meshes and cases ({ours} *.cfg);;All meshes ({ours} {every});;All files (*)"
     name, _ = QFileDialog.getOpenFileName(parent, "Open a mesh or case", str(folder), filters)
     return Path(name) if name else None
 

@@ -16,7 +16,10 @@ from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.su2 import read_su2
 from slideviz.mesh.io.su2_scan import Progress
 from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.io.su2b import is_su2b, read_su2b
+from slideviz.mesh.io.su2b_write import su2b_blocks
 from slideviz.mesh.model import Mesh
+from slideviz.terms import FileFormat
 
 _READ_BYTES = 1 << 22
 _READING = 0.1
@@ -26,17 +29,24 @@ _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
 
 
-def read(path: str | Path, zone: int | None = None, progress: Progress | None = None) -> Mesh:
+def read(
+    path: str | Path,
+    zone: int | None = None,
+    progress: Progress | None = None,
+    file_format: FileFormat | None = None,
+) -> Mesh:
     """Return the mesh of a file.
 
     Parameters
     ----------
     path : str or Path
-        An SU2 file, or one of a format that meshio reads (by its ending).
+        An SU2 file, text or binary, or one of a format that meshio reads (by its ending).
     zone : int, optional
         The zone of an SU2 file, from 1; the first when left out.
     progress : callable, optional
         Called with the fraction done, 0 to 1; what it raises stops the reading and passes on.
+    file_format : {"su2", "su2b"}, optional
+        SU2's text or binary; found out by the ending and the content when left out.
 
     Raises
     ------
@@ -54,7 +64,10 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
     path = Path(path)
     tick = progress or (lambda _: None)
     try:
-        if _is_su2(path):
+        kind = _format_of(path, file_format)
+        if kind == "su2b":
+            return read_su2b(path, zone, tick)
+        if kind == "su2":
             data = _read_bytes(path, tick)
             return read_su2(path, data, zone, lambda done: tick(_READING + (1 - _READING) * done))
         if zone not in (None, 1):
@@ -70,14 +83,22 @@ def read(path: str | Path, zone: int | None = None, progress: Progress | None = 
         ) from problem
 
 
-def _is_su2(path: Path) -> bool:
-    """Tell whether it is an SU2 file, by ending or, where that says nothing, by content."""
+def _format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
+    """Return the SU2 format of a file: as given, by ending or, as that may not say, by content."""
+    ending = path.suffix.lower()
     try:
         require_ordinary(path, MeshError)
-        if path.suffix.lower() not in _UNSURE:
-            return path.suffix.lower() == ".su2"
+        if given is None and ending not in (".su2", ".su2b", *_UNSURE):
+            return None
+        binary = is_su2b(path)
+        if given is not None:
+            return given
+        if binary or ending == ".su2b":
+            return "su2b"
+        if ending == ".su2":
+            return "su2"
         with path.open("rb") as file:
-            return _NDIME.search(file.read(_SNIFFED_BYTES)) is not None
+            return "su2" if _NDIME.search(file.read(_SNIFFED_BYTES)) else None
     except (OSError, ValueError) as problem:
         raise _unreadable(path, problem) from problem
 
@@ -123,6 +144,8 @@ def write(
     cell_data: Mapping[str, ArrayLike] | None = None,
     base: Mesh | None = None,
     going_on: Callable[[], object] | None = None,
+    *,
+    file_format: FileFormat | None = None,
 ) -> None:
     """Write a mesh, in the format that the ending of ``path`` names, whole or not at all.
 
@@ -131,7 +154,8 @@ def write(
     path : str or Path
         The file; one that exists is replaced.
     mesh : Mesh
-        What to write. From SU2 to SU2 everything else in the file is kept.
+        What to write. From SU2 text to text, and from binary to binary, everything else in the
+        file is kept.
     overwrite : bool
         Whether ``path`` may be the file that the mesh was read from.
     cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
@@ -141,6 +165,8 @@ def write(
     going_on : callable, optional
         Called between the blocks of an SU2 file; what it raises stops the writing, and what was
         at ``path`` stays.
+    file_format : {"su2", "su2b"}, optional
+        SU2's text or binary, whatever the ending.
 
     Raises
     ------
@@ -165,7 +191,8 @@ def write(
         )
     replaces = path if overwrite else None
     values = _checked(mesh, cell_data or {})
-    if path.suffix.lower() != ".su2":
+    kind = file_format or path.suffix.lower().removeprefix(".")
+    if kind not in ("su2", "su2b"):
         from slideviz.mesh.io.meshio_write import write_other_format
 
         moved = {} if base is None else {"displacement": mesh.points - base.points}
@@ -176,7 +203,7 @@ def write(
             path, f"an SU2 file has no place for cell data ({', '.join(values)}); write a .vtu file"
         )
     with atomic_write(path, replaces=replaces) as file:
-        for block in su2_blocks(mesh):
+        for block in su2b_blocks(mesh) if kind == "su2b" else su2_blocks(mesh):
             file.write(block)
             if going_on is not None:
                 going_on()

@@ -1,0 +1,38 @@
+"""``slideviz convert``: writes a mesh in another format."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_convert(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``convert`` to the parser."""
+    call = calls.add_parser("convert", help="write a mesh in another format")
+    call.add_argument("mesh", type=Path, help="the mesh to read")
+    call.add_argument("output", type=Path, help="the mesh to write; its ending names the format")
+    call.add_argument("--zone", type=int, metavar="N", help="one zone, from 1 (default: all)")
+    call.set_defaults(command=convert)
+
+
+def convert(arguments: argparse.Namespace) -> int:
+    """Write a mesh in another format, and say what the format does not hold."""
+    import sys
+    from dataclasses import replace
+
+    from slideviz import read
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.places import Output, require_places, tell_lost
+    from slideviz.mesh.io.convert import convert as write_converted
+    from slideviz.session.formats import left_out
+
+    require_places(arguments, Output(arguments.output, "OUT", is_mesh=True))
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    # Without --zone no zone is lost.
+    tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
+    write_converted(arguments.mesh, arguments.output, arguments.zone, mesh)
+    lost = "" if arguments.output.suffix.lower() == ".su2b" else left_out(arguments.output, mesh)
+    if lost:
+        print(f"slideviz: note: {lost}", file=sys.stderr)
+    print(arguments.output)
+    return DONE

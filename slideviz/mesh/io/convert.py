@@ -1,0 +1,70 @@
+"""Converting a mesh file into another format, with all its zones where both formats have zones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.mesh.check import path_error
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.files import read, write
+from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.io.su2b_write import su2b_blocks
+from slideviz.mesh.model import Mesh
+
+_ZONED = {".su2": "su2", ".su2b": "su2b"}
+
+
+def convert(
+    source: str | Path, target: str | Path, zone: int | None = None, first: Mesh | None = None
+) -> Mesh:
+    """Write a mesh in the format that the ending of ``target`` names; return its first zone.
+
+    Parameters
+    ----------
+    source, target : str or Path
+        The file to read, and the one to write; one that exists is replaced.
+    zone : int, optional
+        The zone to convert, from 1; all of them when left out.
+    first : Mesh, optional
+        The zone, or the first one, if it was read already.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, the format cannot hold the mesh, or it has no zones and the file
+        has several.
+    """
+    source, target = Path(source), Path(target)
+    mesh = read(source, zone) if first is None else first
+    kind = _ZONED.get(target.suffix.lower())
+    same = mesh.document is not None if kind == "su2" else mesh.binary is not None
+    if mesh.zones == 1 or (zone is None and kind is not None and same):
+        write(target, mesh)  # which keeps what else the file has
+        return mesh
+    if zone is not None:
+        write(target, replace(mesh, zone=1, zones=1, document=None, binary=None))
+        return mesh
+    if kind is None:
+        raise path_error(
+            target,
+            f"{source.name} has {mesh.zones} zones, for which this format has no place; "
+            "choose one with --zone",
+        )
+    rest = (read(source, number) for number in range(2, mesh.zones + 1))
+    with atomic_write(target) as file:
+        for block in _zones(kind, mesh, *rest):
+            file.write(block)
+    return mesh
+
+
+def _zones(kind: str, *meshes: Mesh) -> Iterator[bytes]:
+    """Yield a file of several zones."""
+    if kind == "su2b":
+        yield from su2b_blocks(*meshes)
+        return
+    yield f"NZONE= {len(meshes)}\n".encode()
+    for number, mesh in enumerate(meshes, 1):
+        yield f"IZONE= {number}\n".encode()
+        yield from su2_blocks(replace(mesh, document=None))

@@ -1,0 +1,373 @@
+"""Reading SU2 binary meshes (``.su2b``), block by block, and what is kept for writing them again.
+
+The type of each element, its nodes and its index are taken out of the list of all numbers with
+array operations; coordinates and indices of points have a fixed stride.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.check import first_fault, path_error, printable
+from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.su2b_layout import MAGIC, Elements, Source, ZonePlace, find_zones
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+
+BLOCK = 1 << 18
+"""Elements or points that are read at a time."""
+SIZES = np.zeros(256, np.int64)
+"""Nodes of an element, by type."""
+_DIMS = np.zeros(256, np.int64)
+for _row in ELEMENTS.values():
+    SIZES[_row.vtk], _DIMS[_row.vtk] = _row.n_nodes, _row.dim
+
+
+@dataclass(frozen=True, eq=False)
+class BinaryForm:
+    """How a ``.su2b`` file held a mesh, so that it can be written the same way.
+
+    Attributes
+    ----------
+    width : int
+        Bytes of an index, 4 or 8.
+    byte_order : "<" or ">"
+        As NumPy writes it.
+    before, after : bytes
+        The file before the zone and after it: the other zones.
+    order : (m,) int64 or None
+        The cell that stands at each place of the file; None where they stand in order.
+    names : tuple of bytes
+        The names of the markers with what fills them up.
+    cells : Cells
+        The cells as read.
+    """
+
+    width: int
+    byte_order: Literal["<", ">"]
+    before: bytes
+    after: bytes
+    order: IntArray | None
+    names: tuple[bytes, ...]
+    cells: Cells
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Some elements as they stand in a file: types (k,), nodes one after the other, indices (k,).
+
+    ``first`` is the number of the first, and ``ids`` empty where elements have no index.
+    """
+
+    first: int
+    types: NDArray[np.uint8]
+    nodes: IntArray
+    ids: IntArray
+
+
+def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
+    """Return one zone of an SU2 binary mesh.
+
+    Parameters
+    ----------
+    zone : int or None
+        The zone, from 1; None for the first.
+    progress : callable
+        Called with the fraction done; may raise to stop.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake; the message has its byte.
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        source = Source(path, file)
+        zones = find_zones(source)
+        place = chosen_zone(path, zones, zone)
+        whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
+        done = 0
+
+        def tick(count: int) -> None:
+            nonlocal done
+            done += count
+            progress(min(1.0, done / max(whole, 1)))
+
+        cells, order = _cells(source, place, place.cells, place.dim, tick)
+        points = np.empty((place.n_points, place.dim))
+        for first, block in point_blocks(source, place):
+            points[first : first + len(block)] = block
+            tick(len(block))
+        markers = tuple(
+            Marker(m.name, _cells(source, place, m.elements, place.dim - 1, tick)[0])
+            for m in place.markers
+        )
+        form = BinaryForm(
+            source.width,
+            source.order,
+            source.bytes(0, place.begin),
+            source.bytes(place.end, source.size),
+            order,
+            tuple(marker.raw for marker in place.markers),
+            cells,
+        )
+    points.flags.writeable = False
+    return Mesh(
+        points=points,
+        cells=cells,
+        markers=markers,
+        name=printable(path.name),
+        zone=place.number,
+        zones=len(zones),
+        source=path.resolve(),
+        binary=form,
+    )
+
+
+def chosen_zone(path: Path, zones: tuple[ZonePlace, ...], number: int | None) -> ZonePlace:
+    """Return the zone of that number, the first where it is None.
+
+    Raises
+    ------
+    MeshError
+        There is none.
+    """
+    chosen = 1 if number is None else number
+    if not 1 <= chosen <= len(zones):
+        has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"
+        raise path_error(
+            path, f"there is no zone {chosen}, for the file has {has}; choose one of these"
+        )
+    return zones[chosen - 1]
+
+
+def point_blocks(
+    source: Source, place: ZonePlace, size: int = BLOCK
+) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the number of a point and the coordinates (k, d) of it and those that follow.
+
+    Raises
+    ------
+    MeshError
+        A coordinate is not finite, or a point has another index than its place.
+    """
+    kind = source.point(place.dim)
+    for first in range(0, place.n_points, size):
+        count = min(size, place.n_points - first)
+        at = place.points + first * kind.itemsize
+        block = source.array(at, count, kind, "the points")
+        wrong = block["i"] != np.arange(first, first + count, dtype=np.uint64)
+        if wrong.any():
+            k = int(np.argmax(wrong))
+            raise source.error(
+                at + k * kind.itemsize + 8 * place.dim,
+                f"point {first + k} has the index {block['i'][k]}; points are numbered from 0 in "
+                "the order of the file, so write the mesh again",
+            )
+        points = block["x"].astype(np.float64)
+        bad = ~np.isfinite(points)
+        if bad.any():
+            k, axis = np.argwhere(bad)[0].tolist()
+            raise source.error(
+                at + k * kind.itemsize + 8 * axis,
+                f"point {first + k} has the coordinate {points[k, axis]}, which is not finite; "
+                "correct it or mesh again",
+            )
+        yield first, points
+
+
+def element_blocks(
+    source: Source, place: ZonePlace, table: Elements, dim: int, size: int = BLOCK
+) -> Iterator[Block]:
+    """Yield the elements of a table, of dimension ``dim``, so many at a time.
+
+    Raises
+    ------
+    MeshError
+        An element is not what it should be; the message has its byte.
+    """
+    what, start, width = "the elements", 0, source.width
+    for first in range(0, table.count, size):
+        count = min(size, table.count - first)
+        at = table.offsets + first * width
+        offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
+        steps = np.diff(offsets)
+        wrong = (steps <= 0) | (offsets[1:] > table.length) | (offsets[:-1] < start)
+        if wrong.any() or int(offsets[0]) != start:
+            k = 0 if int(offsets[0]) != start else int(np.argmax(wrong)) + 1
+            raise source.error(
+                at + k * width,
+                f"the offset of element {first + k} is {int(offsets[k]) % 2**64}, which must be "
+                f"{'0' if first + k == 0 else 'above the one before it'} and at most "
+                f"{table.length}, the last; the file is damaged, so write the mesh again",
+            )
+        begin = table.entries + start * width
+        numbers = source.array(begin, int(offsets[-1]) - start, source.conn, what)
+        block = _taken_apart(source, table, first, begin, _whole_numbers(numbers), offsets - start)
+        _check_nodes(source, place, block, begin, offsets - start)
+        _check_dim(source, block, dim, begin, offsets - start)
+        start = int(offsets[-1])
+        yield block
+    if start != table.length:
+        raise source.error(
+            table.entries + start * width,
+            f"the list of elements has {table.length} numbers, of which the elements use {start}; "
+            "the file is damaged, so write the mesh again",
+        )
+
+
+def _whole_numbers(values: NDArray) -> IntArray:
+    """Return counts as int64; those that are too large for it become negative."""
+    return np.asarray(values.astype(np.uint64, copy=False).view(np.int64))
+
+
+def _taken_apart(
+    source: Source, table: Elements, first: int, begin: int, numbers: IntArray, offsets: IntArray
+) -> Block:
+    """Return the types, nodes and indices in a part of a list, ``offsets`` counted from there."""
+    types = numbers[offsets[:-1]]
+    known = (types > 0) & (types < 256)
+    sizes = np.where(known, SIZES[np.where(known, types, 0)], 0)
+    steps = np.diff(offsets)
+    wrong = (sizes == 0) | (steps != sizes + 1 + table.numbered)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        at = begin + int(offsets[k]) * source.width
+        if not sizes[k]:
+            allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim)
+            raise source.error(
+                at,
+                f"element {first + k} has the type {int(types[k]) % 2**64}, which is not supported "
+                f"(supported: {allowed}); export the mesh with these",
+            )
+        row = ELEMENTS[int(types[k])]
+        raise source.error(
+            at,
+            f"element {first + k} has {steps[k]} numbers, but a {row.name} has {row.n_nodes} "
+            f"nodes and {2 if table.numbered else 1} more; write the mesh again",
+        )
+    ids = numbers[offsets[1:] - 1] if table.numbered else numbers[:0]
+    if (steps == steps[0]).all():
+        nodes = numbers.reshape(len(types), -1)[:, 1 : 1 + int(sizes[0])].ravel()
+    else:
+        keep = np.ones(len(numbers), bool)
+        keep[offsets[:-1]] = False
+        if table.numbered:
+            keep[offsets[1:] - 1] = False
+        nodes = numbers[keep]
+    return Block(first, types.astype(np.uint8), nodes, ids)
+
+
+def _check_nodes(
+    source: Source, place: ZonePlace, block: Block, begin: int, offsets: IntArray
+) -> None:
+    """Raise for the first node of a block that does not exist."""
+    wrong = block.nodes.view(np.uint64) >= place.n_points
+    if not wrong.any():
+        return
+    at = int(np.argmax(wrong))
+    ends = np.cumsum(SIZES[block.types])
+    k = int(np.searchsorted(ends, at, "right"))
+    column = at - int(ends[k]) + int(SIZES[block.types[k]])
+    raise source.error(
+        begin + (int(offsets[k]) + 1 + column) * source.width,
+        f"element {block.first + k} has the node {int(block.nodes[at]) % 2**64}, but the "
+        f"{place.n_points} points are numbered from 0 to {place.n_points - 1}; correct the element "
+        "or the points",
+    )
+
+
+def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntArray) -> None:
+    """Raise for the first element of a block that has another dimension."""
+    wrong = _DIMS[block.types] != dim
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        row = ELEMENTS[int(block.types[k])]
+        raise source.error(
+            begin + int(offsets[k]) * source.width,
+            f"element {block.first + k} is a {row.name} (type {row.vtk}, dimension {row.dim}), but "
+            f"dimension {dim} is needed here; correct the element or the dimension of its zone",
+        )
+
+
+def _cells(
+    source: Source, place: ZonePlace, table: Elements, dim: int, tick: Callable[[int], None]
+) -> tuple[Cells, IntArray | None]:
+    """Return the elements of a table, and which of them stands at each place of the file.
+
+    That is None where they stand in the order of their indices.
+    """
+    # Too many to be copied once more.
+    types = np.empty(table.count, np.uint8)
+    flat = np.empty(table.length - (1 + table.numbered) * table.count, np.int64)
+    order = np.empty(table.count if table.numbered else 0, np.int64)
+    filled = 0
+    for block in element_blocks(source, place, table, dim):
+        part = slice(block.first, block.first + len(block.types))
+        types[part] = block.types
+        flat[filled : filled + len(block.nodes)] = block.nodes
+        order[part] = block.ids
+        filled += len(block.nodes)
+        tick(len(block.types))
+    types.flags.writeable = flat.flags.writeable = False
+    cells = Cells.from_types(types, flat)
+    fault = first_fault(cells, place.n_points)
+    if fault:
+        at = table.entries + (int(cells.offsets[fault[0]]) + fault[0] * (1 + table.numbered)) * (
+            source.width
+        )
+        raise source.error(at, f"element {fault[0]}: {fault[1]}")
+    if not table.numbered or np.array_equal(order, np.arange(table.count)):
+        return cells, None
+    _check_order(source, table, cells, order)
+    return sorted_back(cells, order), frozen_array(order, np.int64)
+
+
+def _check_order(source: Source, table: Elements, cells: Cells, order: IntArray) -> None:
+    """Raise for the first element whose index is not below their number, or stands twice."""
+    inside = order.view(np.uint64) < len(order)
+    first = np.full(len(order), len(order))
+    np.minimum.at(first, order[inside], np.flatnonzero(inside))
+    wrong = ~inside
+    wrong[inside] = first[order[inside]] != np.flatnonzero(inside)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise source.error(
+            table.entries + (int(cells.offsets[k + 1]) + 2 * k + 1) * source.width,
+            f"element {k} has the index {int(order[k]) % 2**64}, which is not below the number of "
+            f"elements, {len(order)}, or stands twice; write the mesh again",
+        )
+
+
+def sorted_back(cells: Cells, order: IntArray) -> Cells:
+    """Return cells that stand in another order, by their indices ``order`` (m,)."""
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return taken(cells, place)
+
+
+def taken(cells: Cells, chosen: IntArray) -> Cells:
+    """Return the chosen cells (k,), in that order."""
+    sizes = np.diff(cells.offsets)[chosen]
+    ends = np.cumsum(sizes)
+    rows = np.repeat(cells.offsets[chosen] - (ends - sizes), sizes) + np.arange(sizes.sum())
+    return Cells.from_types(cells.types[chosen], cells.connectivity[rows])
+
+
+def is_su2b(path: Path) -> bool:
+    """Tell whether a file begins as an SU2 binary mesh does.
+
+    Raises
+    ------
+    OSError
+        It cannot be read.
+    """
+    with path.open("rb") as file:
+        return file.read(4) in MAGIC

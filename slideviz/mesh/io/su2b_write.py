@@ -1,0 +1,223 @@
+"""Writing SU2 binary meshes (``.su2b``), from arrays or from whatever can make blocks of them.
+
+A mesh that was read from such a file gives that file again, in the same width, byte order and
+order of its elements, with other coordinates. Others are written as SU2 does: counts of 8 bytes,
+little endian, elements sorted by type. Their indices say which element is which, so that a mesh
+is read back with its cells in the order that it had.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import check_mesh
+from slideviz.mesh.io.su2b import BLOCK, SIZES, BinaryForm, taken
+from slideviz.mesh.io.su2b_layout import NAME_BYTES, SEND_RECEIVE
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
+
+_SORTED = (3, 5, 9, 10, 12, 13, 14)
+"""SU2's order of the types of elements."""
+_LARGEST_4 = 2**32 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """What a zone of a file is written from.
+
+    Attributes
+    ----------
+    dim : int
+        2 or 3.
+    n_cells, n_points : int
+    cells : callable
+        The cells ``i`` to ``j`` in the order of the file: types (k,), nodes one after the other,
+        and the index of each (k,).
+    types : callable
+        The types of the cells ``i`` to ``j`` (k,).
+    points : callable
+        The coordinates of the points ``i`` to ``j`` (k, d).
+    markers : tuple of Marker
+    """
+
+    dim: int
+    n_cells: int
+    n_points: int
+    cells: Callable[[int, int], tuple[NDArray[np.uint8], IntArray, IntArray]]
+    types: Callable[[int, int], NDArray[np.uint8]]
+    points: Callable[[int, int], FloatArray]
+    markers: tuple[Marker, ...]
+
+
+def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
+    """Yield the SU2 binary file of a mesh, or of several as its zones, block by block.
+
+    A single mesh that is one zone of a ``.su2b`` file keeps the other zones.
+
+    Raises
+    ------
+    MeshError
+        A mesh cannot be used, has a halo, or has a name that cannot stand in such a file.
+    """
+    for mesh in meshes:
+        check_mesh(mesh)
+        require_binary(mesh)
+    form = meshes[0].binary if len(meshes) == 1 else None
+    if form is None:
+        yield from file_head(len(meshes))
+        for number, mesh in enumerate(meshes, 1):
+            yield from zone_blocks(_zone(mesh, _by_type(mesh.cells)), number)
+        return
+    mesh = meshes[0]
+    same = mesh.cells is form.cells or mesh.cells.same_as(form.cells)
+    yield form.before
+    yield from zone_blocks(
+        _zone(mesh, form.order if same else _by_type(mesh.cells)), mesh.zone, form
+    )
+    yield form.after
+
+
+def require_binary(mesh: Mesh) -> None:
+    """Raise where an SU2 binary file cannot hold a mesh.
+
+    Raises
+    ------
+    MeshError
+        It has a halo, or a boundary has a name that cannot stand in such a file.
+    """
+    if mesh.halo is not None or (mesh.document is not None and mesh.document.sends):
+        raise MeshError(
+            f"{mesh.name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot "
+            "hold; write a .su2 file, or make the mesh without its halo"
+        )
+    for name in mesh.marker_names:
+        size = len(name.encode("utf-8", "replace"))
+        if not name or not name.isprintable() or size >= NAME_BYTES or name.upper() == SEND_RECEIVE:
+            raise MeshError(
+                f"{mesh.name}: the marker name {name!r} cannot stand in an SU2 binary file, which "
+                f"has room for {NAME_BYTES - 1} bytes ({size} given) and has no {SEND_RECEIVE}; "
+                "rename the marker"
+            )
+
+
+def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
+    """Return what an SU2 binary file does not keep of the text file of a mesh, in words."""
+    document = mesh.document
+    if document is None:
+        return ()
+    keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
+    named = ", ".join(dict.fromkeys(key.upper() for key in keys))
+    lost = [f"its other sections ({named})"] if keys else []
+    return (*lost, "its other zones") if mesh.zones > 1 else tuple(lost)
+
+
+def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
+    """Yield what a file begins with."""
+    width, sign = (8, "<") if form is None else (form.width, form.byte_order)
+    yield np.array([width, zones], f"{sign}i4").tobytes()
+
+
+def zone_blocks(zone: Zone, number: int, form: BinaryForm | None = None) -> Iterator[bytes]:
+    """Yield one zone of a file, in the width and byte order of ``form``."""
+    width, sign = (8, "<") if form is None else (form.width, form.byte_order)
+    conn = np.dtype(f"{sign}u{width}")
+
+    def short(*values: int) -> bytes:
+        return np.array(values, f"{sign}i4").tobytes()
+
+    yield short(number, zone.dim) + np.array([zone.n_cells], conn).tobytes()
+    start = 0
+    for i, j in _parts(zone.n_cells):
+        ends = start + np.cumsum(SIZES[zone.types(i, j)] + 2)
+        yield np.concatenate([[start], ends[:-1]]).astype(conn).tobytes()
+        start = int(ends[-1])
+    if width == 4 and max(start, zone.n_points) > _LARGEST_4:
+        raise MeshError("the mesh has more cells than a file with counts of 4 bytes can hold")
+    yield np.array([start], conn).tobytes()
+    for i, j in _parts(zone.n_cells):
+        yield _rows(*zone.cells(i, j)).astype(conn, copy=False).tobytes()
+    yield np.array([zone.n_points], conn).tobytes()
+    kind = np.dtype([("x", f"{sign}f8", (zone.dim,)), ("i", conn)])
+    for i, j in _parts(zone.n_points):
+        block = np.empty(j - i, kind)
+        block["x"], block["i"] = zone.points(i, j), np.arange(i, j)
+        yield block.tobytes()
+    yield short(len(zone.markers))
+    raw = {} if form is None else {name.partition(b"\0")[0]: name for name in form.names}
+    for marker in zone.markers:
+        name = marker.name.encode()
+        yield raw.get(name, name.ljust(NAME_BYTES, b"\0"))
+        ends = np.cumsum(SIZES[marker.cells.types] + 1)
+        head = np.concatenate([[len(marker.cells), 0], ends])
+        rows = _rows(marker.cells.types, marker.cells.connectivity)
+        yield np.concatenate([head, rows]).astype(conn).tobytes()
+
+
+def _parts(count: int) -> Iterator[tuple[int, int]]:
+    for first in range(0, count, BLOCK):
+        yield first, min(first + BLOCK, count)
+
+
+def _rows(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
+    """Return elements as a list: type, nodes and, where there is one, index of each."""
+    sizes = SIZES[types]
+    more = 1 if ids is None else 2
+    if len(types) and (types == types[0]).all():
+        table = np.empty((len(types), int(sizes[0]) + more), np.int64)
+        table[:, 0] = types[0]
+        table[:, 1 : 1 + int(sizes[0])] = nodes.reshape(len(types), -1)
+        if ids is not None:
+            table[:, -1] = ids
+        return table.ravel()
+    ends = np.cumsum(sizes + more)
+    out = np.empty(len(nodes) + more * len(types), np.int64)
+    keep = np.ones(len(out), bool)
+    keep[ends - sizes - more] = False
+    out[ends - sizes - more] = types
+    if ids is not None:
+        keep[ends - 1] = False
+        out[ends - 1] = ids
+    out[keep] = nodes
+    return out
+
+
+def _by_type(cells: Cells) -> IntArray | None:
+    """Return the cells in the order in which SU2 writes them, None where they are in it."""
+    rank = np.zeros(256, np.int64)
+    rank[list(_SORTED)] = np.arange(len(_SORTED))
+    ranks = rank[cells.types]
+    return None if (np.diff(ranks) >= 0).all() else np.argsort(ranks, kind="stable")
+
+
+def _zone(mesh: Mesh, order: IntArray | None) -> Zone:
+    """Return what the zone of a mesh is written from."""
+    cells = mesh.cells
+
+    def part(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        if order is not None:
+            some = taken(cells, order[i:j])
+            return some.types, some.connectivity, order[i:j]
+        begin, end = cells.offsets[[i, j]]
+        return cells.types[i:j], cells.connectivity[begin:end], np.arange(i, j)
+
+    def types(i: int, j: int) -> NDArray[np.uint8]:
+        return cells.types[i:j] if order is None else cells.types[order[i:j]]
+
+    return Zone(
+        dim=mesh.dim,
+        n_cells=len(cells),
+        n_points=len(mesh.points),
+        cells=part,
+        types=types,
+        points=partial(_slice, mesh.points),
+        markers=mesh.markers,
+    )
+
+
+def _slice(array: FloatArray, i: int, j: int) -> FloatArray:
+    return array[i:j]

@@ -1,0 +1,109 @@
+"""SU2 binary meshes in the commands: by ending and by key, converted, and what they cannot hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.mesh.io.su2b_layout import MAGIC
+from slideviz.samples.table import write_sample
+from slideviz.session.formats import left_out
+from tests.mesh.test_su2b import THREE_D, TWO_D, packed
+
+FFD = "FFD_NBOX= 1\nFFD_NLEVEL= 1\n"
+
+
+@pytest.fixture
+def square(tmp_path: Path, monkeypatch) -> Path:
+    """A folder with the 25 by 25 square case, its mesh as text and binary, as current folder."""
+    write_sample("square", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert run(["convert", "mesh.su2", "mesh.su2b"]) == 0
+    return tmp_path
+
+
+def is_binary(path):
+    return Path(path).read_bytes()[:4] in MAGIC
+
+
+def test_a_run_gives_the_same_mesh_from_text_and_binary(square):
+    call = ["run", "square.cfg", "-q", "--steps", "2"]
+    assert run([*call, "-o", "text.su2"]) == 0
+    binary = [*call, "--set", "MESH_FILENAME=mesh.su2b"]
+    assert run([*binary, "-o", "binary.su2b", "--steps-dir", "steps"]) == 0
+    one, other = sv.read("text.su2"), sv.read("binary.su2b")
+    assert np.array_equal(one.points.view(np.int64), other.points.view(np.int64))
+    assert sorted(p.name for p in Path("steps").iterdir()) == ["mesh_1.su2b", "mesh_2.su2b"]
+    assert Path("steps/mesh_2.su2b").read_bytes() == Path("binary.su2b").read_bytes()
+    for command in (["info"], ["quality", "--reference", "mesh.su2"]):
+        assert run([command[0], "binary.su2b", *command[1:]]) == 0
+
+
+def test_keys_say_the_format_whatever_the_ending(square):
+    Path("mesh.su2b").rename("mesh.bin")
+    call = ["run", "square.cfg", "-q", "--steps", "1", "--set", "MESH_FILENAME=mesh.bin"]
+    call += ["--set", "MESH_FORMAT=SU2B", "--set", "MESH_OUT_FORMAT=su2b"]
+    assert run([*call, "--set", "MESH_OUT_FILENAME=out.mesh"]) == 0
+    assert is_binary("out.mesh")
+    assert run([*call, "-o", "plain"]) == 0
+    assert is_binary("plain")
+    assert run([*call, "-o", "text.su2"]) == 0
+    assert not is_binary("text.su2")
+    text = Path("square.cfg").read_text().replace("MESH_OUT_FILENAME", "% MESH_OUT_FILENAME")
+    Path("square.cfg").write_text(text + "MESH_OUT_FORMAT= SU2B\n")
+    assert run(["run", "square.cfg", "-q", "--steps", "1"]) == 0
+    assert is_binary("mesh_def.su2b")
+
+
+def test_a_format_that_is_none_is_told(square, capsys):
+    assert run(["run", "square.cfg", "--set", "MESH_FORMAT=CGNS"]) == 1
+    assert "'CGNS' is not one of SU2 | SU2B" in capsys.readouterr().err
+    assert run(["run", "square.cfg", "--set", "MESH_FORMAT=SU2B"]) == 1
+    assert "mesh.su2: byte 0: this is no SU2 binary mesh" in capsys.readouterr().err
+
+
+def test_what_a_binary_mesh_loses_is_said_before_the_work(square, capsys):
+    with Path("mesh.su2").open("a") as file:
+        file.write(FFD)
+    words = "will not have its other sections (FFD_NBOX, FFD_NLEVEL) of mesh.su2; write a .su2 file"
+    for call in (["convert", "mesh.su2", "out.su2b"], ["run", "square.cfg", "-o", "out.su2b"]):
+        assert run(call) == 0
+        assert f"slideviz: warning: out.su2b is an SU2 binary mesh and {words}" in (
+            capsys.readouterr().err
+        )
+    mesh = sv.read("mesh.su2")
+    assert left_out(Path("a.su2b"), mesh) == (
+        "a.su2b does not hold its other sections (FFD_NBOX, FFD_NLEVEL)."
+    )
+    assert left_out(Path("a.su2"), mesh) == left_out(Path("a.su2b"), sv.read("out.su2b")) == ""
+
+
+def test_a_halo_is_refused_before_the_work(square, capsys):
+    sends = "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
+    text = Path("mesh.su2").read_text().replace("NMARK= 5", "NMARK= 6") + sends
+    Path("mesh.su2").write_text(text)
+    Path("out.su2b").unlink(missing_ok=True)
+    for call in (["convert", "mesh.su2", "out.su2b"], ["run", "square.cfg", "-o", "out.su2b"]):
+        assert run(call) == 1
+        assert "has a halo (SEND_RECEIVE markers)" in capsys.readouterr().err
+    assert not Path("out.su2b").exists()
+
+
+def test_convert_has_all_zones_or_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("two.su2b").write_bytes(packed([TWO_D, THREE_D], 4, ">"))
+    assert run(["convert", "two.su2b", "two.su2"]) == 0
+    assert run(["convert", "two.su2", "again.su2b"]) == 0
+    assert capsys.readouterr().err == ""
+    assert Path("again.su2b").read_bytes() == packed([TWO_D, THREE_D])
+    assert run(["convert", "two.su2", "second.su2b", "--zone", "2"]) == 0
+    assert Path("second.su2b").read_bytes() == packed([THREE_D])
+    assert "will not have its other zones" in capsys.readouterr().err
+    assert run(["convert", "two.su2b", "second.vtu", "--zone", "2"]) == 0
+    assert len(sv.read("second.vtu").points) == 9
+    assert run(["convert", "two.su2b", "out.nothing"]) == 1
+    assert "no mesh format has the ending .nothing" in capsys.readouterr().err
+    assert run(["convert", "two.su2b", "two.su2b"]) == 1
+    assert "is the input mesh" in capsys.readouterr().err
