@@ -138,6 +138,17 @@ def zoom(text: str) -> Zoom:
     return Detail(tuple(centre), width)
 
 
+def count(text: str) -> int:
+    """Return a whole number, which may be written as 1e8."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.5
+    if not number.is_integer():
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number, as 20000 or 1e8")
+    return int(text) if text.strip().lstrip("+-").isdigit() else int(number)
+
+
 def size(text: str) -> tuple[int, int]:
     """Return width and height of ``1280x800``."""
     width, sign, height = text.lower().partition("x")

@@ -5,13 +5,22 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from slideviz.cli.options import count
+from slideviz.terms import FILE_FORMATS
+
 
 def add_sample(calls: argparse._SubParsersAction) -> None:
     """Add the command ``sample`` to the parser."""
     call = calls.add_parser("sample", help="write a sample case")
     call.add_argument("name", nargs="?", help="which one; none: list them")
     call.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME)")
-    call.add_argument("--size", type=int, metavar="N", help="size; what it counts is in the list")
+    call.add_argument("--size", type=count, metavar="N", help="size; what it counts is in the list")
+    call.add_argument(
+        "--format",
+        choices=tuple(FILE_FORMATS),
+        default="su2",
+        help="of the mesh; su2b (binary) for a stator of up to 200 million cells (default: su2)",
+    )
     call.add_argument("--variant", metavar="NAME", help="other motions; listed without NAME")
     call.add_argument("--force", action="store_true", help="replace files that exist")
     call.set_defaults(command=sample)
@@ -30,7 +39,14 @@ def sample(arguments: argparse.Namespace) -> int:
         print(table([(name, ", ".join(row.variants)) for name, row in SAMPLES.items()]))
         return DONE
     folder = arguments.output or Path(arguments.name)
-    paths = write_sample(arguments.name, folder, arguments.size, arguments.variant, arguments.force)
+    paths = write_sample(
+        arguments.name,
+        folder,
+        arguments.size,
+        arguments.variant,
+        arguments.force,
+        arguments.format,
+    )
     for path in paths:
         print(path)
     case = next(path for path in paths if path.suffix == ".cfg")

@@ -3,20 +3,25 @@
 The grid of ``passage``, an O-grid in a channel, is smoothed at three radii in the plane of z
 and r theta; between them z and theta are quadratic in r. The annulus has the extents of the
 thesis's Aachen stator; its blade is our own. A fine grid is a smoothed coarse one with cubic
-splines on each of its blocks. The variant ``optimise`` moves the blade as an optimiser might:
+splines on each of its blocks; one of more than five million cells is that without further
+smoothing. Nodes and cells follow from the planes and the layer alone, so that any part of a mesh
+can be made without the rest of it. The variant ``optimise`` moves the blade as an optimiser might:
 twist, lean and bumps.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
 from slideviz.errors import CaseError
+from slideviz.mesh.io.su2b_write import Zone
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.blade import Counts, Section, Shares, blade_nodes, camber, counts
 from slideviz.samples.passage import Grid, layer_parts, make_grid, smoothed, straight_points
@@ -24,6 +29,8 @@ from slideviz.samples.thesis import FILE
 
 QUADRILATERAL, HEXAHEDRON = 9, 12
 SIZES = (5_000, 5_000_000)
+LARGEST = 200_000_000
+"""Cells of a mesh that is written block by block."""
 BLADES = 41
 RADII = (0.25, 0.275, 0.3)
 DEPTH = 0.1143
@@ -39,6 +46,9 @@ HOLE = (-0.12, 1.12, 0.16)
 SHARES = Shares(ahead=26, along=50, behind=25, nose=0.5, tail=0.15)
 COARSE = 24
 """Cells along the inflow of the finest grid that is smoothed from straight lines."""
+FINEST, SPLINED = 126, 48
+"""Cells along the inflow of the finest grid that is smoothed, and of the one that the nodes of
+finer ones are interpolated from."""
 RADIAL = 0.62
 """Cells in r over those along the inflow."""
 ROUGH = 1e-3
@@ -62,23 +72,121 @@ def stator_mesh(size: int) -> Mesh:
         ``size`` is not within ``SIZES``.
     """
     if not SIZES[0] <= size <= SIZES[1]:
-        raise CaseError(f"size {size} is out of range; a stator has {SIZES[0]} to {SIZES[1]}")
+        raise CaseError(
+            f"size {size} is out of range; a stator has {SIZES[0]} to {SIZES[1]}, or up to "
+            f"{LARGEST} as an SU2 binary mesh (slideviz sample stator --format su2b)"
+        )
+    stack = stator_stack(size)
+    cells = Cells.from_blocks([(HEXAHEDRON, stack.hexahedra(np.arange(stack.n_cells)))])
+    points = stack.points(np.arange(stack.n_points))
+    return Mesh(points, cells, stack.markers(), name="stator")
+
+
+def stator_zone(size: int) -> tuple[Zone, Displacements]:
+    """Return what a file of the mesh is written from, block by block, and its displacement.
+
+    Raises
+    ------
+    CaseError
+        ``size`` is below ``SIZES`` or above ``LARGEST``.
+    """
+    if not SIZES[0] <= size <= LARGEST:
+        raise CaseError(f"size {size} is out of range; a stator has {SIZES[0]} to {LARGEST}")
+    stack = stator_stack(size)
+    markers = stack.markers()
+
+    def types(i: int, j: int) -> NDArray[np.uint8]:
+        return np.full(j - i, HEXAHEDRON, np.uint8)
+
+    def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
+        ids = np.arange(i, j)
+        return types(i, j), stack.hexahedra(ids).ravel(), ids
+
+    zone = Zone(
+        dim=3,
+        n_cells=stack.n_cells,
+        n_points=stack.n_points,
+        cells=cells,
+        types=types,
+        points=lambda i, j: stack.points(np.arange(i, j)),
+        markers=markers,
+    )
+    nodes = markers[0].nodes
+    return zone, _displacement(nodes, stack.points(nodes))
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The smoothed grids at three radii, and the layers of cells between hub and shroud.
+
+    Attributes
+    ----------
+    grid : Grid
+    planes : (3, m, 2) float64
+        z and theta of the nodes at ``RADII``.
+    layers : int
+    """
+
+    grid: Grid
+    planes: FloatArray
+    layers: int
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of nodes."""
+        return self.planes.shape[1] * (self.layers + 1)
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of cells."""
+        return len(self.grid.quads) * self.layers
+
+    def points(self, nodes: IntArray) -> FloatArray:
+        """Return the coordinates of nodes (k, 3), which are numbered from hub to shroud.
+
+        Layers are half as high at hub and shroud as in the middle, more or less.
+        """
+        layer, column = np.divmod(nodes, self.planes.shape[1])
+        part = np.linspace(0.0, 1.0, self.layers + 1)
+        part = part - np.sin(2 * np.pi * part) / (4 * np.pi)
+        radius = (RADII[0] + (RADII[-1] - RADII[0]) * part)[layer]
+        shares = (2 * (part - 0.5) * (part - 1), 4 * part * (1 - part), 2 * part * (part - 0.5))
+        z, theta = (
+            sum(share[layer] * plane[column] for share, plane in zip(shares, planes, strict=True))
+            for planes in np.moveaxis(self.planes, 2, 0)
+        )
+        return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
+
+    def hexahedra(self, ids: IntArray) -> IntArray:
+        """Return the nodes of cells (k, 8)."""
+        layer, place = np.divmod(ids, len(self.grid.quads))
+        nodes = self.planes.shape[1]
+        shroud = self._shroud[place] + (nodes * layer)[:, None]
+        return np.concatenate([shroud, shroud + nodes], axis=1)
+
+    @property
+    def _shroud(self) -> IntArray:
+        """Return the cells of a plane, right-handed as seen from outside, where the shroud is."""
+        return self.grid.quads[:, ::-1]
+
+    def markers(self) -> tuple[Marker, ...]:
+        """Return the boundaries."""
+        nodes = self.planes.shape[1]
+        walls = {"HUB": self.grid.quads, "SHROUD": self._shroud + self.layers * nodes}
+        for name, (low, high) in _sides(self.grid).items():
+            strip = np.column_stack([low, high, high + nodes, low + nodes])
+            walls[name] = _repeated(strip, nodes, self.layers)
+        names = ("BLADE", "HUB", "SHROUD", "INFLOW", "OUTFLOW", "PER1", "PER2")
+        return tuple(Marker(n, Cells.from_blocks([(QUADRILATERAL, walls[n])])) for n in names)
+
+
+def stator_stack(size: int) -> Stack:
+    """Return the grids that a mesh of about ``size`` hexahedra is made from."""
     grid, layers = _grid_of(size)
     sections = zip(RADII, ANGLES_DEG, strict=True)
-    planes = np.stack([_plane(grid, radius, angles) for radius, angles in sections])
-    points = _stacked(planes, layers)
-    nodes = planes.shape[1]
-    # z and r theta are right-handed as seen from outside, where the shroud is.
-    shroud = grid.quads[:, ::-1]
-    walls = {"HUB": grid.quads, "SHROUD": shroud + layers * nodes}
-    for name, (low, high) in _sides(grid).items():
-        strip = np.column_stack([low, high, high + nodes, low + nodes])
-        walls[name] = _repeated(strip, nodes, layers)
-    names = ("BLADE", "HUB", "SHROUD", "INFLOW", "OUTFLOW", "PER1", "PER2")
-    markers = [Marker(name, Cells.from_blocks([(QUADRILATERAL, walls[name])])) for name in names]
-    hexahedra = _repeated(np.concatenate([shroud, shroud + nodes], axis=1), nodes, layers)
-    cells = Cells.from_blocks([(HEXAHEDRON, hexahedra)])
-    return Mesh(points, cells, tuple(markers), name="stator")
+    return Stack(
+        grid, np.stack([_plane(grid, radius, angles) for radius, angles in sections]), layers
+    )
 
 
 def stator_case() -> Case:
@@ -104,8 +212,12 @@ def stator_case() -> Case:
 def stator_displacement(mesh: Mesh) -> Displacements:
     """Return the displacement of the blade: twist, lean and bumps."""
     nodes = mesh.marker("BLADE").nodes
+    return _displacement(nodes, mesh.points[nodes])
+
+
+def _displacement(nodes: IntArray, points: FloatArray) -> Displacements:
     stack_z = LEADING_EDGE + STACK * CHORD
-    return Displacements(nodes, reshaped(mesh.points[nodes], (RADII[0], RADII[-1]), stack_z))
+    return Displacements(nodes, reshaped(points, (RADII[0], RADII[-1]), stack_z))
 
 
 def _sides(grid: Grid) -> dict[str, tuple[IntArray, IntArray]]:
@@ -140,25 +252,12 @@ def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatA
     else:
         coarse = make_grid(counts(COARSE, SHARES))
         start = smoothed(coarse, straight_points(coarse, section))
-        points = smoothed(grid, refined(coarse, start, grid, section), ROUGH)
+        middle = grid if along <= FINEST else make_grid(counts(SPLINED, SHARES))
+        points = smoothed(middle, refined(coarse, start, middle, section), ROUGH)
+        if middle is not grid:
+            points = refined(middle, points, grid, section)
     height = points[:, 1] - camber(np.array([STACK]), section)
     return np.column_stack([LEADING_EDGE + CHORD * points[:, 0], CHORD * height / radius])
-
-
-def _stacked(planes: FloatArray, layers: int) -> FloatArray:
-    """Return the nodes of all layers, from hub to shroud: (m, 3).
-
-    Layers are half as high at hub and shroud as in the middle, more or less.
-    """
-    part = np.linspace(0.0, 1.0, layers + 1)[:, None]
-    part = part - np.sin(2 * np.pi * part) / (4 * np.pi)
-    radius = RADII[0] + (RADII[-1] - RADII[0]) * part
-    shares = (2 * (part - 0.5) * (part - 1), 4 * part * (1 - part), 2 * part * (part - 0.5))
-    z, theta = (
-        sum(share * plane for share, plane in zip(shares, planes[..., k], strict=True))
-        for k in range(2)
-    )
-    return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=2).reshape(-1, 3)
 
 
 def _repeated(cells: IntArray, nodes: int, layers: int) -> IntArray:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.su2b_write import Zone, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.passage import passage_case, passage_mesh
-from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh
+from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
 from slideviz.samples.thesis import FILE, thesis_case
 from slideviz.samples.turbine_row import row_case, row_mesh
+from slideviz.terms import FileFormat
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,15 @@ class Sample:
     displacement: Displacements | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Streamed:
+    """A sample as ``Sample``, but for its mesh, which can be of any size: ``zone`` makes blocks."""
+
+    zone: Zone
+    case: Case
+    displacement: Displacements | None = None
+
+
 @dataclass(frozen=True)
 class SampleKind:
     """A kind of sample: what makes it, and the words for it.
@@ -57,12 +69,15 @@ class SampleKind:
         How it can move, the default first. ``file``: as a displacement file; ``motion``: the same
         by MOTION keys; ``translate``: the case of thesis Figure 4.4, which moves the block close
         to two sides; ``flat``: that of Figure 4.14, without a component in z.
+    stream : callable or None
+        Returns the sample of a size with a mesh that is made while it is written.
     """
 
     about: str
     size: int
     make: Callable[[str, int, str], Sample]
     variants: tuple[str, ...] = ("motion",)
+    stream: Callable[[int], Streamed] | None = None
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:
@@ -80,6 +95,11 @@ def _turbine_row(name: str, size: int, _variant: str) -> Sample:
 def _stator(name: str, size: int, _variant: str) -> Sample:
     mesh = stator_mesh(size)
     return Sample(name, mesh, stator_case(), stator_displacement(mesh))
+
+
+def _streamed_stator(size: int) -> Streamed:
+    zone, displacement = stator_zone(size)
+    return Streamed(zone, stator_case(), displacement)
 
 
 SAMPLES: Mapping[str, SampleKind] = {
@@ -121,6 +141,7 @@ SAMPLES: Mapping[str, SampleKind] = {
         240_000,
         _stator,
         ("file",),
+        _streamed_stator,
     ),
 }
 """Every kind of sample, by name."""
@@ -144,6 +165,12 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     CaseError
         There is no such sample or variant, or the size is out of range.
     """
+    row, kind = _row(name, variant)
+    return row.make(name, row.size if size is None else size, kind)
+
+
+def _row(name: str, variant: str | None) -> tuple[SampleKind, str]:
+    """Return the kind of sample of a name, and the variant."""
     if name not in SAMPLES:
         hint = nearest(name, SAMPLES)
         raise CaseError(f"no sample {name!r}; the samples are {', '.join(SAMPLES)}{hint}")
@@ -151,7 +178,7 @@ def sample(name: str, size: int | None = None, variant: str | None = None) -> Sa
     kind = variant or row.variants[0]
     if kind not in row.variants:
         raise CaseError(f"no variant {kind!r} of {name}; it has {', '.join(row.variants)}")
-    return row.make(name, row.size if size is None else size, kind)
+    return row, kind
 
 
 def write_sample(
@@ -160,8 +187,12 @@ def write_sample(
     size: int | None = None,
     variant: str | None = None,
     overwrite: bool = False,
+    file_format: FileFormat = "su2",
 ) -> list[Path]:
     """Write ``mesh.su2``, ``displacement.txt`` where there is one, and ``NAME.cfg``; return them.
+
+    As SU2's binary (``mesh.su2b``) a stator is written block by block, and never as a whole in
+    memory.
 
     Parameters are those of ``sample`` and:
 
@@ -171,6 +202,8 @@ def write_sample(
         Where to; made if there is none.
     overwrite : bool
         Whether to replace files that exist.
+    file_format : {"su2", "su2b"}
+        The format of the mesh.
 
     Raises
     ------
@@ -180,8 +213,14 @@ def write_sample(
     from slideviz.case.cfg import write_case
     from slideviz.mesh.io.files import write
 
-    made, folder = sample(name, size, variant), Path(folder)
-    mesh, table, case = folder / "mesh.su2", folder / FILE, folder / f"{name}.cfg"
+    row, _ = _row(name, variant)
+    made: Sample | Streamed
+    if file_format == "su2b" and row.stream is not None:
+        made = row.stream(row.size if size is None else size)
+    else:
+        made = sample(name, size, variant)
+    folder = Path(folder)
+    mesh, table, case = folder / f"mesh.{file_format}", folder / FILE, folder / f"{name}.cfg"
     paths = [mesh, *([table] if made.displacement else []), case]
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
@@ -191,22 +230,27 @@ def write_sample(
     except OSError as problem:
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
-    write(mesh, made.mesh, overwrite)
+    if isinstance(made, Streamed):
+        with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
+            for block in chain(file_head(1), zone_blocks(made.zone, 1)):
+                file.write(block)
+    else:
+        write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
         with atomic_write(table, CaseError, table if overwrite else None) as file:
             file.write(_displacement_text(made.displacement).encode())
-    placed = _in_folder(made.case, folder, name)
+    placed = _in_folder(made.case, folder, name, file_format)
     write_case(case, placed.change(source=case if overwrite else None))
     return paths
 
 
-def _in_folder(case: Case, folder: Path, name: str) -> Case:
+def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
     """Return the case with its files in that folder."""
     motions = tuple(
         replace(motion, path=folder / motion.path) if isinstance(motion, FromFile) else motion
         for motion in case.motions
     )
-    mesh, out = folder / "mesh.su2", folder / f"{name}_deformed.su2"
+    mesh, out = folder / f"mesh.{ending}", folder / f"{name}_deformed.{ending}"
     return case.change(mesh_file=mesh, mesh_out=out, motions=motions)
 
 

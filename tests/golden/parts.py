@@ -25,7 +25,18 @@ SIZES = {
 """Cells of the samples, as small as they are offered."""
 
 VARIANTS = {"square": ("file", "motion", "translate"), "hexahedron": ("file", "motion", "flat")}
-COMMANDS = ("run", "info", "quality", "section", "film", "compare", "convert", "sample", "keys", "shots")
+COMMANDS = (
+    "run",
+    "info",
+    "quality",
+    "section",
+    "film",
+    "compare",
+    "convert",
+    "sample",
+    "keys",
+    "shots",
+)
 
 SLIDING, PERIODIC = ("none", "ps", "ds"), ("none", "periodic", "fixed", "moving")
 REDUCED = ("DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-3")

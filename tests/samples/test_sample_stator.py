@@ -183,3 +183,46 @@ def test_sample_meshes_folder_holds_a_small_stator():
     np.testing.assert_allclose(found.vectors, fresh.displacement.vectors, rtol=0, atol=1e-8)
     paths = {"mesh_file": None, "mesh_out": None, "source": None, "motions": ()}
     assert case.change(**paths) == fresh.case.change(**paths)
+
+
+@pytest.mark.parametrize("block", [1000, 1 << 18])
+def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
+    from slideviz.mesh.io import su2b_write
+
+    monkeypatch.setattr(su2b_write, "BLOCK", block)
+    whole = stator(7_777)
+    write_sample("stator", tmp_path, 7_777, file_format="su2b")
+    sv.write(tmp_path / "memory.su2b", whole.mesh)
+    assert (tmp_path / "mesh.su2b").read_bytes() == (tmp_path / "memory.su2b").read_bytes()
+    case = sv.Case.read(tmp_path / "stator.cfg")
+    assert case.mesh_file == tmp_path / "mesh.su2b"
+    assert case.mesh_out == tmp_path / "stator_deformed.su2b"
+    asked = displacements(case, sv.read(case.mesh_file))
+    assert np.array_equal(asked.vectors, whole.displacement.vectors)
+
+
+def test_other_samples_are_written_as_binary_from_memory(tmp_path):
+    write_sample("square", tmp_path, 7, file_format="su2b")
+    assert sv.read(tmp_path / "mesh.su2b").cells.same_as(made("square", 7).mesh.cells)
+
+
+def test_a_grid_finer_than_those_that_are_smoothed_is_as_good(monkeypatch):
+    from slideviz.samples import stator as module
+
+    monkeypatch.setattr(module, "FINEST", 20)
+    monkeypatch.setattr(module, "SPLINED", 16)
+    monkeypatch.setattr(module, "COARSE", 12)
+    mesh = stator_mesh(40_000)
+    found = sv.quality(mesh)
+    assert (found.inverted, found.unproven) == (0, 0)
+    assert found.min > 0.4
+    pair_up(mesh, ("PER1", "PER2"), "rotational")
+
+
+def test_sizes_that_are_out_of_range_are_told(tmp_path):
+    from slideviz.samples.stator import stator_zone
+
+    with pytest.raises(CaseError, match=r"up to 200000000 as an SU2 binary mesh"):
+        stator_mesh(6_000_000)
+    with pytest.raises(CaseError, match="out of range; a stator has 5000 to 200000000"):
+        stator_zone(10**9)
