@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import prange
 
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
-from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, half_chord
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick

@@ -18,8 +18,8 @@ from numba import prange
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array, bsr_matrix
 
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
-from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.evaluate import Tick, no_tick
 

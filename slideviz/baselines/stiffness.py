@@ -21,8 +21,8 @@ from scipy.sparse import bsr_array, csr_array
 
 from slideviz.baselines.shapes import Block
 from slideviz.errors import DeformError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.caching import njit
 from slideviz.rbf.evaluate import Tick, no_tick
 
 CHUNK = 20_000

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 
 LARGEST = 1e50
 """Coordinates that are computed with are not larger: products of several must stay numbers."""
@@ -31,12 +31,12 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
     Wrong are node indices that are negative or not below ``n_points``, and a node that stands
     twice in one element.
     """
-    outside = (cells.connectivity < 0) | (cells.connectivity >= n_points)
-    if outside.any():
-        at = int(np.argmax(outside))
+    flat = cells.connectivity
+    if len(flat) and (flat.min() < 0 or flat.max() >= n_points):
+        at = int(np.argmax((flat < 0) | (flat >= n_points)))
         element = int(np.searchsorted(cells.offsets, at, "right")) - 1
         return element, (
-            f"node {cells.connectivity[at]} does not exist: the {n_points} points are numbered "
+            f"node {flat[at]} does not exist: the {n_points} points are numbered "
             f"from 0 to {n_points - 1}; correct the element or the points"
         )
     repeated = _first_repeated(cells)
@@ -54,13 +54,25 @@ def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the first element that has a node twice, and that node."""
     found = []
     for ids, nodes in cells.by_type.values():
-        ordered = np.sort(nodes, axis=1)
-        same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
-        bad = same.any(axis=1)
-        if bad.any():
-            k = int(np.argmax(bad))
-            found.append((int(ids[k]), int(ordered[k, int(np.argmax(same[k]))])))
+        row, node = _twice(nodes)
+        if row >= 0:
+            found.append((int(ids[row]), int(node)))
     return min(found, default=None)
+
+
+@njit(nogil=True, cache=True)
+def _twice(nodes):  # type: ignore[no-untyped-def]
+    """Return the first row of nodes (m, n) that has a node twice, and the smallest such; or -1."""
+    for row in range(len(nodes)):
+        least = -1
+        for i in range(nodes.shape[1]):
+            for j in range(i):
+                node = nodes[row, i]
+                if node == nodes[row, j] and (least < 0 or node < least):
+                    least = node
+        if least >= 0:
+            return row, least
+    return -1, -1
 
 
 def unused_nodes(mesh: Mesh) -> IntArray:
@@ -111,13 +123,17 @@ def check_points(mesh: Mesh) -> None:
     MeshError
         One is NaN or infinite.
     """
-    bad = ~np.isfinite(mesh.points).all(axis=1)
-    if bad.any():
-        k = int(np.argmax(bad))
+    if not _within(mesh.points, np.finfo(float).max):
+        k = int(np.argmax(~np.isfinite(mesh.points).all(axis=1)))
         raise MeshError(
             f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}, which is not finite; "
             "correct the file or the displacement that put it there"
         )
+
+
+def _within(points: FloatArray, largest: float) -> bool:
+    """Tell whether all coordinates are numbers not larger than this."""
+    return not points.size or bool(points.min() >= -largest and points.max() <= largest)
 
 
 def check_size(mesh: Mesh) -> None:
@@ -128,6 +144,8 @@ def check_size(mesh: Mesh) -> None:
     MeshError
         One is larger than ``LARGEST``.
     """
+    if _within(mesh.points, LARGEST):
+        return
     # What is not finite is reported elsewhere, or makes its cells inverted.
     bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)
     if bad.any():

@@ -1,25 +1,32 @@
-"""Corner Jacobians and Bernstein coefficients of the Jacobian determinant of cells.
+"""Corner Jacobians and Bernstein coefficients of the Jacobian determinant of cells, compiled.
 
-Arrays here have the cells last, ``(..., m)``, so that every operation runs over contiguous
-memory. ``at`` is (d, n, m): the coordinates of the n nodes of m cells of one type.
+Arrays here have the cells last, ``(..., m)``, so that every inner loop runs over contiguous memory
+and is vectorised. ``at`` is (d, n, m): the coordinates of the n nodes of m cells of one type.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.terms import CELL_STATES
 
 if TYPE_CHECKING:
-    from slideviz.mesh.model import FloatArray, IntArray, Mesh
+    from slideviz.mesh.model import FloatArray, Mesh
 
-CHUNK = 4096
-"""Cells handled at a time: small enough that the temporary arrays stay in the cache."""
+OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+
+LANES = 64
+"""Cells that a loop works on at a time: what it keeps of them stays in the first-level cache."""
+
+VALID, INVERTED, UNPROVEN = range(len(CELL_STATES))
+"""Codes of a cell's status: its place in `slideviz.terms.CELL_STATES`."""
+
+CORNERS = {vtk: np.array(row.corners, np.int64) for vtk, row in ELEMENTS.items() if row.corners}
 
 
 def check_cells(mesh: Mesh) -> None:
@@ -40,62 +47,194 @@ def check_cells(mesh: Mesh) -> None:
                 f"mesh has dimension {mesh.dim}; keep only cells of the mesh's dimension"
             )
     flat = mesh.cells.connectivity
-    wrong = (flat < 0) | (flat >= len(mesh.points))
-    if wrong.any():
+    if flat.min() < 0 or flat.max() >= len(mesh.points):
+        wrong = (flat < 0) | (flat >= len(mesh.points))
         raise MeshError(
             f"{mesh.name} has {len(mesh.points)} points, but a cell has node "
             f"{flat[wrong.argmax()]} (counted from 0); node indices must be in that range"
         )
 
 
-def chunks(nodes: IntArray) -> Iterator[slice]:
-    """Yield slices that cut (m, n) ``nodes`` into parts of at most ``CHUNK`` cells."""
-    for first in range(0, len(nodes), CHUNK):
-        yield slice(first, first + CHUNK)
+@njit(**OPTIONS)
+def _gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
+    """Write the coordinates of ``count`` cells from ``first`` on into ``at`` (d, n, LANES)."""
+    for c in range(count):
+        for j in range(nodes.shape[1]):
+            node = nodes[first + c, j]
+            for axis in range(points.shape[1]):
+                at[axis, j, c] = points[node, axis]
 
 
-def coordinates(columns: FloatArray, nodes: IntArray) -> FloatArray:
-    """Return (d, n, m) node coordinates from ``columns`` (d, N) and ``nodes`` (m, n)."""
-    return np.take(columns, nodes.T, axis=1)
-
-
-def corner_edges(vtk: int, at: FloatArray) -> FloatArray:
-    """Return (e, d, k, m): the e edge vectors that leave each of the k corners.
-
-    They are the rows of the corner matrices A_k (thesis Eq. 2.39 to 2.42, Table 2.3).
-    """
-    table = np.array(ELEMENTS[vtk].corners)
-    ends = at[:, table[:, 1:].T]
-    return np.moveaxis(ends - at[:, table[:, 0]][:, None], 1, 0)
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the cross product of (3, ...) and (3, ...), broadcast."""
-    return np.stack(
-        (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+@njit(inline="always", **OPTIONS)
+def _edge(at, start, stop, c):  # type: ignore[no-untyped-def]
+    return (
+        at[0, stop, c] - at[0, start, c],
+        at[1, stop, c] - at[1, start, c],
+        at[2, stop, c] - at[2, start, c],
     )
 
 
-def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the scalar product of (d, ...) and (d, ...), broadcast."""
-    return total(a * b)
+@njit(inline="always", **OPTIONS)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def total(a: FloatArray) -> FloatArray:
-    """Return the sum over the first axis, term by term.
+@njit(inline="always", **OPTIONS)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
-    ``a.sum(axis=0)`` adds pairwise where a chunk has a single cell, so that the last bit of a
-    result would depend on the size of the chunks.
+
+@njit(inline="always", **OPTIONS)
+def _half_sum(a, b):  # type: ignore[no-untyped-def]
+    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
+
+
+@njit(**OPTIONS)
+def _corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
+    """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
+
+    They are the determinants of the edges that leave each corner.
     """
-    return reduce(np.add, a)
+    for k in range(len(table)):
+        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        if at.shape[0] == 2:
+            for c in range(count):
+                ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
+                bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
+                alpha[k, c] = ax * by - ay * bx
+        else:
+            h = table[k, 3]
+            for c in range(count):
+                normal = _cross(_edge(at, o, i, c), _edge(at, o, j, c))
+                alpha[k, c] = _dot(normal, _edge(at, o, h, c))
 
 
-def determinant(edges: FloatArray) -> FloatArray:
-    """Return the determinants (...) of matrices with the rows ``edges`` (d, d, ...)."""
-    if len(edges) == 2:
-        a, b = edges
-        return a[0] * b[1] - a[1] * b[0]
-    return dot(cross(edges[0], edges[1]), edges[2])
+@njit(**OPTIONS)
+def _spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
+    """Write what the skew compares each corner Jacobian with into ``spread`` (k, ...).
+
+    What that is for each type, `slideviz.mesh.metrics` says.
+    """
+    for k in range(len(table)):
+        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        if at.shape[0] == 2:
+            for c in range(count):
+                ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
+                bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
+                aa, bb = ax * ax + ay * ay, bx * bx + by * by
+                spread[k, c] = aa + bb - (ax * bx + ay * by) if vtk == 5 else np.sqrt(aa * bb)
+            continue
+        h = table[k, 3]
+        for c in range(count):
+            x, y, z = _edge(at, o, i, c), _edge(at, o, j, c), _edge(at, o, h, c)
+            xx, yy, zz = _dot(x, x), _dot(y, y), _dot(z, z)
+            if vtk == 10:
+                squares = 1.5 * (xx + yy + zz)
+                spread[k, c] = squares - _dot(x, y) - _dot(y, z) - _dot(z, x)
+            elif vtk == 14:
+                half = _half_sum(x, y)
+                axis = z[0] - half[0], z[1] - half[1], z[2] - half[2]
+                spread[k, c] = xx + yy + 2 * _dot(axis, axis)
+            else:
+                spread[k, c] = np.sqrt(xx * yy * zz)
+
+
+@njit(**OPTIONS)
+def _prism(at, count, found):  # type: ignore[no-untyped-def]
+    """Write what `prism_coefficients` returns into ``found`` (3, 3, ...)."""
+    for c in range(count):
+        a, b = _edge(at, 0, 1, c), _edge(at, 0, 2, c)
+        p, q = _edge(at, 3, 4, c), _edge(at, 3, 5, c)
+        low, top = _cross(a, b), _cross(p, q)
+        middle = _half_sum(_cross(a, q), _cross(p, b))
+        for i in range(3):
+            height = _edge(at, i, i + 3, c)
+            found[0, i, c] = _dot(low, height)
+            found[1, i, c] = _dot(middle, height)
+            found[2, i, c] = _dot(top, height)
+
+
+# Node of a hexahedron by its parameters (i, j, k), each 0 or 1.
+_NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
+
+
+@njit(**OPTIONS)
+def _hexahedron(at, count, found):  # type: ignore[no-untyped-def]
+    """Write what `hexahedron_coefficients` returns into ``found`` (3, 3, 3, ...)."""
+    found[:] = 0.0
+    for i in range(2):
+        for j in range(2):
+            for c in range(count):
+                u0 = _edge(at, _NODE[0, j, 0], _NODE[1, j, 0], c)
+                u1 = _edge(at, _NODE[0, j, 1], _NODE[1, j, 1], c)
+                v0 = _edge(at, _NODE[i, 0, 0], _NODE[i, 1, 0], c)
+                v1 = _edge(at, _NODE[i, 0, 1], _NODE[i, 1, 1], c)
+                low, top = _cross(u0, v0), _cross(u1, v1)
+                middle = _half_sum(_cross(u0, v1), _cross(u1, v0))
+                for p in range(2):
+                    for q in range(2):
+                        # 1 / binomial(2, a) for the sum of two linear Bernstein factors, each way.
+                        weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
+                        w = _edge(at, _NODE[p, q, 0], _NODE[p, q, 1], c)
+                        found[i + p, j + q, 0, c] += weight * _dot(low, w)
+                        found[i + p, j + q, 1, c] += weight * _dot(middle, w)
+                        found[i + p, j + q, 2, c] += weight * _dot(top, w)
+
+
+@njit(**OPTIONS)
+def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
+    """Write the corner Jacobians of cells, ``nodes`` (m, n), into ``alpha`` (k, m)."""
+    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        _gather(points, nodes, first, count, at)
+        _corners(at, table, count, alpha[:, first : first + count])
+
+
+@njit(**OPTIONS)
+def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ignore[no-untyped-def]
+    """Write corner Jacobians, spreads and status of cells of one type, in one pass.
+
+    Parameters
+    ----------
+    points, nodes, table
+        (N, d), (m, n), and ``CORNERS[vtk]``.
+    turn : (m,) int8
+        1, or -1 for a cell that is numbered the other way round: a factor of its Jacobians.
+    alpha, spread, status : (k, m), (k, m), (m,) uint8
+        ``INVERTED`` where a corner Jacobian is not a positive number, ``UNPROVEN`` where another
+        coefficient of a prism or a hexahedron is not, and else ``VALID``.
+    """
+    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    found = np.empty((3, 3, 3, LANES))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        here = slice(first, first + count)
+        _gather(points, nodes, first, count, at)
+        _corners(at, table, count, alpha[:, here])
+        _spreads(vtk, at, table, count, spread[:, here])
+        sides, states = turn[here], status[here]
+        states[:] = VALID
+        if vtk == 12:
+            _hexahedron(at, count, found)
+            _mark(found.reshape(27, LANES), sides, states, UNPROVEN)
+        elif vtk == 13:
+            _prism(at, count, found[0])
+            _mark(found[0, 1], sides, states, UNPROVEN)
+        for k in range(len(table)):
+            for c in range(count):
+                alpha[k, first + c] *= sides[c]
+        # After the coefficients: a corner decides, be it negative or no number.
+        _mark(alpha[:, here], np.ones_like(sides), states, INVERTED)
+
+
+@njit(**OPTIONS)
+def _mark(values, sides, states, as_):  # type: ignore[no-untyped-def]
+    """Set the states (m,) where one of the values (k, m) is not positive or infinite."""
+    for k in range(len(values)):
+        for c in range(len(states)):
+            value = values[k, c] * sides[c]
+            states[c] = states[c] if 0.0 < value < np.inf else as_
 
 
 def prism_coefficients(at: FloatArray) -> FloatArray:
@@ -105,16 +244,9 @@ def prism_coefficients(at: FloatArray) -> FloatArray:
     ``[c, i]`` is coefficient c of the quadratic above corner i. Entries 0 and 2 are the corner
     Jacobians, and the volume is the sum of all, divided by 18.
     """
-    low, top = at[:, :3], at[:, 3:]
-    height = top - low
-    a, b = low[:, 1] - low[:, 0], low[:, 2] - low[:, 0]
-    c, d = top[:, 1] - top[:, 0], top[:, 2] - top[:, 0]
-    normals = (cross(a, b), 0.5 * (cross(a, d) + cross(c, b)), cross(c, d))
-    return np.stack([dot(normal[:, None], height) for normal in normals])
-
-
-# Node of a hexahedron by its parameters (i, j, k), each 0 or 1.
-_NODE = np.array([[[0, 4], [3, 7]], [[1, 5], [2, 6]]])
+    found = np.empty((3, 3, at.shape[2]))
+    _prism(np.ascontiguousarray(at), at.shape[2], found)
+    return found
 
 
 def hexahedron_coefficients(at: FloatArray) -> FloatArray:
@@ -127,23 +259,6 @@ def hexahedron_coefficients(at: FloatArray) -> FloatArray:
     coefficients are the corner Jacobians, and the mean of all is the volume (A. Johnen,
     J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, 2013).
     """
-    nodes = at[:, _NODE]
-    u = nodes[:, 1] - nodes[:, 0]
-    v = nodes[:, :, 1] - nodes[:, :, 0]
-    w = nodes[:, :, :, 1] - nodes[:, :, :, 0]
-    # (3, i, j, k, k', m): triple products need the normals of u and v edges only.
-    normals = cross(u[:, None, :, :, None], v[:, :, None, None, :])
-    thirds = np.stack(
-        (
-            normals[..., 0, 0, :],
-            0.5 * (normals[..., 0, 1, :] + normals[..., 1, 0, :]),
-            normals[..., 1, 1, :],
-        ),
-        axis=3,
-    )
-    found = np.zeros((3, 3, 3, at.shape[2]))
-    for i, j, p, q in np.ndindex(2, 2, 2, 2):
-        # 1 / binomial(2, a) for the sum of two linear Bernstein factors, for a and for b.
-        weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
-        found[i + p, j + q] += weight * dot(thirds[:, i, j], w[:, p, q, None])
+    found = np.empty((3, 3, 3, at.shape[2]))
+    _hexahedron(np.ascontiguousarray(at), at.shape[2], found)
     return found

@@ -8,26 +8,57 @@ directions, whatever their shape.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.jacobians import chunks, coordinates, corner_edges, determinant, total
+from slideviz.mesh.jacobians import CORNERS, write_corners
+from slideviz.mesh.metrics import total
+from slideviz.mesh.model import Mesh, frozen_array
+from slideviz.mesh.threads import in_parts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+    from slideviz.mesh.model import Cells, FloatArray, IntArray
+
+_REFERENCES: WeakKeyDictionary[Mesh, tuple[FloatArray, NDArray[np.int8]]] = WeakKeyDictionary()
+
+
+def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
+    """Return what cells are compared with: sums of corner Jacobians (m,), and their signs (m,).
+
+    The sums have the signs that `orientation` gives. Both are found once, and kept as long as the
+    mesh lives.
+    """
+    found = _REFERENCES.get(mesh)
+    if found is None:
+        sums = corner_sums(mesh)
+        signs = orientation(mesh.cells, sums)
+        sums *= signs
+        found = _REFERENCES[mesh] = frozen_array(sums, np.float64), frozen_array(signs, np.int8)
+    return found
 
 
 def corner_sums(mesh: Mesh) -> FloatArray:
     """Return (m,) sums of each cell's corner Jacobians, in the numbering of the file."""
-    columns = np.ascontiguousarray(mesh.points.T)
     sums = np.empty(len(mesh.cells))
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        for part in chunks(nodes):
-            edges = corner_edges(vtk, coordinates(columns, nodes[part]))
-            sums[ids[part]] = total(determinant(edges))
+        sums[ids] = _sums_of(mesh.points, vtk, nodes)
+    return sums
+
+
+def _sums_of(points: FloatArray, vtk: int, nodes: IntArray) -> FloatArray:
+    """Return (m,) what `corner_sums` does, of cells (m, n) of one type."""
+    sums, table = np.empty(len(nodes)), CORNERS[vtk]
+
+    def add(part: slice) -> None:
+        alpha = np.empty((len(table), part.stop - part.start))
+        write_corners(points, nodes[part], table, alpha)
+        sums[part] = total(alpha)
+
+    in_parts(add, len(nodes))
     return sums
 
 

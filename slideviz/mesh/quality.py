@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,17 +17,19 @@ import numpy as np
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.check import check_size
 from slideviz.mesh.jacobians import (
+    CORNERS,
+    INVERTED,
+    UNPROVEN,
+    VALID,
     check_cells,
-    chunks,
-    coordinates,
-    corner_edges,
-    determinant,
-    total,
+    measure,
+    write_corners,
 )
-from slideviz.mesh.metrics import METRICS
+from slideviz.mesh.metrics import METRICS, total
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.mesh.orientation import corner_sums, orientation
-from slideviz.mesh.validity import INVERTED, UNPROVEN, VALID, prove
+from slideviz.mesh.orientation import reference_of
+from slideviz.mesh.threads import in_parts
+from slideviz.mesh.validity import decide
 from slideviz.terms import Metric
 
 if TYPE_CHECKING:
@@ -183,35 +185,50 @@ def quality(
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")
     check_cells(mesh)
     check_size(mesh)
-    base = mesh if reference is None else _checked(reference, mesh)
-    sums = corner_sums(base)
-    signs = orientation(mesh.cells, sums)
-    sums *= signs
-    columns = np.ascontiguousarray(mesh.points.T)
-    size, skew = np.empty(len(mesh.cells)), np.empty(len(mesh.cells))
+    sums, signs = reference_of(mesh if reference is None else _checked(reference, mesh))
+    values, size, skew = np.empty((3, len(mesh.cells)))
     status = np.empty(len(mesh.cells), np.uint8)
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        skew_of = METRICS[metric][vtk]
-        for part in chunks(nodes):
-            going_on()
-            at, here = coordinates(columns, nodes[part]), ids[part]
-            edges, turn = corner_edges(vtk, at), signs[here].astype(np.float64)
-            alpha = determinant(edges) * turn
-            status[here] = prove(vtk, at, turn, alpha)
-            good = status[here] != INVERTED
-            with np.errstate(all="ignore"):
-                size[here] = np.where(good, _ratio(total(alpha), sums[here]), 0.0)
-                # 1 is the bound of every formula; rounding must not leave the histogram.
-                skew[here] = np.where(good, np.minimum(skew_of(edges, alpha), 1.0), 0.0)
+
+        def of_part(part: slice, vtk: int, ids: IntArray, nodes: IntArray) -> None:
+            here = ids[part]
+            found = _of_cells(mesh.points, vtk, nodes[part], signs[here], sums[here], metric)
+            size[here], skew[here], status[here] = found
+            values[here] = np.sqrt(found[0]) * found[1]
+
+        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), going_on)
     return Quality(
-        values=frozen_array(np.sqrt(size) * skew, np.float64),
+        values=frozen_array(values, np.float64),
         size=frozen_array(size, np.float64),
         skew=frozen_array(skew, np.float64),
         status=frozen_array(status, np.uint8),
-        signs=frozen_array(signs, np.int8),
+        signs=signs,
         metric=metric,
         halo=None if mesh.halo is None else mesh.halo.cells,
     )
+
+
+def _of_cells(
+    points: FloatArray,
+    vtk: int,
+    nodes: IntArray,
+    signs: NDArray[np.int8],
+    sums: FloatArray,
+    metric: Metric,
+) -> tuple[FloatArray, FloatArray, NDArray[np.uint8]]:
+    """Return size, skew and status (m,) of cells of one type, ``nodes`` (m, n)."""
+    table, status = CORNERS[vtk], np.empty(len(nodes), np.uint8)
+    alpha, spread = np.empty((2, len(table), len(nodes)))
+    measure(vtk, points, nodes, table, signs, alpha, spread, status)
+    open_ = np.flatnonzero(status == UNPROVEN)
+    if len(open_):
+        status[open_] = decide(vtk, points[nodes[open_]].T, signs[open_])
+    good = status != INVERTED
+    with np.errstate(all="ignore"):
+        size = np.where(good, _ratio(total(alpha), sums), 0.0)
+        # 1 is the bound of every formula; rounding must not leave the histogram.
+        skew = np.where(good, np.minimum(METRICS[metric][vtk](spread, alpha), 1.0), 0.0)
+    return size, skew, status
 
 
 def _checked(reference: Mesh, mesh: Mesh) -> Mesh:
@@ -246,8 +263,10 @@ def corner_jacobians(mesh: Mesh, cell: int, sign: int = 1) -> FloatArray:
     if not 0 <= cell < len(mesh.cells):
         raise MeshError(f"no cell {cell}; {mesh.name} has the cells 0 to {len(mesh.cells) - 1}")
     begin, end = mesh.cells.offsets[cell : cell + 2]
-    at = mesh.points[mesh.cells.connectivity[begin:end]].T[:, :, None]
-    return sign * determinant(corner_edges(int(mesh.cells.types[cell]), at))[:, 0]
+    table = CORNERS[int(mesh.cells.types[cell])]
+    alpha = np.empty((len(table), 1))
+    write_corners(mesh.points, mesh.cells.connectivity[None, begin:end], table, alpha)
+    return sign * alpha[:, 0]
 
 
 def _ratio(now: FloatArray, before: FloatArray) -> FloatArray:

@@ -21,14 +21,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.jacobians import hexahedron_coefficients, prism_coefficients
-from slideviz.terms import CELL_STATES
+from slideviz.mesh.jacobians import (
+    INVERTED,
+    UNPROVEN,
+    VALID,
+    hexahedron_coefficients,
+    prism_coefficients,
+)
 
 if TYPE_CHECKING:
     from slideviz.mesh.model import FloatArray
-
-VALID, INVERTED, UNPROVEN = range(len(CELL_STATES))
-"""Codes of a cell's status: its place in `slideviz.terms.CELL_STATES`."""
 
 LEVELS = 6
 """How often a hexahedron is cut before it is called unproven."""
@@ -44,34 +46,24 @@ _HALVES = np.array(
 )
 
 
-def prove(vtk: int, at: FloatArray, signs: FloatArray, alpha: FloatArray) -> Status:
-    """Return the status (m,) of m cells of one type.
+def decide(vtk: int, at: FloatArray, signs: NDArray[np.int8]) -> Status:
+    """Return the status (m,) of cells whose corners are positive, but not all coefficients.
 
     Parameters
     ----------
     vtk : int
-        Element type.
-    at : (d, n, m)
+        Element type: prism or hexahedron.
+    at : (3, n, m)
         Node coordinates.
     signs : (m,)
         1, or -1 for a cell that is numbered the other way round.
-    alpha : (k, m)
-        Corner Jacobians, with ``signs`` applied.
     """
-    # "not > 0" rather than "<= 0": a corner that is not a number is not valid either.
-    status = np.where((alpha > 0).all(axis=0) & np.isfinite(alpha).all(axis=0), VALID, INVERTED)
-    if vtk == 13:
-        low, middle, top = prism_coefficients(at) * signs
-        open_ = (middle <= 0).any(axis=0) & (status == VALID)
-        # The quadratic with these coefficients touches zero where middle = -√(low · top).
-        least = middle[:, open_] + np.sqrt(low[:, open_] * top[:, open_])
-        status[open_] = np.where((least > 0).all(axis=0), VALID, INVERTED)
-    elif vtk == 12:
-        found = hexahedron_coefficients(at) * signs
-        open_ = (status == VALID) & ~(found > 0).all(axis=(0, 1, 2))
-        if open_.any():
-            status[open_] = subdivide(found[..., open_])
-    return status.astype(np.uint8)
+    if vtk == 12:
+        return subdivide(hexahedron_coefficients(at) * signs)
+    low, middle, top = prism_coefficients(at) * signs
+    # The quadratic with these coefficients touches zero where middle = -√(low · top).
+    least = middle + np.sqrt(low * top)
+    return np.where((least > 0).all(axis=0), VALID, INVERTED).astype(np.uint8)
 
 
 def subdivide(coefficients: FloatArray, levels: int = LEVELS) -> Status:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.caching import njit
 from slideviz.rbf.compiled import one_at_a_time
 
 LEAF = 4

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numba import get_num_threads, prange, set_num_threads
 
-from slideviz.rbf.caching import njit
+from slideviz.mesh.caching import njit
 from slideviz.rbf.kernels import SHAPE
 
 LOCK = threading.Lock()

@@ -20,8 +20,8 @@ from scipy.sparse.linalg import LinearOperator, onenormest
 from threadpoolctl import ThreadpoolController
 
 from slideviz.errors import DeformError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.caching import njit
 from slideviz.rbf.evaluate import Tick, no_tick
 
 PIVOT_GUARD = 1e-12

@@ -16,8 +16,8 @@ import numpy as np
 
 from slideviz.case.model import Case, Reduction, Scale, Translate
 from slideviz.errors import CaseError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.rbf.caching import njit
 from slideviz.samples.sizing import Sizing, find_sizing, relax
 from slideviz.samples.vane import AHEAD, LENGTH, camber_line, pitch, vane_layers
 

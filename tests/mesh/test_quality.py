@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from slideviz.errors import CaseError, MeshError
-from slideviz.mesh import jacobians
+from slideviz.mesh import threads
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import INVERTED, VALID, corner_jacobians, quality
 from tests.oracles import quality as oracle
@@ -262,7 +262,7 @@ def test_chunk_size_does_not_matter(vtk, monkeypatch):
     mesh, before = soup(vtk, shaken(vtk, 50, 0.3)), soup(vtk, shaken(vtk, 50, 0.1, seed=1))
     whole = quality(mesh, before)
     for chunk in (1, 7, 49, 50):
-        monkeypatch.setattr(jacobians, "CHUNK", chunk)
+        monkeypatch.setattr(threads, "PART", chunk)
         parts = quality(mesh, before)
         np.testing.assert_array_equal(parts.values, whole.values)
         np.testing.assert_array_equal(parts.status, whole.status)

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from slideviz.mesh.jacobians import hexahedron_coefficients, prism_coefficients
+from slideviz.mesh.jacobians import (
+    INVERTED,
+    UNPROVEN,
+    VALID,
+    hexahedron_coefficients,
+    prism_coefficients,
+)
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.mesh.validity import INVERTED, LEVELS, UNPROVEN, VALID, subdivide
+from slideviz.mesh.validity import LEVELS, subdivide
 from tests.oracles import quality as oracle
 
 # In twentieths; found by a search over random cells. All corner Jacobians are positive.

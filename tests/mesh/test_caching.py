@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from slideviz.rbf.caching import njit
+from slideviz.mesh.caching import njit
 
 
 def double(x):
@@ -85,7 +85,7 @@ def test_a_cache_that_cannot_be_written_only_costs_time(cache, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("slideviz.rbf.caching._SealedFile._open_for_write", full)
+    monkeypatch.setattr("slideviz.mesh.caching._SealedFile._open_for_write", full)
     assert compilations(half) == 1
     assert compilations(half) == 1
 
@@ -95,7 +95,7 @@ def test_all_loops_have_this_cache():
     root = Path(sys.modules["slideviz"].__file__).parent
     users = [path.name for path in root.rglob("*.py") if "njit" in path.read_text()]
     own = [
-        path.name for path in root.rglob("*.py") if "rbf.caching import njit" in path.read_text()
+        path.name for path in root.rglob("*.py") if "mesh.caching import njit" in path.read_text()
     ]
     assert sorted(users) == sorted([*own, "caching.py"])
 
