@@ -6,7 +6,7 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
 from slideviz.mesh.topology import Boundary, Fans, fan_normals
 from slideviz.rbf.classify import Classes, classify, fan_roles
@@ -35,8 +35,10 @@ def roles_of_copies(case: Case, mesh: Mesh) -> tuple[Case, tuple[str, ...]]:
 
 def find_period(
     case: Case, mesh: Mesh, boundary: Boundary
-) -> tuple[tuple[Pair, ...], Frame, IntArray]:
-    """Return the periodic pairs, the frame, and which of its images stands for each node (n,).
+) -> tuple[tuple[Pair, ...], Frame, FloatArray, IntArray]:
+    """Return periodic pairs, frame, coordinates in it (n, d), and the image that stands for each.
+
+    Of all periodic images of a node one stands for all of them: (n,).
 
     Raises
     ------
@@ -49,7 +51,7 @@ def find_period(
     frame = make_frame(inside, pairs, periodic_distance=alike)
     coords = frame.coords(mesh.points)
     stands = find_images(pairs if alike else (), frame, coords, boundary.nodes, mesh.extent)
-    return pairs, frame, stands
+    return pairs, frame, coords, stands
 
 
 def _pairs(case: Case, mesh: Mesh) -> tuple[Pair, ...]:

@@ -21,7 +21,7 @@ from slideviz.deformation.classes import find_classes, find_period, roles_of_cop
 from slideviz.deformation.prescribed import alikeness, displaced, prescribed
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
-from slideviz.mesh.check import check_size
+from slideviz.mesh.check import check_size, within
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair
@@ -159,9 +159,8 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
     asked, (case, notes) = case, roles_of_copies(case, mesh)
     boundary = boundary_of(mesh)
     fans = find_fans(boundary, mesh.points, case.feature_angle_deg)
-    pairs, frame, stands = find_period(case, mesh, boundary)
+    pairs, frame, coords, stands = find_period(case, mesh, boundary)
     beyond = 0 if mesh.halo is None else len(mesh.halo.outer)
-    coords = frame.coords(mesh.points)
     classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
@@ -222,13 +221,14 @@ def _method(
 
 def _require_finite(mesh: Mesh) -> None:
     """Raise MeshError when a coordinate is NaN or infinite."""
+    if within(mesh.points, np.finfo(float).max):
+        return
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
-    if len(bad):
-        where = ", ".join(f"{v:.6g}" for v in mesh.points[bad[0]])
-        raise MeshError(
-            f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
-            f"({len(bad)} nodes are not), so correct the mesh"
-        )
+    where = ", ".join(f"{v:.6g}" for v in mesh.points[bad[0]])
+    raise MeshError(
+        f"{mesh.name}: node {bad[0]} is at {where}; coordinates must be finite numbers "
+        f"({len(bad)} nodes are not), so correct the mesh"
+    )
 
 
 def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntArray:
@@ -241,11 +241,11 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     twins = boundary_nodes[tree.query_pairs(COINCIDENT * mesh.extent, output_type="ndarray")]
     links = np.concatenate([twins.reshape(-1, 2), images])
     out = np.arange(len(mesh.points))
-    nodes = np.unique(links)
-    nodes = nodes[np.lexsort(mesh.points[nodes].T[::-1])]
-    label = components(len(out), *links.T)[nodes]
-    _, first, group = np.unique(label, return_index=True, return_inverse=True)
-    out[nodes] = nodes[first[group]]
+    nodes, ends = np.unique(links, return_inverse=True)
+    label = components(len(nodes), *ends.reshape(links.shape).T)
+    order = np.lexsort(mesh.points[nodes].T[::-1])
+    _, first, group = np.unique(label[order], return_index=True, return_inverse=True)
+    out[nodes[order]] = nodes[order][first[group]]
     return out
 
 

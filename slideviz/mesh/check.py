@@ -123,7 +123,7 @@ def check_points(mesh: Mesh) -> None:
     MeshError
         One is NaN or infinite.
     """
-    if not _within(mesh.points, np.finfo(float).max):
+    if not within(mesh.points, np.finfo(float).max):
         k = int(np.argmax(~np.isfinite(mesh.points).all(axis=1)))
         raise MeshError(
             f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}, which is not finite; "
@@ -131,7 +131,7 @@ def check_points(mesh: Mesh) -> None:
         )
 
 
-def _within(points: FloatArray, largest: float) -> bool:
+def within(points: FloatArray, largest: float) -> bool:
     """Tell whether all coordinates are numbers not larger than this."""
     return not points.size or bool(points.min() >= -largest and points.max() <= largest)
 
@@ -144,7 +144,7 @@ def check_size(mesh: Mesh) -> None:
     MeshError
         One is larger than ``LARGEST``.
     """
-    if _within(mesh.points, LARGEST):
+    if within(mesh.points, LARGEST):
         return
     # What is not finite is reported elsewhere, or makes its cells inverted.
     bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)

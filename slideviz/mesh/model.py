@@ -32,6 +32,13 @@ def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     return array
 
 
+def sorted_nodes(nodes: IntArray) -> IntArray:
+    """Return the nodes that stand in an array of any shape, sorted, each once: (u,)."""
+    used = np.zeros(nodes.max(initial=-1) + 1, bool)
+    used[nodes] = True
+    return np.flatnonzero(used)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Cells:
     """Elements of mixed type, in file order.
@@ -89,19 +96,20 @@ class Cells:
     def by_type(self) -> dict[int, tuple[IntArray, IntArray]]:
         """For each VTK identifier present: element ids (m_t,), nodes (m_t, n_t)."""
         found = {}
-        for vtk in np.unique(self.types):
-            ids = np.flatnonzero(self.types == vtk)
-            columns = np.arange(ELEMENTS[int(vtk)].n_nodes)
-            nodes = self.connectivity[self.offsets[ids][:, None] + columns]
-            found[int(vtk)] = (frozen_array(ids, np.int64), frozen_array(nodes, np.int64))
+        for vtk in np.flatnonzero(np.bincount(self.types)).tolist():
+            ids, width = np.flatnonzero(self.types == vtk), ELEMENTS[vtk].n_nodes
+            if ids[-1] - ids[0] + 1 == len(ids):  # one block: nothing need be copied
+                block = self.connectivity[self.offsets[ids[0]] : self.offsets[ids[-1] + 1]]
+                nodes = block.reshape(-1, width)
+            else:
+                nodes = self.connectivity[self.offsets[ids][:, None] + np.arange(width)]
+            found[vtk] = (frozen_array(ids, np.int64), frozen_array(nodes, np.int64))
         return found
 
     @cached_property
     def nodes(self) -> IntArray:
         """Return the indices of all nodes used, sorted, each once: (u,)."""
-        used = np.zeros(self.connectivity.max(initial=-1) + 1, bool)
-        used[self.connectivity] = True
-        return frozen_array(np.flatnonzero(used), np.int64)
+        return frozen_array(sorted_nodes(self.connectivity), np.int64)
 
     def __repr__(self) -> str:
         found = ", ".join(

@@ -10,6 +10,7 @@ that is one marker and closed in itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
 from slideviz.mesh.unique_rows import row_groups
 
 FEATURE_ANGLE_DEG = 40.0
@@ -57,10 +58,10 @@ class Boundary:
         """Return the dimension of the mesh, 2 or 3."""
         return 2 if self.facets.shape[1] == 2 else 3
 
-    @property
+    @cached_property
     def nodes(self) -> IntArray:
         """Return the boundary nodes, sorted: (b,)."""
-        return np.unique(self.facets)
+        return frozen_array(sorted_nodes(self.facets), np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,9 +170,11 @@ def _canonical_triangles(table: IntArray) -> IntArray:
 def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
     """Return the facets with the node order that makes their normals point out of the owner."""
     centre = mesh.points[facets].mean(axis=1)
-    size = np.diff(mesh.cells.offsets)
-    sums = np.add.reduceat(mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1], axis=0)
-    middle = sums[owner] / size[owner][:, None]
+    size = mesh.cells.offsets[owner + 1] - mesh.cells.offsets[owner]
+    starts = np.cumsum(size) - size
+    entries = np.repeat(mesh.cells.offsets[owner] - starts, size) + np.arange(size.sum())
+    corners = mesh.points[mesh.cells.connectivity[entries]]
+    middle = np.add.reduceat(corners, starts, axis=0) / size[:, None] if len(owner) else centre
     inward = np.einsum("fd,fd->f", facet_vectors(mesh.points, facets), centre - middle) < 0
     turned = facets.copy()
     if mesh.dim == 2:

@@ -22,6 +22,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair, along, axis_basis, in_axis_frame
+from slideviz.mesh.threads import in_parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,18 @@ class Frame:
         """Return coordinates (n, d) of Cartesian points (n, d)."""
         if self.axis is None or self.origin is None:
             return np.array(points, float)
+        out = np.empty((len(points), self.dim))
+
+        def fill(part: slice) -> None:
+            out[part] = self._cylindrical(points[part])
+
+        in_parts(fill, len(points))
+        return out
+
+    def _cylindrical(self, points: FloatArray) -> FloatArray:
+        """Return (r, rho theta[, z]) of points (n, d)."""
+        assert self.axis is not None
+        assert self.origin is not None
         local = in_axis_frame(points, self.axis, self.origin)
         angle = np.arctan2(local[:, 1], local[:, 0]) - self.theta0
         angle = np.mod(angle + np.pi, 2 * np.pi) - np.pi
@@ -73,6 +86,18 @@ class Frame:
         """Return Cartesian points (n, d) of coordinates (n, d)."""
         if self.axis is None or self.origin is None:
             return np.array(coords, float)
+        out = np.empty((len(coords), self.dim))
+
+        def fill(part: slice) -> None:
+            out[part] = self._cartesian(coords[part])
+
+        in_parts(fill, len(coords))
+        return out
+
+    def _cartesian(self, coords: FloatArray) -> FloatArray:
+        """Return points (n, d) of coordinates (r, rho theta[, z])."""
+        assert self.axis is not None
+        assert self.origin is not None
         angle = coords[:, 1] / self.radius + self.theta0
         local = np.zeros((len(coords), 3))
         local[:, 0] = coords[:, 0] * np.cos(angle)
@@ -108,19 +133,29 @@ class Frame:
 
     def features(self, coords: FloatArray) -> FloatArray:
         """Return the numbers that distances are computed from: (k, n), rows contiguous."""
+        out = np.empty((len(self._features(coords[:1])), len(coords)))
+
+        def fill(part: slice) -> None:
+            out[:, part] = self._features(coords[part])
+
+        in_parts(fill, len(coords))
+        return out
+
+    def _features(self, coords: FloatArray) -> FloatArray:
+        """Return features (k, n) of nodes at ``coords`` (n, d)."""
         if self.cylindrical and self.period:
             half = np.pi / self.period * coords[:, 1] / self.radius
             rows = [coords[:, 0], np.sin(half), np.cos(half)]
             rows.append(coords[:, 2] if self.dim == 3 else np.zeros(len(coords)))
-            return np.ascontiguousarray(np.stack(rows))
+            return np.stack(rows)
         x = self.points(coords)
         if self.direction is None:
-            return np.ascontiguousarray(x.T)
+            return x.T
         angle = 2 * np.pi / self.period * along(self.direction[None], x)[:, 0]
         size = self.period / (2 * np.pi)
         rows = [size * np.cos(angle), size * np.sin(angle)]
         rows.extend(along(_across(self.direction), x).T)
-        return np.ascontiguousarray(np.stack(rows))
+        return np.stack(rows)
 
     def shift(self) -> FloatArray:
         """Return one period as a difference of coordinates, (d,); zero when not periodic."""
@@ -166,14 +201,20 @@ def make_frame(
         return Frame(dim)
     axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(pairs[0].axis, float)
     origin = np.asarray(pairs[0].origin, float)
-    local = in_axis_frame(points, axis, origin)
-    radii = np.hypot(local[:, 0], local[:, 1])
+    radii, angles = np.empty((2, len(points)))
+
+    def fill(part: slice) -> None:
+        local = in_axis_frame(points[part], axis, origin)
+        radii[part] = np.hypot(local[:, 0], local[:, 1])
+        angles[part] = np.arctan2(local[:, 1], local[:, 0])
+
+    in_parts(fill, len(points))
     return Frame(
         dim,
         period=pairs[0].period if periodic_distance else 0.0,
         axis=axis,
         origin=origin,
-        theta0=_middle_angle(np.arctan2(local[:, 1], local[:, 0])[radii > 1e-9 * radii.max()]),
+        theta0=_middle_angle(angles[radii > 1e-9 * radii.max()]),
         # The largest radius, so that no error of an angle is longer than its frame component.
         radius=float(radii.max()),
     )

@@ -59,9 +59,12 @@ def find_images(
     gap, at = cKDTree(coords[nodes]).query(coords[nodes] + frame.shift())
     twins = np.stack([nodes, nodes[at]], axis=1)[gap <= near]
     links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])
-    label = components(count, *links.T)
-    order = np.lexsort((coords @ frame.shift(), ~paired, label))
-    return order[np.searchsorted(label[order], label)]
+    linked, ends = np.unique(links, return_inverse=True)
+    label = components(len(linked), *ends.reshape(links.shape).T)
+    order = np.lexsort((coords[linked] @ frame.shift(), ~paired[linked], label))
+    stands = np.arange(count)
+    stands[linked] = linked[order[np.searchsorted(label[order], label)]]
+    return stands
 
 
 def spread(

@@ -85,10 +85,10 @@ class NodeTypes:
             self._fans = mesh, angle, find_fans(boundary, mesh.points, angle)
         try:
             try:
-                _, frame, stands = find_period(case, mesh, boundary)
+                _, frame, _, stands = find_period(case, mesh, boundary)
             except MeshError:  # until its markers match, the case is as without periodicity
                 alone = case.change(periodic="none", periodic_type="translational")
-                _, frame, stands = find_period(alone, mesh, boundary)
+                _, frame, _, stands = find_period(alone, mesh, boundary)
             classes = find_classes(case, mesh, boundary, self._fans[2], frame, stands)
         except SlidevizError:
             return NOTHING  # what is wrong with the case is said beside the Run button
@@ -101,7 +101,7 @@ class NodeTypes:
         kinds[classes.edge] = place["sliding_edge"]
         kinds[classes.fixed] = place["fixed"]
         kinds[classes.moving] = place["moving"]
-        nodes = np.unique(boundary.nodes)
+        nodes = boundary.nodes
         return TypedNodes(nodes, kinds[nodes])
 
 
