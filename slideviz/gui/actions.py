@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QAction, QActionGroup
-from qtpy.QtWidgets import QLabel, QMenu, QMenuBar, QSizePolicy, QToolBar, QToolButton, QWidget
+from qtpy.QtWidgets import QLabel, QMenu, QMenuBar, QSizePolicy, QToolBar, QWidget
 
-from slideviz.gui.commands import COMMANDS, MENUS, Menu, Now, valued
+from slideviz.gui.commands import COMMANDS, MENUS
+from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.command import Menu, Now, valued
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -63,14 +63,6 @@ class Actions:
                 menu.addAction(act)
                 if group is not None:
                     group.addAction(act)
-
-    def set_icon_colour(self, colour: str) -> None:
-        """Redraw the icons in another colour."""
-        for name, command in COMMANDS.items():
-            if command.image:
-                self.by_name[name].setIcon(icon(command.image, colour))
-        # No action has this one.
-        self.bar.range.setIcon(icon("colours", colour))
 
     def sync(self, now: Now) -> None:
         """Show what is checked and what can be done."""
@@ -126,11 +118,9 @@ class ToolBar(QToolBar):
 
     def _add_range(self) -> None:
         menu = self._actions.menus["colours"]
-        self.range = QToolButton()
-        self.range.setObjectName("colour_range")
-        self.range.setToolTip(wrapped(menu.menuAction().statusTip()))
-        self.range.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.range.setMenu(menu)
+        self.range = tool_button(
+            menu.menuAction().statusTip(), image="colours", menu=menu, name="colour_range"
+        )
         self.addWidget(self.range)
         self.addSeparator()
 

@@ -12,9 +12,9 @@ from qtpy.QtCore import QCoreApplication, QSettings, QStandardPaths, Qt, QTimer
 from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.responsiveness.jit_warmup import prepare_drawing
 from slideviz.gui.responsiveness.settings import READ_MS, WARM_UP_MS
 from slideviz.gui.responsiveness.threads import be_quick, ready_numerics
+from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
 from slideviz.gui.widgets.faults import caught, crash_log
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.window import MainWindow
@@ -51,9 +51,9 @@ def launch(path: Path | None = None, run: bool = False) -> int:
         with caught(window.faults):
             be_quick()
             window.show()
-            window.restore.look(crashes)
+            window.recovery.look(crashes)
             QTimer.singleShot(0, lambda: prepare_drawing(window.view, window.scene.stage))
-            QTimer.singleShot(WARM_UP_MS, window.warm_up.start)
+            QTimer.singleShot(WARM_UP_MS, window.warmup.start)
             if path is not None:
                 QTimer.singleShot(0, lambda: window.files.open_path(path))
                 if run:

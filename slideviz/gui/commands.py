@@ -6,209 +6,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from qtpy.QtGui import QAction, QKeySequence
+from qtpy.QtGui import QKeySequence
 from qtpy.QtWidgets import QMenu
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
+from slideviz.gui.widgets.command import (
+    Command,
+    Menu,
+    Now,
+    flat,
+    idle,
+    opened,
+    solid,
+    stepped,
+    stepped_and_idle,
+    valued,
+    why_not,
+)
 from slideviz.gui.widgets.icons import STROKES
 from slideviz.gui.widgets.runs_menu import fill_compare
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
-from slideviz.session.state import Session
 from slideviz.terms import SHOWN, Shown, ShownTerm
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
 
 KEY = QKeySequence.StandardKey
-Keys = str | QKeySequence.StandardKey
-
-
-def always(_: Any) -> bool:
-    """Return True."""
-    return True
-
-
-@dataclass(frozen=True)
-class Command:
-    """Something that can be done, with all its words, for whatever offers it.
-
-    Attributes
-    ----------
-    name : str
-    title : str
-        In a menu, with the letter marked that chooses it there.
-    tip : str
-        What it does, in a sentence.
-    do : callable
-        Does it, given the window.
-    keys : tuple of str or standard keys
-    image : str
-        The name of its icon.
-    enabled, checked : callable
-        Whether it can be done and, of a toggle, whether it is on, given the `Now` of the window.
-    title_now : callable, optional
-        Its title where that changes; an empty one takes it out of the menu.
-    tip_now : callable, optional
-        What its tooltip says instead, if anything; where it cannot be done, why.
-    button, button_key : str
-        What the tooltip of its button in a panel says, and the key of that.
-    short : str
-        Its word on the tool bar, if it has no icon.
-    """
-
-    name: str
-    title: str
-    tip: str
-    do: Callable[..., object]
-    keys: tuple[Keys, ...] = ()
-    image: str = ""
-    enabled: Callable[[Any], bool] = always
-    checked: Callable[[Now], bool] | None = None
-    title_now: Callable[[Now], str] | None = None
-    tip_now: Callable[[Now], str] | None = None
-    button: str = ""
-    button_key: str = ""
-    short: str = ""
-
-    def called(self, now: Now) -> str:
-        """Return its title, as it is now if it is offered now."""
-        return (self.title_now(now) if self.title_now else "") or self.title
-
-    def action(self, window: MainWindow) -> QAction:
-        """Return an action that does it; `show` keeps it up to date."""
-        act = QAction(self.title, window)
-        act.setObjectName(self.name)
-        act.setShortcuts([QKeySequence(keys) for keys in self.keys])
-        act.setCheckable(self.checked is not None)
-        act.triggered.connect(lambda _=False: self.do(window))
-        if self.short:
-            act.setIconText(self.short)
-        self._explain(act, self.tip, self.tip)
-        return act
-
-    def _explain(self, act: QAction, status: str, tip: str) -> None:
-        act.setStatusTip(status)
-        keys = act.shortcut().toString()
-        act.setToolTip(wrapped(f"{tip} ({keys})" if keys else tip))
-
-    def show(self, act: QAction, now: Now) -> None:
-        """Let its action show what can be done now."""
-        able = self.enabled(now)
-        if self.title_now is not None:
-            title = self.title_now(now)
-            act.setVisible(bool(title))
-            able = able and bool(title)
-            act.setText(title or act.text())
-        act.setEnabled(able)
-        if self.checked is not None:
-            act.setChecked(self.checked(now))
-        if self.tip_now is not None:
-            tip = self.tip_now(now) or self.tip
-            self._explain(act, self.tip if able else tip, tip)
-
-
-@dataclass(frozen=True)
-class Menu:
-    """A menu: what is in it, by lines and menus in it.
-
-    Attributes
-    ----------
-    fill : callable, optional
-        Puts in what no table knows, given the window and the menu: once, above the entries, or,
-        where there are none, each time that it opens.
-    one_of : bool
-        Whether one of its commands is on at a time.
-    tooltips : bool
-        Whether it shows tooltips: they say why something cannot be done.
-    """
-
-    name: str
-    title: str
-    tip: str = ""
-    entries: tuple[Command | Menu | None, ...] = ()
-    enabled: Callable[[Now], bool] = always
-    fill: Callable[[Any, QMenu], object] | None = None
-    one_of: bool = False
-    tooltips: bool = False
-
-    def commands(self) -> Iterator[Command]:
-        """Yield the commands in it and in the menus in it."""
-        for entry in self.entries:
-            if isinstance(entry, Menu):
-                yield from entry.commands()
-            elif entry is not None:
-                yield entry
-
-
-@dataclass(frozen=True)
-class Now:
-    """What decides which commands of the window can be done.
-
-    Attributes
-    ----------
-    busy : bool
-        Whether a job runs.
-    ready : bool
-        Whether a run could start if none did.
-    undo, redo : str
-        What would be undone or done again, in words.
-    theme : str
-    """
-
-    session: Session
-    busy: bool = False
-    ready: bool = False
-    undo: str = ""
-    redo: str = ""
-    theme: str = ""
-
-
-def opened(now: Now) -> bool:
-    """Tell whether a mesh is open."""
-    return now.session.mesh is not None
-
-
-def flat(now: Now) -> bool:
-    """Tell whether a mesh of two dimensions is open."""
-    return now.session.mesh is not None and now.session.mesh.dim == 2
-
-
-def solid(now: Now) -> bool:
-    """Tell whether a mesh of three dimensions is open."""
-    return opened(now) and not flat(now)
-
-
-def valued(now: Now) -> bool:
-    """Tell whether the colours say a value of cells."""
-    return opened(now) and now.session.view.colour_by != "role"
-
-
-def stepped(now: Now) -> bool:
-    """Tell whether there are steps."""
-    return len(now.session.frames) > 1
-
-
-def idle(now: Now) -> bool:
-    """Tell whether a mesh is open and no job runs."""
-    return opened(now) and not now.busy
-
-
-def _stepped_and_idle(now: Now) -> bool:
-    return stepped(now) and idle(now)
-
-
-def _why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
-    """Return what says why something cannot be done, if it cannot."""
-    wait = "Wait for the end of what runs, or cancel it."
-    return lambda now: "" if able(now) else wait if opened(now) and now.busy else why
-
 
 # What they do ------------------------------------------------------------------------------
 
@@ -272,15 +100,15 @@ _EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshe
             lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=opened),
     Command("export_film", "&Film of the steps…", "Make a film of the steps.",
             lambda window: window.exports.make_film(),
-            enabled=stepped, tip_now=_why_not(stepped, _NO_STEPS)),
+            enabled=stepped, tip_now=why_not(stepped, _NO_STEPS)),
     Command("export_quality", "&Quality as CSV…",
             "Save the quality of every cell of the step that is shown as a CSV table.",
             lambda window: window.exports.quality(),
-            enabled=idle, tip_now=_why_not(idle, "There is no mesh yet: open one first.")),
+            enabled=idle, tip_now=why_not(idle, "There is no mesh yet: open one first.")),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step, each in a file of its own.",
             lambda window: window.exports.steps(),
-            enabled=_stepped_and_idle, tip_now=_why_not(_stepped_and_idle, _NO_STEPS)),
+            enabled=stepped_and_idle, tip_now=why_not(stepped_and_idle, _NO_STEPS)),
 ), tooltips=True)
 
 _FILE = Menu("file", "&File", entries=(

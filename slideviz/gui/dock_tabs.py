@@ -37,8 +37,8 @@ class DockTabs(QObject):
         self.window, self._bare = window, bare
         self._docks = {dock.windowTitle(): dock for dock in docks}
         for dock in self._docks.values():
-            for told in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
-                told.connect(self._soon)
+            for change in (dock.dockLocationChanged, dock.topLevelChanged, dock.visibilityChanged):
+                change.connect(self._soon)
         self._timer = later(self, self.watch)
         self.watch()
 

@@ -20,6 +20,7 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out, usual_ending
 from slideviz.session.keep import keep_view
+from slideviz.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
     from slideviz.gui.window import MainWindow
@@ -143,12 +144,11 @@ class Files(QObject):
         before : str
             What the changes would be lost by, in words.
         """
-        unsaved = {} if self._answered else self._unsaved()
-        if not unsaved:
+        unsaved = Unsaved.of(self.window.store.session, self.window.runner.busy)
+        if self._answered or not unsaved.what:
             return True
-        can_save = [name for name in unsaved if name in ("case", "mesh")]
-        question = self._question(unsaved, before)
-        answer = questions.ask_unsaved(self.window, question, can_save)
+        question = unsaved.question(before)
+        answer = questions.ask_unsaved(self.window, question, unsaved.can_save)
         # What else there is was in the question, too: it is not asked about again.
         if answer in ("case", "both") and not self.save_case():
             return False
@@ -164,46 +164,6 @@ class Files(QObject):
             again()
         finally:
             self._answered = False
-
-    def _unsaved(self) -> dict[str, str]:
-        """Return what would be lost, in words, by what it is."""
-        session, unsaved = self.window.store.session, {}
-        if session.unsaved_case:
-            source = session.case.source
-            unsaved["case"] = (
-                f"the changes to {source.name}" if source else "roles, motions and method as a case"
-            )
-        if session.unsaved_mesh:
-            run = session.run_shown
-            # While it goes on there is no last step to save.
-            name = "mesh" if run.end and not self.window.runner.busy else "run"
-            unsaved[name] = f"the deformed mesh of run {run.number}"
-        return unsaved
-
-    def _question(self, unsaved: dict[str, str], before: str) -> str:
-        """Return what is asked; a second line says what saving is good for."""
-        session = self.window.store.session
-        text = f"Save {' and '.join(unsaved.values())} before {before}?"
-        if "run" in unsaved:
-            lost = "Its steps are lost, for it goes on; cancel it to save what there is."
-            rest = {name: words for name, words in unsaved.items() if name != "run"}
-            if not rest:
-                return f"Run {session.shown} goes on. Lose its steps?"
-            return f"{self._question(rest, before)}\nRun {session.shown} goes on. {lost}"
-        more = []
-        shown = session.run_shown
-        if "case" in unsaved and shown and shown.end == "done" and not session.outdated:
-            more.append(f"The case repeats run {shown.number} exactly.")
-        others = [
-            str(r.number) for r in session.runs if r.frames and not r.saved and r is not shown
-        ]
-        if others:
-            several = len(others) > 1
-            more.append(
-                f"The mesh{'es' * several} of run{'s' * several} {', '.join(others)} "
-                f"{'are' if several else 'is'} not saved either."
-            )
-        return "\n".join([text, " ".join(more)]) if more else text
 
     # Save ------------------------------------------------------------------------------
 

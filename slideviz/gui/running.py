@@ -11,7 +11,7 @@ from qtpy.QtCore import QObject, Signal
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.gui.widgets.questions import Banner
+from slideviz.gui.widgets.banner import Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import Doing
 from slideviz.session.run_messages import (

@@ -19,12 +19,13 @@ from qtpy.QtWidgets import (
     QScrollArea,
     QSizePolicy,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from slideviz.gui.commands import COMMANDS
+from slideviz.gui.widgets.build import boxed, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.cards import SIZE, card
+from slideviz.gui.widgets.elided import ElidedLabel
 from slideviz.gui.widgets.icons import icon, logo
 from slideviz.gui.widgets.tips import rich_label, wrapped
 
@@ -53,67 +54,52 @@ class StartPage(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.page = QWidget()
         self.page.setMaximumWidth(WIDEST)
-        middle, outer = QWidget(), QHBoxLayout()
+        outer = in_row(None, self.page, None)
+        outer.setStretchFactor(self.page, 100)
+        self.setWidget(boxed(outer))
         outer.setContentsMargins(24, 12, 24, 12)
-        outer.addStretch(1)
-        outer.addWidget(self.page, 100)
-        outer.addStretch(1)
-        middle.setLayout(outer)
-        self.setWidget(middle)
-        column = QVBoxLayout(self.page)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(6)
-        column.addStretch(2)
-        column.addLayout(self._make_head())
-        column.addSpacing(10)
-        column.addLayout(self._make_buttons(TRIED in samples))
-        self.hint = QLabel("Files can also be dropped anywhere on this window.")
-        self.hint.setProperty("hint", True)
-        column.addWidget(self.hint)
-        self._recent = QVBoxLayout()
-        self._recent.setSpacing(0)
-        column.addLayout(self._recent)
+        self.hint = hint_label("Files can also be dropped anywhere on this window.")
+        self._recent = in_column(spacing=0)
         self.recent_buttons: list[QPushButton] = []
         self.sample_buttons: dict[str, QToolButton] = {}
-        if samples:
-            column.addSpacing(8)
-            column.addWidget(_heading("Sample cases"))
-            column.addLayout(self._make_cards(samples))
-        column.addStretch(3)
+        buttons = self._make_buttons(TRIED in samples)
+        head = (self._make_head(), 10, buttons, self.hint, self._recent)
+        cards = (8, _heading("Sample cases"), self._make_cards(samples)) if samples else ()
+        column = in_column(None, *head, *cards, None, spacing=6, on=self.page)
+        column.setStretch(0, 2)
+        column.setStretch(column.count() - 1, 3)
 
     # Parts -----------------------------------------------------------------------------
 
     def _make_head(self) -> QHBoxLayout:
-        head, picture = QHBoxLayout(), QLabel()
+        picture = QLabel()
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
         title = rich_label(
             "<span style='font-size:22pt; font-weight:600'>slideviz</span><br>"
             "Deform CFD meshes, and see at once where and why they suffer"
         )
         title.setWordWrap(True)
-        head.addWidget(picture)
-        head.addSpacing(10)
-        head.addWidget(title, 1)
-        return head
+        return in_row(picture, 10, title, wide=[title])
 
     def _make_buttons(self, can_try: bool) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        self.attempt = QPushButton(icon("run", "#ffffff"), "Try it: deform a blade passage")
-        self.attempt.setObjectName("run")
-        self.attempt.setToolTip("Open the sample “passage” and deform it at once.")
-        self.attempt.clicked.connect(lambda: self.try_wanted.emit(TRIED))
+        self.attempt = push_button(
+            "Try it: deform a blade passage",
+            "Open the sample “passage” and deform it at once.",
+            lambda: self.try_wanted.emit(TRIED),
+            "run",
+        )
+        self.attempt.setIcon(icon("run", "#ffffff"))
         self.attempt.setVisible(can_try)
-        self.open = QPushButton("Open a mesh or case…")
-        self.open.setObjectName("open_page")
-        self.open.setToolTip(COMMANDS["open"].tip)
-        self.open.clicked.connect(lambda _=False: COMMANDS["open"].do(self.window()))
+        self.open = push_button(
+            "Open a mesh or case…",
+            COMMANDS["open"].tip,
+            lambda: COMMANDS["open"].do(self.window()),
+            "open_page",
+        )
         for button in (self.attempt, self.open):
             button.setAutoDefault(True)  # the Enter key, too
             button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-            row.addWidget(button)
-        row.addStretch(1)
-        return row
+        return in_row(self.attempt, self.open, None, spacing=10)
 
     def _make_cards(self, samples: dict[str, str]) -> QGridLayout:
         self._cards = QGridLayout()
@@ -204,28 +190,21 @@ class RecentButton(QPushButton):
         self.setAutoDefault(True)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(8, 4, 8, 4)
         when = changed_words(path)
         self.setEnabled(bool(when))
         self.setToolTip(wrapped(str(path) if when else f"{path} is not there any more."))
         self.setAccessibleName(f"{path.name} in {path.parent}, {when or 'missing'}")
-        name, self.folder = rich_label(f"<b>{html.escape(path.name)}</b>"), QLabel()
-        time = QLabel(when or "missing")
+        name, time = rich_label(f"<b>{html.escape(path.name)}</b>"), QLabel(when or "missing")
+        folder = str(path.parent).replace(str(Path.home()), "~", 1)
+        self.folder = ElidedLabel(folder, Qt.TextElideMode.ElideMiddle)
+        self.folder.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         for label in (name, self.folder, time):
             label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-            row.addWidget(label, 1 if label is self.folder else 0)
-        for label in (self.folder, time):
-            label.setProperty("hint", True)
-        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+            label.setProperty("hint", label is not name)
+        parts = in_row(name, self.folder, time, wide=[self.folder])
+        parts.setContentsMargins(8, 4, 8, 4)
+        self.setLayout(parts)
         self.setFixedHeight(self.fontMetrics().height() + 12)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        folder = str(self.path.parent).replace(str(Path.home()), "~", 1)
-        room = self.folder.width()
-        middle = Qt.TextElideMode.ElideMiddle
-        self.folder.setText(self.folder.fontMetrics().elidedText(folder, middle, room))
 
 
 def changed_words(path: Path, now: datetime | None = None) -> str:

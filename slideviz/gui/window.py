@@ -17,19 +17,18 @@ from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QVBoxLayout, QWidge
 from slideviz.case.motion_words import box_words
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
-from slideviz.gui.commands import Now
 from slideviz.gui.dialogs.exporter import Exports
 from slideviz.gui.dialogs.help import Help
 from slideviz.gui.docks import Docks
 from slideviz.gui.files import Files
+from slideviz.gui.intersection_check import IntersectionCheck
 from slideviz.gui.panels.boundaries import BoundariesPanel
-from slideviz.gui.panels.intersection_check import IntersectionCheck
 from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
 from slideviz.gui.panels.run import RunPanel
-from slideviz.gui.responsiveness.jit_warmup import WarmUp
-from slideviz.gui.restore import Restore
+from slideviz.gui.recovery import SessionRecovery
+from slideviz.gui.responsiveness.warmup_thread import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewport.canvas import View3D
@@ -37,8 +36,11 @@ from slideviz.gui.viewport.cutting import Cutting
 from slideviz.gui.viewport.player import Player
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
+from slideviz.gui.widgets.banner import Banner
+from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import Faults
-from slideviz.gui.widgets.questions import Banner
+from slideviz.gui.widgets.icons import redraw_icons
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.io.file_checks import protected
@@ -100,9 +102,9 @@ class MainWindow(Services):
         self._restore()
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
-        self.clash_watch = IntersectionCheck(self.store, self)
-        self.warm_up = WarmUp(self)
-        self.warm_up.compiling.connect(self.preparing.setVisible)
+        self.intersection_check = IntersectionCheck(self.store, self)
+        self.warmup = WarmupThread(self)
+        self.warmup.compiling.connect(self.preparing.setVisible)
         self._keep_session(kept)
         plain_labels(self)
         self.sync_actions()
@@ -216,10 +218,10 @@ class MainWindow(Services):
 
     def _keep_session(self, folder: Path | None) -> None:
         self.autosave: Autosave | None = None
-        self.restore: Restore | None = None
+        self.recovery: SessionRecovery | None = None
         if folder is not None:
             self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.place, self)
-            self.restore = Restore(self, self.offer, self.autosave)
+            self.recovery = SessionRecovery(self, self.offer, self.autosave)
 
     def restore_layout(self) -> None:
         """Put every panel back to where it was at first."""
@@ -322,7 +324,7 @@ class MainWindow(Services):
             return
         self.docks_.lead_to(missing.place)
         panel = self.docks_.panels[missing.place]
-        if hasattr(panel, "lead_to"):
+        if isinstance(panel, Panel):
             panel.lead_to(missing)
 
     def set_theme(self, name: str) -> None:
@@ -330,13 +332,13 @@ class MainWindow(Services):
         name = name if name in theme.THEMES else "system"
         self.settings.setValue("theme", name)
         look = theme.apply(name)
-        colour = theme.icon_colour(look)
-        self.actions_.set_icon_colour(colour)
+        redraw_icons(self)
         self.sync_actions()
-        self.player.set_icon_colour(colour)
-        for panel in self.docks_.panels.values():
-            if hasattr(panel, "take_theme"):
-                panel.take_theme(look, colour)
+        # Words about inverted cells have the theme's red.
+        self.player.sync(self.store.session)
+        for panel in self.findChildren(Panel):
+            panel.take_theme(look)
+        self.cutting.set_look(look)
         self.viewing.set_look(look)
 
     # Qt --------------------------------------------------------------------------------
@@ -372,8 +374,8 @@ class MainWindow(Services):
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
             self.exports.end()
-            self.warm_up.close()
-            self.clash_watch.close()
+            self.warmup.close()
+            self.intersection_check.close()
             self.left_behind = not self.running.close()
             if self.autosave is not None:
                 self.autosave.close()

@@ -58,8 +58,8 @@ class Bench:
     """A window, the beat of its event loop, and what waits for it."""
 
     def __init__(self, app, folder: Path) -> None:
-        from slideviz.gui.responsiveness.jit_warmup import prepare_drawing
         from slideviz.gui.responsiveness.threads import be_quick, ready_numerics
+        from slideviz.gui.responsiveness.warmup_thread import prepare_drawing
         from slideviz.gui.window import MainWindow
 
         ready_numerics()
@@ -70,8 +70,8 @@ class Bench:
         be_quick()
         self.window.show()
         prepare_drawing(self.window.view, self.window.scene.stage)
-        self.window.warm_up.start()
-        self.until(lambda: not self.window.warm_up.thread_.is_alive())
+        self.window.warmup.start()
+        self.until(lambda: not self.window.warmup.thread_.is_alive())
         self.beat = Beat()
         self.rest()
 

@@ -34,7 +34,7 @@ def nothing_of_closed_windows():
     """Collect what closed windows left, as PySide would give their wrappers to new objects.
 
     The view keeps a QSurface; where Qt puts an action at its address later, Python gets the
-    surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.garbage`), no thread
+    surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.threads`), no thread
     of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
     """
     gc.collect()

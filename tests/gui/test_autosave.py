@@ -134,14 +134,14 @@ def test_the_session_of_a_window_that_is_open_is_not_offered(make, qtbot, case_f
     kept(first, qtbot)
     assert find_sessions(folder) == ([], [])
     other = make()
-    other.restore.look()
+    other.recovery.look()
     assert not other.offer.isVisible()
     assert other.autosave.path != first.autosave.path
 
 
 def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_file, folder):
     window = make()
-    window.restore.look()
+    window.recovery.look()
     assert window.offer.isVisible()
     text = window.offer.text.text()
     assert "did not end properly" in text
@@ -161,7 +161,7 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
 
 def test_discard_throws_it_away(make, crashed, folder):
     window = make()
-    window.restore.look()
+    window.recovery.look()
     window.offer.answers["Discard"].click()
     assert not window.offer.isVisible()
     assert list(folder.iterdir()) == []
@@ -169,16 +169,16 @@ def test_discard_throws_it_away(make, crashed, folder):
 
 def test_a_closed_offer_comes_again_at_the_next_start_only(make, crashed, qtbot):
     window = make()
-    window.restore.look()
+    window.recovery.look()
     window.offer._closed()
     assert not window.offer.isVisible()
     assert crashed.exists()
     second = make()
-    second.restore.look()
+    second.recovery.look()
     assert not second.offer.isVisible(), "the first window holds it"
     window.close()
-    window.restore._later.clear()
-    second.restore.look()
+    window.recovery._later.clear()
+    second.recovery.look()
     assert second.offer.isVisible()
 
 
@@ -187,8 +187,8 @@ def test_several_are_offered_one_after_the_other_newest_first(make, crashed):
     older.write_text(crashed.read_text().replace("STEPS= 7", "STEPS= 3"))
     os.utime(older, (1e9, 1e9))
     window = make()
-    window.restore.look()
-    assert [found.case.steps for found in window.restore.waiting] == [7, 3]
+    window.recovery.look()
+    assert [found.case.steps for found in window.recovery.waiting] == [7, 3]
     assert "1 more" in window.offer.text.text()
     window.offer.answers["Discard"].click()
     assert older.exists()
@@ -202,7 +202,7 @@ def test_a_session_whose_mesh_is_gone_is_told_and_kept(make, crashed, qtbot, cas
     away = mesh.rename(mesh.with_suffix(".away"))
     try:
         window = make()
-        window.restore.look()
+        window.recovery.look()
         window.offer.answers["Restore"].click()
         qtbot.waitUntil(lambda: window.banner.isVisible())
         assert "no such file" in window.banner.text.text()
@@ -220,14 +220,14 @@ def test_a_session_that_cannot_be_read_is_told_and_kept(make, folder, text):
     bad.write_text(text)
     (folder / "session-4194399-1.cfg.broken").write_text("an earlier one")
     window = make()
-    window.restore.look()
+    window.recovery.look()
     assert "cannot be read" in window.banner.text.text()
     assert not window.offer.isVisible()
     assert not bad.exists()
     assert (folder / "session-4194399-1.cfg.2.broken").read_text() == text
     assert (folder / "session-4194399-1.cfg.broken").read_text() == "an earlier one"
     window.banner.hide()
-    window.restore.look()
+    window.recovery.look()
     assert not window.banner.isVisible()
 
 

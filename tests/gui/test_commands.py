@@ -3,7 +3,8 @@
 import pytest
 from qtpy.QtGui import QKeySequence
 
-from slideviz.gui.commands import COMMANDS, MENUS, Now
+from slideviz.gui.commands import COMMANDS, MENUS
+from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.icons import STROKES
 from slideviz.session import changes
 from slideviz.session.state import Session

@@ -142,7 +142,7 @@ def test_another_mesh_is_begun_with(full):
 
 def test_it_is_dark_in_the_dark(full, qtbot):
     with qtbot.waitSignal(full.canvas.drawn):
-        full.take_theme(DARK, "#ffffff")
+        full.take_theme(DARK)
     assert full.canvas.grab().toImage().pixelColor(3, 3).name() == DARK.background
 
 

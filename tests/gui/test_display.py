@@ -8,8 +8,7 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.panels.display import NOT_PERIODIC, ROLES_ONLY, SHOWN
-from slideviz.gui.panels.display_fields import MOST_COPIES, Copies
+from slideviz.gui.panels.display import MOST_COPIES, NOT_PERIODIC, ROLES_ONLY, SHOWN, Copies
 from slideviz.samples.table import write_sample
 from slideviz.scene.passages import CopyLayer
 from slideviz.scene.pick import to_display

@@ -261,7 +261,7 @@ def test_counts_are_made_once_for_a_frame(full, qtbot, monkeypatch):
 
 def test_it_is_dark_in_the_dark(full, qtbot):
     with qtbot.waitSignal(full.canvas.drawn):
-        full.take_theme(DARK, "#ffffff")
+        full.take_theme(DARK)
     assert full.canvas.grab().toImage().pixelColor(3, 3).name() == DARK.background
 
 

@@ -159,11 +159,11 @@ def test_a_table_is_checked_as_it_is_typed(dialog, blade, qtbot):
     assert not dialog.save.isEnabled()
     QTest.keyClicks(dialog.edit, f"{node} 0.3 0.4")
     qtbot.waitUntil(dialog.save.isEnabled)
-    assert dialog.told.text().startswith("1 of ")
-    assert not dialog.told.property("bad")
+    assert dialog.answer.text().startswith("1 of ")
+    assert not dialog.answer.property("bad")
     QTest.keyClicks(dialog.edit, " 7")
-    qtbot.waitUntil(lambda: bool(dialog.told.property("bad")))
-    assert "needed are 3: node dx dy" in dialog.told.text()
+    qtbot.waitUntil(lambda: bool(dialog.answer.property("bad")))
+    assert "needed are 3: node dx dy" in dialog.answer.text()
     assert not dialog.save.isEnabled()
 
 

@@ -12,13 +12,13 @@ import pytest
 from qtpy.QtCore import QEvent, QObject
 from qtpy.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from slideviz.gui.responsiveness import jit_warmup, settings, threads
-from slideviz.gui.responsiveness.garbage import GarbageCollector
+from slideviz.gui.responsiveness import settings, threads, warmup_thread
 from slideviz.gui.responsiveness.settings import GARBAGE_OBJECTS
+from slideviz.gui.responsiveness.threads import GarbageCollector
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.widgets import plot_image
-from slideviz.gui.widgets.bar import QuietBar
+from slideviz.gui.widgets.build import QuietBar
 from slideviz.plots.style import PRINT
 
 
@@ -226,8 +226,8 @@ def test_numpy_multiplies_in_the_thread_that_asks():
 def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     order = []
     monkeypatch.setattr(threads, "stand_back", lambda: order.append("back"))
-    monkeypatch.setattr(jit_warmup.jit_warmup, "warm_up", lambda *_: order.append("warm"))
-    window.warm_up.start()
+    monkeypatch.setattr(warmup_thread.jit_warmup, "warm_up", lambda *_: order.append("warm"))
+    window.warmup.start()
     qtbot.waitUntil(lambda: len(order) == 2)
     assert order == ["back", "warm"], "before Numba makes its threads, which inherit it"
     gc.unfreeze()

@@ -413,7 +413,7 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
     views = (viewing.view, viewing.second)
     QApplication.processEvents()
     painted = []
-    views[1 - leads].told.resized.disconnect()
+    views[1 - leads].signals.resized.disconnect()
     views[1 - leads]._one_paint._timer.timeout.connect(lambda: painted.append(1))
     where = QPointF(60, 90)
     none = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase

@@ -231,7 +231,7 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
     low, high = flat.scene.bounds()
     assert flat.across.low < low[0] < high[0] < flat.across.high
     assert flat.upright.low < low[1] < high[1] < flat.upright.high
-    flat.view.told.zoomed.emit(flat.view.rect().center(), 2.0)
+    flat.view.signals.zoomed.emit(flat.view.rect().center(), 2.0)
     zoomed = flat.scene.ranges()
     assert np.ptp(zoomed[0]) == pytest.approx(flat.across.high - flat.across.low)
     drag(panel.editor.slider, 0.5)
@@ -476,7 +476,7 @@ def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
         assert across[0] < low[0] < high[0] < across[1]
         assert upright[0] < low[1] < high[1] < upright[1]
     assert first.scene.looks_like(second.scene)
-    second.view.told.zoomed.emit(QPoint(30, 30), 2.0)
+    second.view.signals.zoomed.emit(QPoint(30, 30), 2.0)
     assert first.scene.looks_like(second.scene)
     zoomed = first.scene.ranges()
     drag(panel.editor.slider, 0.4)

@@ -7,7 +7,7 @@ import pytest
 from qtpy.QtGui import QColor, QPalette
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.step_numbers import result_parts
+from slideviz.gui.viewport.player import result_parts
 from slideviz.gui.widgets import theme
 from slideviz.mesh.quality import quality
 from slideviz.session import changes

@@ -34,12 +34,12 @@ def work(monkeypatch):
 
 
 def test_a_window_does_not_warm_up_by_itself(window):
-    assert window.warm_up.thread_ is None
+    assert window.warmup.thread_ is None
     assert not window.preparing.isVisible()
 
 
 def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work):
-    window.warm_up.start()
+    window.warmup.start()
     qtbot.wait(50)
     assert not window.preparing.isVisible()
     work.compile.set()
@@ -51,15 +51,15 @@ def test_preparing_is_told_only_while_something_is_compiled(window, qtbot, work)
     qtbot.waitUntil(lambda: not window.preparing.isVisible())
     assert gc.get_freeze_count() > 1000, "what was imported is not searched for garbage"
     gc.unfreeze()
-    first = window.warm_up.thread_
-    window.warm_up.start()
-    assert window.warm_up.thread_ is first
+    first = window.warmup.thread_
+    window.warmup.start()
+    assert window.warmup.thread_ is first
 
 
 def test_closing_does_not_wait_for_it(window, work):
-    window.warm_up.start()
+    window.warmup.start()
     assert window.close()
-    assert window.warm_up.thread_.is_alive()
+    assert window.warmup.thread_.is_alive()
     assert work.stopped()
 
 

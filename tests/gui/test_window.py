@@ -9,14 +9,13 @@ import pytest
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QTimerEvent, QUrl
 from qtpy.QtGui import QDragEnterEvent, QDropEvent
 from qtpy.QtTest import QTest
-from qtpy.QtWidgets import QApplication, QMenu
+from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 
 from slideviz import Case, read
 from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
 from slideviz.gui.viewport import player as player_module
-from slideviz.gui.viewport.player import step_ms
-from slideviz.gui.viewport.step_numbers import plain, result_parts
+from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.mesh.quality import INVERTED
 from slideviz.session import changes, jobs, opening
 from slideviz.session.run_messages import ended
@@ -310,7 +309,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
     opened.type(field, "0.01")
-    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     assert panel.run.isEnabled()
     ghost = window.scene.plotter.actors["motion:airfoil"]
     assert ghost.prop.color == ROLES["moving"].colour
@@ -335,14 +334,14 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
         asked.append(case.motions[0].vector[1])
         return ""
 
-    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     monkeypatch.setattr(intersections, "find_intersection", listening)
     opened.add_motion(Translate)
     field = window.motions.editor.vector.fields[1]
     opened.click(field)
     field.selectAll()
     QTest.keyClicks(field, "0.123456")
-    opened.qtbot.waitUntil(lambda: not window.clash_watch.busy)
+    opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     assert asked[-1] == 0.123456
     assert len(asked) <= 2
 
@@ -364,14 +363,14 @@ def test_motions_are_reordered_changed_and_removed(opened):
     opened.add_motion(Translate)
     opened.add_motion(Rotate)
     assert panel.list.currentRow() == 1
-    opened.click(panel.buttons["up"])
+    opened.click(panel.findChild(QToolButton, "motion_up"))
     assert [type(motion) for motion in opened.session.case.motions] == [Rotate, Translate]
     assert panel.list.currentRow() == 0
     opened.choose(panel.editor.kind, Scale)
     assert [type(motion) for motion in opened.session.case.motions] == [Scale, Translate]
-    opened.click(panel.buttons["remove"])
+    opened.click(panel.findChild(QToolButton, "motion_remove"))
     assert [type(motion) for motion in opened.session.case.motions] == [Translate]
-    opened.click(panel.buttons["remove"])
+    opened.click(panel.findChild(QToolButton, "motion_remove"))
     assert not opened.session.case.motions
     assert not panel.editor.isVisible()
 
@@ -981,7 +980,7 @@ def test_colours_edges_and_ghosts_are_switched_from_the_tool_bar(opened):
 def test_the_wheel_zooms_about_the_mouse_and_f_shows_all_again(opened):
     window = opened.window
     scale = window.view.camera.parallel_scale
-    window.view.told.zoomed.emit(QPoint(100, 100), 1.5)
+    window.view.signals.zoomed.emit(QPoint(100, 100), 1.5)
     assert window.view.camera.parallel_scale == pytest.approx(scale / 1.5)
     QTest.keyClick(window, Qt.Key.Key_F)
     assert window.view.camera.parallel_scale == pytest.approx(scale)

@@ -6,15 +6,8 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
-from qtpy.QtCore import QSize, Qt, Signal
-from qtpy.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QLabel, QWidget
 
 from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import OffscreenRenderer
@@ -23,8 +16,8 @@ from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.turns import Turns, raise_again
-from slideviz.gui.widgets.bar import QuietBar
-from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, to_image
+from slideviz.gui.widgets.build import QuietBar, hint_label, in_column, in_row, set_style
+from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 
 PREVIEW = (360, 225)
 
@@ -65,16 +58,12 @@ class FilmDialog(QDialog):
         self._previewing.failed.connect(raise_again)
         self.form = FilmForm(renderer)
         self.form.changed.connect(self._changed)
-        outer = QVBoxLayout(self)
-        outer.addLayout(self._make_previews())
-        outer.addWidget(self.form)
         self.words = QLabel()
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
         self.words.setWordWrap(True)
-        outer.addWidget(self.words)
         self.bar = QuietBar()
-        outer.addWidget(self.bar)
-        outer.addWidget(self._make_buttons())
+        parts = (self._make_previews(), self.form, self.words, self.bar, self._make_buttons())
+        self.setLayout(in_column(*parts))
         self._soon = later(self, self._draw, PREVIEW_MS)
         self._changed()
         self._show_filming(False)
@@ -82,19 +71,10 @@ class FilmDialog(QDialog):
     # Parts -----------------------------------------------------------------------------
 
     def _make_previews(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        self.previews = []
-        for word in ("First image", "Last image"):
-            column, title, picture = QVBoxLayout(), QLabel(word), QLabel()
-            title.setProperty("hint", True)
-            picture.setFixedSize(QSize(PREVIEW[0] + 2, PREVIEW[1] + 2))
-            picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
-            picture.setAccessibleName(word)
-            self.previews.append(picture)
-            column.addWidget(title)
-            column.addWidget(picture)
-            row.addLayout(column)
-        return row
+        words = ("First image", "Last image")
+        self.previews = [preview_label(word, PREVIEW) for word in words]
+        pairs = zip(words, self.previews, strict=True)
+        return in_row(*(in_column(hint_label(word), picture) for word, picture in pairs))
 
     def _make_buttons(self) -> QDialogButtonBox:
         buttons = QDialogButtonBox()
@@ -110,8 +90,7 @@ class FilmDialog(QDialog):
     def _changed(self) -> None:
         problem = self.form.problem()
         self.words.setText(problem or self.form.words)
-        self.words.setProperty("bad", bool(problem))
-        self.words.style().polish(self.words)
+        set_style(self.words, "bad", bool(problem))
         self.make.setEnabled(not problem)
         self._soon.start()
 

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qtpy.QtCore import Signal
-from qtpy.QtWidgets import (
-    QCheckBox,
-    QDoubleSpinBox,
-    QFormLayout,
-    QHBoxLayout,
-    QSpinBox,
-    QWidget,
-)
+from qtpy.QtCore import QSignalBlocker, Signal
+from qtpy.QtWidgets import QDoubleSpinBox, QFormLayout, QSpinBox, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import FPS, SIZES, Reel, check_film
+from slideviz.gui.widgets.build import check_box, in_row
 from slideviz.gui.widgets.choice import Choice
 
 KINDS = {
@@ -56,14 +50,13 @@ class FilmForm(QWidget):
         self.frames = len(renderer.session.frames)
         self._make_size()
         self._make_pace()
-        self.white = QCheckBox("White background")
-        self.white.setToolTip("Else the background of the view.")
+        self.white = check_box("White background", "Else the background of the view.")
         self.white.setChecked(True)
-        self.fill = QCheckBox("Fill the images with the mesh")
-        self.fill.setToolTip("Else they show what the view shows of the mesh.")
+        self.fill = check_box(
+            "Fill the images with the mesh", "Else they show what the view shows of the mesh."
+        )
         self.fill.setChecked(renderer.fills)
-        self.mark = QCheckBox("Marked cell")
-        self.mark.setToolTip("Its outline, with its number and its value.")
+        self.mark = check_box("Marked cell", "Its outline, with its number and its value.")
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow("Kind", self.kind)
@@ -83,12 +76,11 @@ class FilmForm(QWidget):
         self.kind.chosen.connect(self._kind_chosen)
         self.size_choice.chosen.connect(self._size_chosen)
         self.width_px, self.height_px = QSpinBox(), QSpinBox()
-        self._pixels = QHBoxLayout()
+        self._pixels = in_row(self.width_px, self.height_px)
         for box in (self.width_px, self.height_px):
             box.setRange(SMALLEST, LARGEST)
             box.setSuffix(" px")
             box.valueChanged.connect(self._pixels_typed)
-            self._pixels.addWidget(box)
 
     def _make_pace(self) -> None:
         self.fps, self.hold = QDoubleSpinBox(), QDoubleSpinBox()
@@ -150,9 +142,8 @@ class FilmForm(QWidget):
     def _size_chosen(self, name: str) -> None:
         if "x" in name:
             for box, length in zip((self.width_px, self.height_px), name.split("x"), strict=True):
-                box.blockSignals(True)
-                box.setValue(int(length))
-                box.blockSignals(False)
+                with QSignalBlocker(box):
+                    box.setValue(int(length))
         self._changed()
 
     def _pixels_typed(self) -> None:

@@ -6,28 +6,30 @@ import html
 from collections.abc import Callable
 
 from qtpy.QtCore import QObject, QSize, Qt
-from qtpy.QtGui import QFontDatabase, QKeySequence, QTextCursor, QTextDocument
+from qtpy.QtGui import QKeySequence, QTextCursor, QTextDocument
 from qtpy.QtWidgets import (
     QApplication,
     QDialog,
     QDialogButtonBox,
-    QHBoxLayout,
     QHeaderView,
     QLabel,
     QLineEdit,
     QPlainTextEdit,
     QTreeWidget,
     QTreeWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
-from slideviz.gui.commands import MENUS, Now
+from slideviz.gui.commands import MENUS
+from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in_row
+from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import versions
 from slideviz.gui.widgets.icons import logo
 from slideviz.gui.widgets.services import Services
+from slideviz.gui.widgets.tips import fixed_font
 
 LOG_LINES = 40
+CLOSE = QDialogButtonBox.StandardButton.Close
 MOUSE = (
     ("Drag", "turn a 3D mesh, move a 2D one"),
     ("Shift+Drag, middle button", "move"),
@@ -88,27 +90,20 @@ class ShortcutsDialog(QDialog):
         super().__init__(window)
         self.setWindowTitle("Keyboard and mouse")
         self.resize(1060, 700)
-        column = QVBoxLayout(self)
-        self.search = QLineEdit()
-        self.search.setPlaceholderText("Find an action or a key")
-        self.search.setClearButtonEnabled(True)
+        self.search = _search_field("Find an action or a key")
         self.search.textChanged.connect(self._filter)
-        column.addWidget(self.search)
         self.tree = QTreeWidget()
         self.tree.setHeaderLabels(["Action", "Keys", "What it does"])
         self.tree.setRootIsDecorated(False)
         self.tree.setIndentation(14)
         self.tree.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        column.addWidget(self.tree)
         for title, rows in shortcut_rows(window):
             self._add(title, rows)
         self._add("Mouse", [(what, keys, "") for keys, what in MOUSE])
         header = self.tree.header()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
+        self.setLayout(in_column(self.search, self.tree, dialog_buttons(self, CLOSE)))
         self.search.setFocus()
 
     def _add(self, title: str, rows: list[tuple[str, str, str]]) -> None:
@@ -142,25 +137,17 @@ class TextDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle(title)
         self.resize(860, 640)
-        column, row = QVBoxLayout(self), QHBoxLayout()
-        self.search = QLineEdit()
-        self.search.setPlaceholderText("Find (Enter: the next one)")
-        self.search.setClearButtonEnabled(True)
-        self.count = QLabel()
-        self.count.setProperty("hint", True)
-        row.addWidget(self.search, 1)
-        row.addWidget(self.count)
-        column.addLayout(row)
+        self.search, self.count = _search_field("Find (Enter: the next one)"), hint_label()
+        self.count.setWordWrap(False)
         self.text = QPlainTextEdit(text)
         self.text.setReadOnly(True)
-        self.text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.text.setFont(fixed_font())
         self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        column.addWidget(self.text)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons = dialog_buttons(self, CLOSE)
         # Enter belongs to the search.
-        buttons.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
+        buttons.button(CLOSE).setAutoDefault(False)
+        head = in_row(self.search, self.count, wide=[self.search])
+        self.setLayout(in_column(head, self.text, buttons))
         self.search.textChanged.connect(self._typed)
         self.search.returnPressed.connect(self.next)
         self.search.setFocus()
@@ -187,7 +174,6 @@ class AboutDialog(QDialog):
         from slideviz import __version__
 
         self.setWindowTitle("About slideviz")
-        column, head = QVBoxLayout(self), QHBoxLayout()
         picture = QLabel()
         picture.setPixmap(logo().pixmap(QSize(64, 64)))
         title = QLabel(
@@ -195,21 +181,24 @@ class AboutDialog(QDialog):
             "Deforms CFD meshes with radial basis functions,<br>"
             "with boundaries that slide and repeat."
         )
-        head.addWidget(picture)
-        head.addSpacing(8)
-        head.addWidget(title, 1)
-        column.addLayout(head)
         self.text = QLabel(f"<pre>{html.escape(versions())}</pre>")
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        column.addWidget(self.text)
-        column.addWidget(QLabel("MIT licence: use, change and pass it on freely; no warranty."))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        licence = QLabel("MIT licence: use, change and pass it on freely; no warranty.")
+        buttons = dialog_buttons(self, CLOSE)
         self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
         self.copy.setAutoDefault(False)
         self.copy.setToolTip("Copy the versions.")
         self.copy.clicked.connect(lambda: QApplication.clipboard().setText(versions()))
-        buttons.rejected.connect(self.reject)
-        column.addWidget(buttons)
+        head = in_row(picture, 8, title, wide=[title])
+        self.setLayout(in_column(head, self.text, licence, buttons))
+
+
+def _search_field(words: str) -> QLineEdit:
+    """Return a field for words to find, with a button that clears it."""
+    field = QLineEdit()
+    field.setPlaceholderText(words)
+    field.setClearButtonEnabled(True)
+    return field
 
 
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:

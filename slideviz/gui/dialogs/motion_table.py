@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qtpy.QtGui import QFontDatabase
-from qtpy.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
-    QLabel,
-    QPlainTextEdit,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtWidgets import QDialog, QDialogButtonBox, QLabel, QPlainTextEdit, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.settings import TABLE_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
+from slideviz.gui.widgets.tips import fixed_font
 from slideviz.session.motion_table import Rows, table_text, write_table
 
 FILTERS = "Displacements (*.txt)"
@@ -49,12 +43,12 @@ class TableDialog(QDialog):
         about.setWordWrap(True)
         self.edit = QPlainTextEdit(text)
         self.edit.setObjectName("table")
-        self.edit.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.edit.setFont(fixed_font())
         self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.edit.setPlaceholderText(f"{rows.heading}\n…")
-        self.told = QLabel()
-        self.told.setWordWrap(True)
-        self.buttons = QDialogButtonBox()
+        self.answer = QLabel()
+        self.answer.setWordWrap(True)
+        self.buttons = dialog_buttons(self)
         kind = QDialogButtonBox.ButtonRole
         self.fill = self.buttons.addButton("List all nodes", kind.ActionRole)
         self.fill.setToolTip("Add a row of zeros for each node that has none yet.")
@@ -62,12 +56,8 @@ class TableDialog(QDialog):
         self.save = self.buttons.addButton("Save as…", kind.AcceptRole)
         self.save.setToolTip("Save the table as a displacement file, which the case then uses.")
         self.buttons.addButton(QDialogButtonBox.StandardButton.Cancel)
-        column = QVBoxLayout(self)
-        for widget in (about, self.edit, self.told, self.buttons):
-            column.addWidget(widget, 1 if widget is self.edit else 0)
+        self.setLayout(in_column(about, self.edit, self.answer, self.buttons, wide=[self.edit]))
         self.fill.clicked.connect(self._fill)
-        self.buttons.accepted.connect(self.accept)
-        self.buttons.rejected.connect(self.reject)
         self._soon = later(self, self.check, TABLE_MS)
         self.edit.textChanged.connect(self._soon.start)
         self.edit.setFocus()
@@ -91,10 +81,8 @@ class TableDialog(QDialog):
             said, wrong = self.rows.check(self.text), False
         except SlidevizError as error:
             said, wrong = str(error), True
-        self.told.setText(said)
-        self.told.setProperty("bad", wrong and bool(self.text.strip()))
-        self.told.style().unpolish(self.told)
-        self.told.style().polish(self.told)
+        self.answer.setText(said)
+        set_style(self.answer, "bad", wrong and bool(self.text.strip()))
         self.save.setEnabled(not wrong)
 
     def accept(self) -> None:

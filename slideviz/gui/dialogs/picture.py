@@ -9,7 +9,7 @@ from collections.abc import Generator
 from dataclasses import asdict, replace
 from typing import Any
 
-from qtpy.QtCore import QSize, Qt
+from qtpy.QtCore import QSignalBlocker, Qt
 from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import (
     QCheckBox,
@@ -17,10 +17,8 @@ from qtpy.QtWidgets import (
     QDialogButtonBox,
     QDoubleSpinBox,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QSpinBox,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -31,15 +29,26 @@ from slideviz.export.vector import MOST_CELLS
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.turns import Turns, raise_again
+from slideviz.gui.widgets.build import (
+    boxed,
+    check_box,
+    dialog_buttons,
+    hint_label,
+    in_column,
+    in_row,
+    set_style,
+)
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import (
     copy_image,
     drawn_for,
     fitted,
     framed,
+    preview_label,
     to_image,
     wait_cursor,
 )
+from slideviz.terms import SHOWN
 
 PREVIEW = (470, 330)
 SIZES = {
@@ -59,7 +68,7 @@ PAPER_POINTS = 8.5
 """Normal letters on paper; journals ask for 8 at least."""
 OPTIONS = {
     "legend": ("Legend or colour bar", "What the colours mean, at the right."),
-    "edges": ("Mesh edges", "The edges of the cells."),
+    "edges": (SHOWN["edges"].name, SHOWN["edges"].tip),
     "triad": ("Directions of the axes", "Small arrows in the lower left corner."),
     "title": ("Title with the quality", "Run and step, with minimum, mean and inverted cells."),
     "fill": ("Fill the picture with the mesh", "Else it shows what the view shows of the mesh."),
@@ -96,20 +105,9 @@ class PictureDialog(QDialog):
         self._make_preview()
         self._make_size()
         self._make_options()
-        row = QHBoxLayout()
-        row.setSpacing(16)
-        left, right = QVBoxLayout(), QVBoxLayout()
-        left.addWidget(self.preview)
-        left.addWidget(self.words)
-        left.addWidget(self.kinds)
-        left.addStretch(1)
-        right.addLayout(self._form)
-        right.addStretch(1)
-        row.addLayout(left)
-        row.addLayout(right)
-        outer = QVBoxLayout(self)
-        outer.addLayout(row)
-        outer.addWidget(self._make_buttons())
+        left = in_column(self.preview, self.words, self.kinds, None)
+        parts = in_row(left, in_column(self._form, None), spacing=16)
+        self.setLayout(in_column(parts, self._make_buttons()))
         self._timer = later(self, self._draw, PREVIEW_MS)
         self._turns = Turns(self)
         self._turns.failed.connect(raise_again)
@@ -119,16 +117,11 @@ class PictureDialog(QDialog):
     # Parts -----------------------------------------------------------------------------
 
     def _make_preview(self) -> None:
-        self.preview = QLabel()
-        self.preview.setFixedSize(QSize(PREVIEW[0] + 2, PREVIEW[1] + 2))
-        self.preview.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.preview = preview_label("Preview of the picture", PREVIEW)
         self.preview.setObjectName("preview")
-        self.preview.setAccessibleName("Preview of the picture")
         self.words = QLabel()
         self.words.setTextFormat(Qt.TextFormat.PlainText)  # it has the name of a file
-        self.kinds = QLabel(_kinds(self.renderer))
-        self.kinds.setProperty("hint", True)
-        self.kinds.setWordWrap(True)
+        self.kinds = hint_label(_kinds(self.renderer))
         self.kinds.setFixedWidth(PREVIEW[0])
 
     def _make_size(self) -> None:
@@ -154,8 +147,9 @@ class PictureDialog(QDialog):
         self.dpi.valueChanged.connect(self._changed)
         self._form = QFormLayout()
         self._form.addRow("Size", self.size_choice)
-        self._pixels = _row(self.width_px, QLabel("×"), self.height_px)
-        self._paper = _row(self.width_cm, QLabel("×"), self.height_cm, self.dpi)
+        self._pixels = boxed(in_row(self.width_px, QLabel("×"), self.height_px, None))
+        paper = (self.width_cm, QLabel("×"), self.height_cm, self.dpi)
+        self._paper = boxed(in_row(*paper, None))
         self._form.addRow("", self._pixels)
         self._form.addRow("", self._paper)
         self.text = Choice(TEXT)
@@ -170,26 +164,20 @@ class PictureDialog(QDialog):
         self._form.addRow("Background", self.background)
         self.options: dict[str, QCheckBox] = {}
         for name, (text, tip) in OPTIONS.items():
-            box = QCheckBox(text)
-            box.setToolTip(tip)
-            box.toggled.connect(self._changed)
-            self.options[name] = box
-            self._form.addRow("", box)
+            self.options[name] = check_box(text, tip, self._changed)
+            self._form.addRow("", self.options[name])
         self._form.setRowVisible(self.options["both"], self.renderer.beside is not None)
         marked = self.renderer.session.view.marked is not None
         self._form.setRowVisible(self.options["marked"], marked)
 
     def _make_buttons(self) -> QDialogButtonBox:
-        buttons = QDialogButtonBox(
-            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
-        )
-        self.save = buttons.button(QDialogButtonBox.StandardButton.Save)
+        kinds = QDialogButtonBox.StandardButton
+        buttons = dialog_buttons(self, kinds.Save, kinds.Cancel)
+        self.save = buttons.button(kinds.Save)
         self.save.setText("Save…")
         self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
         self.copy.setToolTip("Copy this picture to the clipboard.")
         self.copy.clicked.connect(self._copy)
-        buttons.accepted.connect(self.accept)
-        buttons.rejected.connect(self.reject)
         return buttons
 
     # What was chosen -------------------------------------------------------------------
@@ -249,9 +237,8 @@ class PictureDialog(QDialog):
         if name not in ("paper", "other"):
             size = self._view_size if name == "view" else [int(n) for n in name.split("x")]
             for box, length in zip((self.width_px, self.height_px), size, strict=True):
-                box.blockSignals(True)
-                box.setValue(length)
-                box.blockSignals(False)
+                with QSignalBlocker(box):
+                    box.setValue(length)
         self._form.setRowVisible(self._paper, name == "paper")
         self._form.setRowVisible(self._pixels, name != "paper")
         self._changed()
@@ -268,8 +255,7 @@ class PictureDialog(QDialog):
             if too_large
             else words_of_size(figure)
         )
-        self.words.setProperty("bad", too_large)
-        self.words.style().polish(self.words)
+        set_style(self.words, "bad", too_large)
         for button in (self.save, self.copy):
             button.setEnabled(not too_large)
         if not too_large and self.isVisible():
@@ -304,17 +290,6 @@ class PictureDialog(QDialog):
         self._timer.stop()
         self._turns.stop()
         super().done(result)
-
-
-def _row(*widgets: QWidget) -> QWidget:
-    """Return widgets in a row, as one."""
-    whole = QWidget()
-    layout = QHBoxLayout(whole)
-    layout.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        layout.addWidget(widget)
-    layout.addStretch(1)
-    return whole
 
 
 def _kinds(renderer: OffscreenRenderer) -> str:

@@ -7,23 +7,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from qtpy.QtCore import QItemSelectionModel, QPoint, Qt, Signal
+from qtpy.QtCore import QItemSelectionModel, QPoint, QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QAction, QBrush, QContextMenuEvent, QKeyEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
-    QLabel,
     QMenu,
-    QPushButton,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
+from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import role_icon
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.state import Session
@@ -74,24 +72,25 @@ class BoundariesTable(QTableWidget):
         super().keyPressEvent(event)
 
 
-class BoundariesPanel(QWidget):
-    """Shows the roles of the boundaries and lets them be changed, several at once."""
+class BoundariesPanel(Panel):
+    """The roles of the boundaries; several can be changed at once."""
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._names: tuple[str, ...] = ()
         self._choices: list[Choice] = []
-        self._syncing = False
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 4)
-        layout.setSpacing(4)
         self.table = self._make_table()
-        layout.addWidget(self.table, 1)
-        layout.addLayout(self._make_guess_line())
+        self.guess_text = hint_label()
+        self.keep = push_button(
+            "Keep all",
+            "Take every guessed role as right.",
+            lambda: self.store.change(changes.confirm),
+            "keep",
+        )
+        guesses = in_row(self.guess_text, self.keep, wide=[self.guess_text])
+        in_column(self.table, guesses, wide=[self.table], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.setFocusProxy(self.table)
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        self.follow()
 
     def _make_table(self) -> BoundariesTable:
         table = BoundariesTable()
@@ -119,26 +118,12 @@ class BoundariesPanel(QWidget):
         table.role_wanted.connect(lambda row: self._choices[row].showPopup())
         return table
 
-    def _make_guess_line(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        self.guess_text = QLabel()
-        self.guess_text.setWordWrap(True)
-        self.guess_text.setProperty("hint", True)
-        self.keep = QPushButton("Keep all")
-        self.keep.setObjectName("keep")
-        self.keep.setToolTip("Take every guessed role as right.")
-        self.keep.clicked.connect(lambda: self.store.change(changes.confirm))
-        row.addWidget(self.guess_text, 1)
-        row.addWidget(self.keep)
-        return row
-
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
         """Show the session; the only place that fills the table."""
-        self._syncing = True
-        try:
-            names = session.mesh.marker_names if session.mesh else ()
+        names = session.mesh.marker_names if session.mesh else ()
+        with QSignalBlocker(self.table):
             if names != self._names or len(self._choices) != len(names):
                 self._fill(session, names)
             elif session.mesh is not None:
@@ -146,8 +131,6 @@ class BoundariesPanel(QWidget):
             for row, name in enumerate(names):
                 self._sync_row(session, row, name)
             self._sync_selection(session)
-        finally:
-            self._syncing = False
         count = len(session.guesses)
         self.keep.setVisible(count > 0)
         self.guess_text.setVisible(count > 0 or (session.mesh is not None and not names))
@@ -198,10 +181,10 @@ class BoundariesPanel(QWidget):
         font = choice.font()
         font.setItalic(guess is not None)
         choice.setFont(font)
-        told = f"{role}: {ROLES[role].tip}."
+        tip = f"{role}: {ROLES[role].tip}."
         if guess:
-            told += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
-        choice.setToolTip(wrapped(told))
+            tip += f"\nA guess: {guess.reason}. Choose a role, or “Keep all”, to confirm it."
+        choice.setToolTip(wrapped(tip))
 
     def _sync_selection(self, session: Session) -> None:
         wanted = set(session.view.selected)
@@ -227,11 +210,10 @@ class BoundariesPanel(QWidget):
         return tuple(self._names[row] for row in rows)
 
     def _selection_changed(self) -> None:
-        if not self._syncing:
-            self.store.change(changes.select, self.selected())
+        self.store.change(changes.select, self.selected())
 
     def _item_changed(self, item: QTableWidgetItem) -> None:
-        if self._syncing or item.column() != NAME:
+        if item.column() != NAME:
             return
         shown = item.checkState() == Qt.CheckState.Checked
         name = self._names[item.row()]

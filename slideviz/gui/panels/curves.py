@@ -12,20 +12,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QMouseEvent
-from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QWidget
 
 from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.errors import SlidevizError
+from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.plot_canvas import (
-    PLOT_FILTERS,
-    PlotArea,
-    PlotCanvas,
-    ask_and_write,
-    write_plot,
-)
+from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import curves
@@ -64,47 +59,35 @@ class CurveCanvas(PlotCanvas):
         self.picked(self.to_value(event.position().x()))
 
 
-class CurvesPanel(QWidget):
+class CurvesPanel(Panel):
     """One plot of three, of the shown run and of the others."""
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._profiles = curves.Profiles()
         self._mesh: object = None
         self.canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.picked = self._picked
-        column = QVBoxLayout(self)
-        column.setContentsMargins(4, 4, 4, 4)
-        column.setSpacing(3)
-        column.addLayout(self._make_head())
-        column.addWidget(self.area, 1)
-        column.addWidget(self._make_span())
-        store.listen(self._changed)
-        self.sync(store.session)
+        head, span = self._make_head(), self._make_span()
+        in_column(head, self.area, span, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
+        self.follow(_concerned)
 
     def _make_head(self) -> QHBoxLayout:
         self.kind = Choice(KINDS)
         self.kind.setObjectName("curve_kind")
-        for index, tip in enumerate(TIPS.values()):
-            self.kind.setItemData(index, tip, Qt.ItemDataRole.ToolTipRole)
+        self.kind.explain(TIPS)
         self.kind.chosen.connect(lambda _: self._other_plot())
-        self.save = QPushButton("Save…")
-        self.save.setToolTip("Save the plot as PNG, SVG or PDF.")
-        self.save.clicked.connect(self._save)
-        self.whole = QCheckBox("0–1")
-        self.whole.setObjectName("whole_quality")
-        self.whole.setToolTip("All qualities there can be, instead of those of the curves.")
-        self.whole.toggled.connect(lambda _: self.canvas.ask())
-        row = QHBoxLayout()
-        row.addWidget(self.kind, 1)
-        row.addWidget(self.whole)
-        row.addWidget(self.save)
-        return row
+        self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
+        self.whole = check_box(
+            "0–1",
+            "All qualities there can be, instead of those of the curves.",
+            lambda _: self.canvas.ask(),
+            "whole_quality",
+        )
+        return in_row(self.kind, self.whole, self.save, wide=[self.kind])
 
     def _make_span(self) -> QWidget:
-        self.span_row = QWidget()
         self.what = Choice(WHAT)
         self.what.setToolTip("The lowest or the mean quality of each layer.")
         self.coordinate = Choice({})
@@ -114,20 +97,13 @@ class CurvesPanel(QWidget):
                 "about the axis of the case."
             )
         )
-        row = QHBoxLayout(self.span_row)
-        row.setContentsMargins(0, 0, 0, 0)
-        for choice in (self.what, self.coordinate):
+        both = (self.what, self.coordinate)
+        for choice in both:
             choice.chosen.connect(lambda _: self._other_plot())
-            row.addWidget(choice, 1)
+        self.span_row = boxed(in_row(*both, wide=both))
         return self.span_row
 
     # State to widgets ------------------------------------------------------------------
-
-    def _changed(self, old: Session, new: Session) -> None:
-        same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
-        turned = old.case.axis != new.case.axis or old.case.origin != new.case.origin
-        if not same or turned:
-            self.sync(new)
 
     def sync(self, session: Session) -> None:
         """Show the session."""
@@ -168,8 +144,8 @@ class CurvesPanel(QWidget):
             )
         return ""
 
-    def take_theme(self, look: Look, _colour: str) -> None:
-        """Take the colours of the theme."""
+    def take_theme(self, look: Look) -> None:
+        """Draw the plot in the colours of another theme."""
         self.canvas.set_look(look)
 
     # Drawing ---------------------------------------------------------------------------
@@ -180,14 +156,12 @@ class CurvesPanel(QWidget):
         if self._missing(session, kind):
             return lambda _figure, _style: None
         whole = self.whole.isChecked()
-        if kind == "span":
-            along = self.coordinate.currentData(), self.what.currentData()
-            return partial(draw_span, self._profiles, session, along, whole)
-        return (
-            partial(draw_greedy, session)
-            if kind == "greedy"
-            else partial(draw_steps, session, whole)
-        )
+        if kind == "greedy":
+            return partial(draw_greedy, session)
+        if kind == "steps":
+            return partial(draw_steps, session, whole)
+        coordinate, what = self.coordinate.currentData(), self.what.currentData()
+        return partial(draw_span, self._profiles, session, coordinate, what, whole)
 
     # What the user does ----------------------------------------------------------------
 
@@ -202,10 +176,14 @@ class CurvesPanel(QWidget):
             self.store.change(changes.show_frame, round(value))
 
     def _save(self) -> None:
-        default = folder_of(self) / f"{self.kind.currentText().lower().replace(' ', '_')}.png"
-        ask_and_write(
-            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
-        )
+        name = self.kind.currentText().lower().replace(" ", "_")
+        ask_and_write_plot(self, "Save plot", name, self.drawing())
+
+
+def _concerned(old: Session, new: Session) -> bool:
+    """Tell whether a change is one of what the curves are of."""
+    same = old.frame is new.frame and old.runs is new.runs and old.shown == new.shown
+    return not same or old.case.axis != new.case.axis or old.case.origin != new.case.origin
 
 
 def close_limits(values: Iterable[FloatArray]) -> tuple[float, float]:
@@ -239,13 +217,14 @@ def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
 def draw_span(
     profiles: curves.Profiles,
     session: Session,
-    along: tuple[curves.Coordinate, Literal["minimum", "mean"]],
+    coordinate: curves.Coordinate,
+    what: Literal["minimum", "mean"],
     whole: bool,
     figure: Figure,
     style: Style,
 ) -> None:
     """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
-    axes, (coordinate, what) = figure.add_subplot(), along
+    axes = figure.add_subplot()
     try:
         found = profiles.of(session, coordinate)
     except SlidevizError as error:

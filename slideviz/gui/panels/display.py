@@ -1,26 +1,23 @@
-"""The display panel: colours and their range, chosen cells, points, neighbours, what is drawn."""
+"""The display panel: colours and their range, threshold, points, passages, what is drawn."""
+
+# ruff: noqa: N802  (Qt's names)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from qtpy.QtCore import QSize, Qt
-from qtpy.QtWidgets import (
-    QCheckBox,
-    QFormLayout,
-    QFrame,
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QScrollArea,
-    QVBoxLayout,
-    QWidget,
-)
+import numpy as np
+from qtpy.QtCore import QSignalBlocker, QSize
+from qtpy.QtGui import QIcon, QImage, QPixmap, QValidator
+from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushButton, QWidget
 
-from slideviz.gui.commands import COMMANDS, Now
-from slideviz.gui.panels.display_fields import Copies, Span, map_icon
+from slideviz.gui.commands import COMMANDS
+from slideviz.gui.widgets.build import PanelScroll, check_box, grow_fields, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.command import Now
+from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.periodic import Pair
@@ -41,35 +38,106 @@ ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
 
 
-class DisplayPanel(QWidget):
-    """Shows how the mesh is looked at, and changes it."""
+MOST_COPIES = 9
+"""Neighbours on each side that can be chosen where a row has no end."""
+
+
+class Copies(NumberBox):
+    """The number of neighbouring passages, in words; the last value is all of a wheel."""
+
+    letters = "al"  # of "all"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("copies")
+        self.around: int | None = None
+        self.set_around(None)
+
+    def set_around(self, around: int | None) -> None:
+        """Take how many passages the wheel has; None: a row without an end."""
+        self.around = around
+        self.setRange(0, MOST_COPIES if around is None else max(around // 2, 1))
+
+    def textFromValue(self, value: int) -> str:
+        """Return the words for a number of neighbours."""
+        if value == 0:
+            return "0"
+        if self.around is not None and value == self.maximum():
+            return f"all {self.around} around"
+        return f"{value} on each side"
+
+    def valueFromText(self, text: str) -> int:
+        """Return the number that is typed, or that words stand for."""
+        if text.strip().startswith("all"):
+            return self.maximum()
+        digits = "".join(sign for sign in text if sign.isdigit())
+        return min(int(digits), self.maximum()) if digits else 0
+
+    def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
+        """Let anything be typed that a number can be read from."""
+        good = any(sign.isdigit() for sign in text) or text.strip() == "all"
+        state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
+        return state, text, at
+
+
+class Span(QWidget):
+    """Two numbers, the first below the second."""
+
+    def __init__(self, name: str, changed: Callable[[tuple[float, float]], object]) -> None:
+        super().__init__()
+        self.low = NumberField(0.0, lambda value: self._must(value < self.high.value, value, "<"))
+        self.high = NumberField(1.0, lambda value: self._must(value > self.low.value, value, ">"))
+        for end, field in (("low", self.low), ("high", self.high)):
+            field.setObjectName(f"{name}_{end}")
+            field.setAccessibleName(f"{name} {end}")
+            field.changed.connect(lambda _: changed((self.low.value, self.high.value)))
+        parts = in_row(self.low, QLabel("to"), self.high, wide=[self.low, self.high], spacing=4)
+        parts.setContentsMargins(0, 0, 0, 0)
+        self.setLayout(parts)
+
+    def _must(self, good: bool, value: float, sign: str) -> str:
+        """Return why a number may not be at its end; empty where it may."""
+        if good:
+            return ""
+        than, other = ("less", self.high) if sign == "<" else ("greater", self.low)
+        return f"{number_text(value)} must be {than} than {number_text(other.value)}"
+
+    def show_values(self, values: tuple[float, float]) -> None:
+        """Show two numbers without telling."""
+        for field, value in zip((self.low, self.high), values, strict=True):
+            if value != field.value:
+                field.show_value(value)
+
+    def set_tip(self, text: str) -> None:
+        """Explain both."""
+        self.low.set_tip(text)
+        self.high.set_tip(text)
+
+
+def map_icon(name: str) -> QIcon:
+    """Return a picture of a colour map, from low to high."""
+    from matplotlib import colormaps
+
+    row = (np.asarray(colormaps[name](np.linspace(0.0, 1.0, 64))) * 255).astype(np.uint8)
+    pixels = np.ascontiguousarray(np.repeat(row[None], 12, axis=0))
+    image = QImage(pixels.tobytes(), 64, 12, 64 * 4, QImage.Format.Format_RGBA8888)
+    return QIcon(QPixmap.fromImage(image.copy()))
+
+
+class DisplayPanel(Panel):
+    """Colours, threshold, points, passages and toggles of the view."""
 
     def __init__(self, store: Store) -> None:
-        super().__init__()
-        self.store = store
+        super().__init__(store)
         self._period = Period()
         self._key: tuple[object, ...] = ()
-        self.form = QFormLayout(self._make_scroll())
+        self.form = QFormLayout(PanelScroll(self).widget())
         self.form.setContentsMargins(6, 6, 6, 4)
-        self.form.setVerticalSpacing(5)
-        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        grow_fields(self.form, 5)
         self._make_colours()
         self._make_threshold()
         self._make_rest()
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
-
-    def _make_scroll(self) -> QWidget:
-        outside = QVBoxLayout(self)
-        outside.setContentsMargins(0, 0, 0, 0)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        inside = QWidget()
-        scroll.setWidget(inside)
-        outside.addWidget(scroll)
-        return inside
+        self.follow()
 
     def _make_colours(self) -> None:
         self.colour_by = self._choice("display_colour_by", labels(COLOUR_BY), "colour_by")
@@ -81,20 +149,14 @@ class DisplayPanel(QWidget):
             self.map.setItemIcon(index, map_icon(name))
         self.form.addRow("Colours", self.map)
         self.range = Span("range", lambda values: self._set(colour_range=values))
-        row = QHBoxLayout()
-        row.setSpacing(3)
-        row.addWidget(self.range, 1)
         self.fit_range = self._button("fit_range", "Fit", "fit_colours")
         self.reset_range = self._button("reset_range", "Reset", "usual_colours")
-        row.addWidget(self.fit_range)
-        row.addWidget(self.reset_range)
-        self.form.addRow("Range", row)
+        parts = (self.range, self.fit_range, self.reset_range)
+        self.form.addRow("Range", in_row(*parts, wide=[self.range], spacing=3))
 
     def _make_threshold(self) -> None:
-        self.only = QCheckBox("Only cells")
-        self.only.setObjectName("only")
-        self.only.setToolTip("Draw only the cells whose value is within these two numbers.")
-        self.only.toggled.connect(self._only)
+        tip = "Draw only the cells whose value is within these two numbers."
+        self.only = check_box("Only cells", tip, self._only, "only")
         self.threshold = Span("threshold", lambda values: self._set(threshold=values))
         self.form.addRow(self.only, self.threshold)
 
@@ -131,10 +193,8 @@ class DisplayPanel(QWidget):
         return choice
 
     def _button(self, name: str, text: str, command: str) -> QPushButton:
-        button = QPushButton(text)
-        button.setObjectName(name)
+        button = push_button(text, "", lambda: COMMANDS[command].do(main_window(self)), name)
         button.setFixedWidth(button.fontMetrics().horizontalAdvance(text) + 16)
-        button.clicked.connect(lambda _=False: COMMANDS[command].do(main_window(self)))
         return button
 
     # State to widgets ------------------------------------------------------------------
@@ -148,14 +208,8 @@ class DisplayPanel(QWidget):
         if key == self._key:
             return
         self._key = key
-        widgets = (self.only, self.copies)
-        for widget in widgets:
-            widget.blockSignals(True)
-        try:
+        with QSignalBlocker(self.only), QSignalBlocker(self.copies):
             self._sync(session)
-        finally:
-            for widget in widgets:
-                widget.blockSignals(False)
 
     def _sync(self, session: Session) -> None:
         view, opened = session.view, session.mesh is not None
@@ -187,22 +241,18 @@ class DisplayPanel(QWidget):
             box.setToolTip(wrapped(term.not_in_2d if opened and not able else term.tip))
 
     def _sync_copies(self, session: Session, pair: Pair | None) -> None:
-        self.copies.setEnabled(pair is not None)
-        self.copies_label.setEnabled(pair is not None)
-        if pair is None:
-            self.copies.setToolTip(wrapped(NOT_PERIODIC))
-            self.copies_label.setToolTip(wrapped(NOT_PERIODIC))
-            self.copies.setValue(0)
-            return
-        self.copies.set_around(passages_around(pair))
-        count = session.view.copies
+        tip, count = NOT_PERIODIC, 0
+        if pair is not None:
+            self.copies.set_around(passages_around(pair))
+            count = session.view.copies
+            tip = (
+                f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} "
+                f"repeat by {pair.describe()}."
+            )
         self.copies.setValue(self.copies.maximum() if count < 0 else count)
-        tip = (
-            f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} repeat "
-            f"by {pair.describe()}."
-        )
-        self.copies.setToolTip(wrapped(tip))
-        self.copies_label.setToolTip(wrapped(tip))
+        for widget in (self.copies, self.copies_label):
+            widget.setEnabled(pair is not None)
+            widget.setToolTip(wrapped(tip))
 
     # Widgets to state ------------------------------------------------------------------
 

@@ -4,26 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from qtpy.QtCore import Qt, QTimer
-from qtpy.QtGui import QKeySequence, QPaintEvent, QShortcut
-from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtCore import QRectF, Qt, QTimer, Signal
+from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen, QShortcut
+from qtpy.QtWidgets import QHBoxLayout, QLabel
 
-from slideviz.color_scheme import Look
-from slideviz.gui.panels.brush import BrushCanvas, Range
+from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.gui.responsiveness.settings import SELECTING_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.widgets.plot_canvas import (
-    PLOT_FILTERS,
-    PlotArea,
-    ask_and_write,
-    is_seen,
-    write_plot,
-)
+from slideviz.gui.widgets.build import check_box, in_column, in_row, push_button
+from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot, is_seen
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_histogram import (
     Counts,
@@ -36,16 +31,110 @@ from slideviz.session import changes
 from slideviz.session.state import Frame, Session
 from slideviz.session.store import Store
 
+GRIP_PX = 6
+"""A press so near to an end of the range moves that end."""
 
-class HistogramPanel(QWidget):
+Range = tuple[float, float]
+
+
+class BrushCanvas(PlotCanvas):
+    """A plot on which the mouse paints a range of values.
+
+    Signals
+    -------
+    brushed(object)
+        The range (low, high) that the mouse holds, or None for a click beside it.
+    held(bool)
+        The button is down, or up again.
+    """
+
+    brushed = Signal(object)
+    held = Signal(bool)
+
+    def __init__(self, drawing: Callable[[], Draw]) -> None:
+        super().__init__(drawing)
+        self.band: Range | None = None
+        self._held: float | None = None
+        self._moved = False
+        self.setCursor(Qt.CursorShape.CrossCursor)
+        self.setToolTip("Drag over values to show only the cells that have them; click to end it.")
+
+    def value_at(self, x_px: float) -> float:
+        """Return the value under a position of the mouse, within the axis."""
+        return float(np.clip(self.to_value(x_px), *self.figure.axes[0].get_xlim()))
+
+    def pixel_of(self, value: float) -> float:
+        """Return the x of a value in pixels of the widget, within the axis."""
+        return self.to_pixel(float(np.clip(value, *self.figure.axes[0].get_xlim())))
+
+    def show_band(self, band: Range | None) -> None:
+        """Show a range."""
+        if band != self.band:
+            self.band = band
+            self.update()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
+            return
+        x = event.position().x()
+        self._held, self._moved = self.value_at(x), False
+        if self.band is not None:
+            ends = [self.pixel_of(value) for value in self.band]
+            for near, far in ((0, 1), (1, 0)):
+                if abs(x - ends[near]) <= GRIP_PX:
+                    self._held, self._moved = self.band[far], True
+        self.held.emit(True)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._held is None:
+            self._show_grip(event.position().x())
+            return
+        here = self.value_at(event.position().x())
+        self._moved = self._moved or abs(self.pixel_of(self._held) - event.position().x()) > 3
+        if self._moved:
+            self.show_band((min(self._held, here), max(self._held, here)))
+            self.brushed.emit(self.band)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if event.button() == Qt.MouseButton.LeftButton and self._held is not None:
+            self._held = None
+            if not self._moved:
+                self.brushed.emit(None)
+            self.held.emit(False)
+
+    def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
+        self.brushed.emit(None)
+
+    def _show_grip(self, x: float) -> None:
+        ends = (self.band or ()) if self.figure.axes else ()
+        near = any(abs(x - self.pixel_of(value)) <= GRIP_PX for value in ends)
+        shape = Qt.CursorShape.SizeHorCursor if near else Qt.CursorShape.CrossCursor
+        self.setCursor(shape)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self.band is None or not self.figure.axes:
+            return
+        left, right = (self.pixel_of(value) for value in self.band)
+        top, height = self.axes_rows()
+        painter = QPainter(self)
+        colour = QColor(SELECTED_COLOUR)
+        painter.setPen(QPen(colour, 2))
+        colour.setAlpha(60)
+        painter.fillRect(QRectF(left, top, right - left, height), colour)
+        for x in (left, right):
+            painter.drawLine(round(x), round(top), round(x), round(top + height))
+        painter.end()
+
+
+class HistogramPanel(Panel):
     """The values of the step that is shown, of the undeformed mesh and of other runs."""
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._counts = Counts()
         self._wanted: Range | None = None
-        self._told: Frame | None = None
+        self._described: Frame | None = None
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._brushed)
@@ -55,58 +144,34 @@ class HistogramPanel(QWidget):
         self.numbers.setWordWrap(True)
         self.range_text = QLabel()
         self.range_text.setWordWrap(True)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(4, 4, 4, 4)
-        column.setSpacing(3)
-        column.addWidget(self.area, 1)
-        column.addWidget(self.numbers)
-        column.addWidget(self.range_text)
-        column.addLayout(self._make_buttons())
+        parts = (self.area, self.numbers, self.range_text, self._make_buttons())
+        in_column(*parts, wide=[self.area], spacing=3, on=self, margins=(4, 4, 4, 4))
         self._soon = later(self, self._choose, SELECTING_MS)
         escape = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         escape.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         escape.activated.connect(self.clear_range)
-        store.listen(self._changed)
-        self.sync(store.session)
+        self.follow(_concerned)
 
     def _make_buttons(self) -> QHBoxLayout:
-        self.log = QCheckBox("log")
-        self.log.setToolTip("Counts on a logarithmic axis, which shows a few bad cells.")
+        self.log = check_box("log", "Counts on a logarithmic axis, which shows a few bad cells.")
         self.log.setChecked(True)
-        self.log.toggled.connect(lambda _: self.canvas.ask())
-        self.whole = QCheckBox("0–1")
-        self.whole.setObjectName("whole_range")
-        self.whole.setToolTip("All values there can be, instead of those that the cells have.")
-        self.whole.toggled.connect(lambda _: self.canvas.ask())
-        self.show_all = QPushButton("Show all cells")
-        self.show_all.setObjectName("show_all_cells")
-        self.show_all.setToolTip("Show cells of any value again (Esc).")
-        self.show_all.clicked.connect(self.clear_range)
-        self.save = QPushButton("Save…")
-        self.save.setToolTip("Save the histogram as PNG, SVG or PDF.")
-        self.save.clicked.connect(self._save)
-        row = QHBoxLayout()
-        row.addWidget(self.log)
-        row.addWidget(self.whole)
-        row.addStretch(1)
-        row.addWidget(self.show_all)
-        row.addWidget(self.save)
-        return row
+        self.whole = check_box(
+            "0–1",
+            "All values there can be, instead of those that the cells have.",
+            name="whole_range",
+        )
+        for box in (self.log, self.whole):
+            box.toggled.connect(lambda _: self.canvas.ask())
+        self.show_all = push_button(
+            "Show all cells",
+            "Show cells of any value again (Esc).",
+            self.clear_range,
+            "show_all_cells",
+        )
+        self.save = push_button("Save…", "Save the histogram as PNG, SVG or PDF.", self._save)
+        return in_row(self.log, self.whole, None, self.show_all, self.save)
 
     # State to widgets ------------------------------------------------------------------
-
-    def _changed(self, old: Session, new: Session) -> None:
-        parts = (
-            old.frame is new.frame,
-            old.runs is new.runs or old.runs == new.runs,
-            old.view.colour_by == new.view.colour_by,
-            old.view.colour_map == new.view.colour_map,
-            old.colour_range == new.colour_range,
-            old.view.threshold == new.view.threshold,
-            old.view.beside == new.view.beside,
-        )
-        if not all(parts):
-            self.sync(new)
 
     def sync(self, session: Session) -> None:
         """Show the session."""
@@ -126,12 +191,12 @@ class HistogramPanel(QWidget):
         if is_seen(self):
             self._sync_words(session)
         else:
-            self._told = None
+            self._described = None
 
     def _sync_words(self, session: Session) -> None:
         if session.frame is None:
             return
-        self._told = session.frame
+        self._described = session.frame
         what = shown_measure(session)
         counted = session.frame.quality.counted
         plain = session.frame.values(what, session.mesh)[counted]
@@ -157,12 +222,12 @@ class HistogramPanel(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        # Behind another tab nothing was told.
-        if self._told is None and self.store.session.frame is not None:
+        # Behind another tab there were no words.
+        if self._described is None and self.store.session.frame is not None:
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
 
-    def take_theme(self, look: Look, _colour: str) -> None:
-        """Take the colours of the theme."""
+    def take_theme(self, look: Look) -> None:
+        """Draw the plot in the colours of another theme."""
         self.canvas.set_look(look)
 
     # Drawing ---------------------------------------------------------------------------
@@ -203,7 +268,16 @@ class HistogramPanel(QWidget):
         self.canvas.show_band(None)
 
     def _save(self) -> None:
-        default = folder_of(self) / "histogram.png"
-        ask_and_write(
-            self, "Save plot", default, PLOT_FILTERS, lambda path: write_plot(path, self.drawing())
-        )
+        ask_and_write_plot(self, "Save plot", "histogram", self.drawing())
+
+
+def _concerned(old: Session, new: Session) -> bool:
+    """Tell whether a change is one of what the histogram is of."""
+    names = ("colour_by", "colour_map", "threshold", "beside")
+    same = (
+        old.frame is new.frame,
+        old.runs is new.runs or old.runs == new.runs,
+        old.colour_range == new.colour_range,
+        *(getattr(old.view, name) == getattr(new.view, name) for name in names),
+    )
+    return not all(same)

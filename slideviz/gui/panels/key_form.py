@@ -11,6 +11,7 @@ from slideviz.case.key import Form, Key
 from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
+from slideviz.gui.widgets.build import grow_fields
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import (
     NumberBox,
@@ -75,8 +76,7 @@ class KeyForm(QFormLayout):
 
     def __init__(self, place: Form, own: Mapping[str, Field] | None = None) -> None:
         super().__init__()
-        self.setVerticalSpacing(4)
-        self.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        grow_fields(self)
         self.fields: dict[str, Field] = {}
         self._rows: list[tuple[Key, Field]] = []
         self._own = own or {}
@@ -96,6 +96,11 @@ class KeyForm(QFormLayout):
         self.fields[field.objectName()] = field
         self._rows.append((key, field))
         self.addRow(label, field)
+
+    @property
+    def words(self) -> str:
+        """Return a sentence that lists the settings."""
+        return ", ".join(key.label.rstrip(" ×") for key, _ in self._rows).capitalize() + "."
 
     def sync(self, case: Case, spare: Case, reasons: Mapping[str, str]) -> None:
         """Fill the fields from a case; where a setting is None there, from ``spare``.

@@ -6,8 +6,9 @@ import contextlib
 import logging
 
 from qtpy.QtCore import QObject, Qt, Signal
-from qtpy.QtGui import QFontDatabase
-from qtpy.QtWidgets import QPlainTextEdit, QWidget
+from qtpy.QtWidgets import QPlainTextEdit
+
+from slideviz.gui.widgets.tips import fixed_font
 
 LOGGERS = ("slideviz", "py.warnings")
 """Whose lines are shown: ours, those of Qt and VTK below it, and Python's warnings."""
@@ -46,11 +47,11 @@ class LogHandler(logging.Handler):
 class LogPanel(QPlainTextEdit):
     """Shows the newest lines of the log."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setReadOnly(True)
         self.setMaximumBlockCount(2000)
-        self.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.setFont(fixed_font())
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self.handler = LogHandler()
         # In a turn of its own: what Qt complains of in the middle of something comes here too.

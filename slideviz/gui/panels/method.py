@@ -1,24 +1,13 @@
 """The method panel: sliding, periodicity, steps, data reduction, and more."""
 
-# ruff: noqa: N802, D102  (Qt's names, and its documentation)
-
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any, cast
 
-from qtpy.QtCore import QPoint, QRect, Qt, QTimer, Signal
-from qtpy.QtWidgets import (
-    QFormLayout,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QScrollArea,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtCore import Qt, QTimer, Signal
+from qtpy.QtWidgets import QFormLayout, QWidget
 
 from slideviz.case.key import Key
 from slideviz.case.keys import KEYS
@@ -26,9 +15,18 @@ from slideviz.case.method_keys import nothing_slides
 from slideviz.case.model import Case, Reduction
 from slideviz.case.periodic_keys import no_pair
 from slideviz.gui.panels.key_form import KeyForm
+from slideviz.gui.widgets.build import (
+    PanelScroll,
+    boxed,
+    hint_label,
+    in_column,
+    in_row,
+    tool_button,
+)
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.field_watch import FieldWatch
 from slideviz.gui.widgets.fields import NumberField, number_text
+from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motions import found_text
@@ -52,20 +50,9 @@ class MoreSettings(QWidget):
 
     changed = Signal(object, object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._criterion = Reduction().criterion
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        self.button = QToolButton()
-        self.button.setObjectName("more")
-        self.button.setText("More settings")
-        self.button.setToolTip("Kernel, support radius, feature angle, details of data reduction.")
-        self.button.setCheckable(True)
-        self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self.button.toggled.connect(self._show_form)
-        layout.addWidget(self.button)
         self.levels = Choice({"none": "none", **labels(LEVEL_CRITERIA)})
         self.levels.setObjectName("levels")
         self.levels.chosen.connect(self._levels_chosen)
@@ -73,11 +60,13 @@ class MoreSettings(QWidget):
         self.level_end.setObjectName("level_end")
         self.level_end.changed.connect(self._level_end_changed)
         self.form = KeyForm("more", {"MULTILEVEL": self.levels, "LVL_SIZE": self.level_end})
-        self.form.setContentsMargins(0, 0, 0, 0)
         self.form.changed.connect(self.changed)
-        self.body = QWidget()
-        self.body.setLayout(self.form)
-        layout.addWidget(self.body)
+        self.button = tool_button(self.form.words, text="More settings", name="more")
+        self.button.setCheckable(True)
+        self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.button.toggled.connect(self._show_form)
+        self.body = boxed(self.form)
+        in_column(self.button, self.body, spacing=4, on=self)
         self._show_form(False)
 
     @property
@@ -105,48 +94,31 @@ class MoreSettings(QWidget):
         self.form.sync(case, spare, {})
 
 
-class MethodPanel(QWidget):
-    """Shows the settings of the case and changes them: a field for each key that has one.
+class MethodPanel(Panel):
+    """The settings of the case: a field for each key that has one.
 
     Each field is found by the name that it has in the case, as ``panel.sliding``.
     """
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._mesh: Mesh | None = None
         self._extent = 0.0
         self._reduction: Reduction | None = None
-        layout = self._make_scroll()
+        self.area = PanelScroll(self)
         self.form, self.more = KeyForm("main"), MoreSettings()
         for part in (self, self.more):
             for name, field in part.form.fields.items():
                 setattr(part, name, field)
-        self.found, self.tolerance_hint, self.guess_text, self.reason = (_hint() for _ in range(4))
+        self.found, self.guess_text = hint_label(), hint_label()
+        self.tolerance_hint, self.reason = hint_label(), hint_label()
         self.tolerance_hint.setWordWrap(False)
         self._complete_form()
-        layout.addLayout(self.form)
-        layout.addWidget(self.reason)
-        layout.addWidget(self.more)
-        layout.addStretch(1)
+        parts = (self.form, self.reason, self.more, None)
+        in_column(*parts, on=self.area.widget(), margins=(6, 6, 6, 4))
         self._connect()
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        self.follow()
         self.watch = FieldWatch(self, store, "method")
-
-    def _make_scroll(self) -> QVBoxLayout:
-        outside = QVBoxLayout(self)
-        outside.setContentsMargins(0, 0, 0, 0)
-        self.area = WholeScroll()
-        self.area.setWidgetResizable(True)
-        self.area.setFrameShape(QFrame.Shape.NoFrame)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        outside.addWidget(self.area)
-        inside = QWidget()
-        self.area.setWidget(inside)
-        layout = QVBoxLayout(inside)
-        layout.setContentsMargins(6, 6, 6, 4)
-        return layout
 
     def _complete_form(self) -> None:
         """Say in the form what belongs to its fields."""
@@ -154,14 +126,10 @@ class MethodPanel(QWidget):
         fields["reduction"].setText("Use fewer control nodes")
         row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.found)
-        both = QWidget()
         row, role = _position(form, fields["tolerance"])
         form.removeWidget(fields["tolerance"])
-        line = QHBoxLayout(both)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.addWidget(fields["tolerance"], 1)
-        line.addWidget(self.tolerance_hint)
-        form.setWidget(row, role, both)
+        wide = fields["tolerance"]
+        form.setWidget(row, role, boxed(in_row(wide, self.tolerance_hint, wide=[wide])))
         form.addRow(self.guess_text)
 
     def _connect(self) -> None:
@@ -244,8 +212,8 @@ class MethodPanel(QWidget):
         part = f"{tolerance.value / extent:.3g} of the extent" if extent else ""
         self.tolerance_hint.setText(part if case.reduction is not None else "")
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
-        told = "\n".join(f"{title}: {why}." for title, why in reasons if why)
-        self.reason.setText(told if session.mesh is not None else "Open a mesh first.")
+        why = "\n".join(f"{title}: {why}." for title, why in reasons if why)
+        self.reason.setText(why if session.mesh is not None else "Open a mesh first.")
         self.reason.setVisible(bool(self.reason.text()))
         for label, text in (
             (self.found, found_text(session)),
@@ -259,27 +227,6 @@ def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemR
     return cast("tuple[int, QFormLayout.ItemRole]", form.getWidgetPosition(field))
 
 
-def _hint() -> QLabel:
-    label = QLabel()
-    label.setWordWrap(True)
-    label.setProperty("hint", True)
-    return label
-
-
 def _kinds(session: Session) -> set[str]:
     names = set(session.case.markers_with("periodic"))
     return {pair.kind for pair in session.pairs if {pair.first, pair.second} <= names}
-
-
-class WholeScroll(QScrollArea):
-    """Shows a field whole when the tab key comes to it, not only where its cursor is."""
-
-    def focusNextPrevChild(self, forwards: bool) -> bool:
-        moved = super().focusNextPrevChild(forwards)
-        inside = self.widget()
-        field = inside.focusWidget() if inside is not None else None
-        if moved and inside is not None and field is not None:
-            place = QRect(field.mapTo(inside, QPoint(0, 0)), field.size())
-            for y in (place.bottom(), place.top()):
-                self.ensureVisible(place.left(), y, 0, 6)
-        return moved

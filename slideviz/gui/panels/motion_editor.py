@@ -21,6 +21,7 @@ from slideviz.case.model import (
 )
 from slideviz.case.motion_words import direction_words, target_words
 from slideviz.gui.panels.motion_form import ABOUT, MotionForm, new_motion
+from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.session.motions import Axis, radial
 
 Z = (0.0, 0.0, 1.0)
@@ -55,8 +56,9 @@ class MotionEditor(MotionForm):
         self.marker.chosen.connect(lambda _: self._tell())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
-        for field in self.numbers:
-            field.changed.connect(lambda _: self._tell())
+        for field in self._rows.values():
+            if isinstance(field, NumberField | VectorField):
+                field.changed.connect(lambda _: self._tell())
         self.path.textEdited.connect(lambda _: self._tell())
         self.browse.clicked.connect(self._browse)
         self.table.clicked.connect(lambda _: self.table_wanted.emit())

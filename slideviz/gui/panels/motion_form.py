@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qtpy.QtWidgets import (
-    QFormLayout,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QPushButton,
-    QSizePolicy,
-    QWidget,
-)
+from qtpy.QtWidgets import QFormLayout, QLabel, QLineEdit, QPushButton, QSizePolicy, QWidget
 
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
+from slideviz.gui.widgets.build import boxed, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField, a_direction, not_zero
 from slideviz.gui.widgets.tips import wrapped
@@ -36,8 +29,7 @@ class MotionForm(QWidget):
         super().__init__(parent)
         self.form = QFormLayout(self)
         self.form.setContentsMargins(0, 2, 0, 0)
-        self.form.setVerticalSpacing(4)
-        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        grow_fields(self.form)
         self._make_fields()
         self._place_fields()
 
@@ -76,59 +68,30 @@ class MotionForm(QWidget):
         self.table = QPushButton("Table…")
         self.table.setObjectName("motion_table")
         self.table.setToolTip("Type or paste the rows, or change them, and save them as the file.")
-        self.numbers = (
-            self.vector,
-            self.angle,
-            self.factors,
-            self.percent,
-            self.distance,
-            self.point,
-            self.axis,
-        )
 
     def _place_fields(self) -> None:
-        row = QWidget()
-        line = QHBoxLayout(row)
-        line.setContentsMargins(0, 0, 0, 0)
-        line.setSpacing(4)
-        line.addWidget(self.path, 1)
-        line.addWidget(self.browse)
-        line.addWidget(self.table)
-        both = QWidget()
-        pair = QHBoxLayout(both)
-        pair.setContentsMargins(0, 0, 0, 0)
-        pair.setSpacing(6)
-        pair.addWidget(self.kind, 1)
-        pair.addWidget(self.marker, 1)
-        self.form.addRow("Motion", both)
-        self._rows: dict[str, QWidget] = {
-            "vector": self.vector,
-            "angle": self.angle,
-            "factors": self.factors,
-            "percent": self.percent,
-            "distance": self.distance,
-            "about": self.about,
-            "point": self.point,
-            "axis": self.axis,
-            "path": row,
-        }
-        titles = (
-            "By",
-            "Angle (°)",
-            "Factors",
-            "Radius by (%)",
-            "and by (length)",
-            "About",
-            "Point",
-            "Axis",
-            "File",
-        )
-        labels = [QLabel(title) for title in titles]
+        both = (self.kind, self.marker)
+        self.form.addRow("Motion", boxed(in_row(*both, wide=both, spacing=6)))
+        file = boxed(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
+        self._rows: dict[str, QWidget] = {}
+        for name, title, widget in (
+            ("vector", "By", self.vector),
+            ("angle", "Angle (°)", self.angle),
+            ("factors", "Factors", self.factors),
+            ("percent", "Radius by (%)", self.percent),
+            ("distance", "and by (length)", self.distance),
+            ("about", "About", self.about),
+            ("point", "Point", self.point),
+            ("axis", "Axis", self.axis),
+            ("path", "File", file),
+        ):
+            self._rows[name] = widget
+            self.form.addRow(QLabel(title), widget)
         # As wide whatever is shown: else the fields would jump from one motion to the next.
+        labels = [self.form.labelForField(widget) for widget in self._rows.values()]
         widest = max(label.sizeHint().width() for label in labels)
-        for label, widget in zip(labels, self._rows.values(), strict=True):
+        for label in labels:
             label.setMinimumWidth(widest)
-            self.form.addRow(label, widget)
         for choice in (self.kind, self.marker, self.about):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 

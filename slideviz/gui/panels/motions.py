@@ -9,30 +9,21 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from qtpy.QtCore import QSize, Qt
+from qtpy.QtCore import QSignalBlocker, QSize, Qt
 from qtpy.QtGui import QAction, QKeySequence
-from qtpy.QtWidgets import (
-    QApplication,
-    QHBoxLayout,
-    QLabel,
-    QListWidget,
-    QMenu,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtWidgets import QApplication, QHBoxLayout, QListWidget, QMenu, QToolButton
 
 from slideviz.case.model import FromFile, Motion, Target, Translate, named
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.motion_words import describe
-from slideviz.color_scheme import Look
 from slideviz.errors import SlidevizError
 from slideviz.gui.dialogs.motion_table import ask_table
 from slideviz.gui.panels.motion_editor import MotionEditor
 from slideviz.gui.panels.motion_form import KINDS, new_motion
+from slideviz.gui.widgets.build import hint_label, in_column, in_row, tool_button
 from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.field_watch import FieldWatch
-from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import Mesh
@@ -47,19 +38,14 @@ HEIGHT, LEAST_HEIGHT = 300, 210
 """Pixels that the panel would like, and that its longest form needs."""
 
 
-class MotionPanel(QWidget):
-    """Lists the motions and edits the chosen one."""
+class MotionPanel(Panel):
+    """The list of the motions, and the form for the one that is chosen."""
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
-        self._syncing = False
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._mesh: Mesh | None = None
         self._extent = 0.0
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 4)
-        layout.setSpacing(4)
-        layout.addLayout(self._make_buttons())
+        buttons = self._make_buttons()
         self.list = QListWidget()
         self.list.setObjectName("motions")
         self.list.setMinimumHeight(52)
@@ -69,47 +55,29 @@ class MotionPanel(QWidget):
         self.list.currentRowChanged.connect(lambda _: self._row_changed())
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.list.addActions(list(self.actions_.values()))
-        layout.addWidget(self.list, 4)
         self.editor = MotionEditor()
         self.editor.changed.connect(self._edited)
         self.editor.table_wanted.connect(self.edit_table)
-        layout.addWidget(self.editor)
-        self.hint = QLabel()
-        self.hint.setWordWrap(True)
-        self.hint.setProperty("hint", True)
-        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(self.hint)
-        layout.addStretch(1)
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        self.hint = hint_label(align=Qt.AlignmentFlag.AlignTop)
+        parts = (buttons, self.list, self.editor, self.hint, None)
+        layout = in_column(*parts, spacing=4, on=self, margins=(6, 6, 6, 4))
+        layout.setStretchFactor(self.list, 4)
+        self.follow()
         self.watch = FieldWatch(self, store, "motion")
 
     def _make_buttons(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(2)
-        self.add = QToolButton()
-        self.add.setObjectName("add_motion")
-        self.add.setText("Add motion")
-        self.add.setIcon(icon("add"))
-        self.add.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self.add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        menu = QMenu(self.add)
+        menu = QMenu()
+        self.add = tool_button("", image="add", text="Add motion", menu=menu, name="add_motion")
         self.add_actions = {}
         for kind, words in KINDS.items():
             self.add_actions[kind] = menu.addAction(words.capitalize())
             self.add_actions[kind].triggered.connect(partial(self._add, kind))
         self.add_table = menu.addAction("Displacement table…", self.new_table)
-        self.add.setMenu(menu)
-        row.addWidget(self.add)
-        row.addStretch(1)
-        for button in self._make_actions():
-            row.addWidget(button)
-        return row
+        return in_row(self.add, None, *self._make_actions(), spacing=2)
 
     def _make_actions(self) -> Iterator[QToolButton]:
         """Make what the menu of the list offers, and yield buttons of what has an icon."""
         self.actions_: dict[str, QAction] = {}
-        self.buttons: dict[str, QToolButton] = {}
         for name, text, keys, function, image, tip in (
             ("duplicate", "Duplicate", "Ctrl+D", self._duplicate, "", ""),
             ("copy", "Copy", "Ctrl+C", self._copy, "", ""),
@@ -124,19 +92,9 @@ class MotionPanel(QWidget):
             act.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
             act.triggered.connect(lambda _=False, function=function: function())
             if image:
-                button = self.buttons[image] = QToolButton()
-                button.setObjectName(f"motion_{image}")
-                button.setIcon(icon(image))
-                button.setToolTip(tip or text)
-                button.clicked.connect(act.trigger)
+                button = tool_button(tip or text, act.trigger, image=image, name=f"motion_{image}")
                 act.enabledChanged.connect(button.setEnabled)
                 yield button
-
-    def take_theme(self, _look: Look, colour: str) -> None:
-        """Redraw the icons in another colour."""
-        self.add.setIcon(icon("add", colour))
-        for image, button in self.buttons.items():
-            button.setIcon(icon(image, colour))
 
     # State to widgets ------------------------------------------------------------------
 
@@ -145,11 +103,10 @@ class MotionPanel(QWidget):
         motions, moving = session.case.motions, session.case.markers_with("moving")
         if session.mesh is not self._mesh:
             self._take_mesh(session.mesh)
-        self._syncing = True
-        try:
-            dim = session.mesh.dim if session.mesh is not None else 2
-            said = (describe(motion, dim, self._extent) for motion in motions)
-            texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
+        dim = session.mesh.dim if session.mesh is not None else 2
+        said = (describe(motion, dim, self._extent) for motion in motions)
+        texts = [f"{i}.  {text}" for i, text in enumerate(said, 1)]
+        with QSignalBlocker(self.list):
             current = self.list.currentRow()
             if self.list.count() != len(texts):
                 self.editor.show_another()
@@ -161,8 +118,6 @@ class MotionPanel(QWidget):
                 self.list.item(row).setText(text)
                 self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
-        finally:
-            self._syncing = False
         self.editor.set_machine(machine_axis(session))
         self._sync_editor(session)
         self._sync_buttons(session, moving)
@@ -210,11 +165,10 @@ class MotionPanel(QWidget):
     # Widgets to state ------------------------------------------------------------------
 
     def _row_changed(self) -> None:
-        if not self._syncing:
-            self.editor.show_another()
-            session = self.store.session
-            self._sync_editor(session)
-            self._sync_buttons(session, session.case.markers_with("moving"))
+        self.editor.show_another()
+        session = self.store.session
+        self._sync_editor(session)
+        self._sync_buttons(session, session.case.markers_with("moving"))
 
     def _add(self, kind: type, *_checked: bool) -> None:
         self._add_for(new_target(self.store.session), kind)

@@ -5,19 +5,14 @@ from __future__ import annotations
 import html
 
 from qtpy.QtCore import Qt, Signal
-from qtpy.QtWidgets import (
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtWidgets import QLabel, QPushButton, QSizePolicy
 
 from slideviz.color_scheme import Look
-from slideviz.gui.commands import COMMANDS, Command
-from slideviz.gui.widgets.bar import QuietBar
+from slideviz.gui.commands import COMMANDS
+from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
+from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
@@ -32,8 +27,8 @@ SETTINGS = "settings"
 """What the link stands for that takes the settings of the run that is shown."""
 
 
-class RunPanel(QWidget):
-    """Starts and cancels a run; says what a run still needs, as a link to where it is given.
+class RunPanel(Panel):
+    """Buttons to run and cancel, progress, and what a run still needs, as a link to its panel.
 
     Signals
     -------
@@ -43,18 +38,14 @@ class RunPanel(QWidget):
 
     place_wanted = Signal(object)
 
-    def __init__(self, store: Store, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.store = store
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
         self._busy = ""
+        self._key: tuple[object, ...] = ()
         self._missing: tuple[Requirement, ...] = ()
         self._cost = ""
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 6)
-        layout.setSpacing(5)
-        row = QHBoxLayout()
         self.run = self._button(COMMANDS["run"], "#ffffff")
-        self.cancel = self._button(COMMANDS["cancel"])
+        self.cancel = self._button(COMMANDS["cancel"], "#3b4652")
         self.text = QLabel()
         self.text.setWordWrap(True)
         self.text.setMinimumHeight(34)
@@ -62,10 +53,6 @@ class RunPanel(QWidget):
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.setTextFormat(Qt.TextFormat.RichText)
         self.text.linkActivated.connect(self._link)
-        row.addWidget(self.run)
-        row.addWidget(self.cancel)
-        row.addWidget(self.text, 1)
-        layout.addLayout(row)
         self.bar = QuietBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
@@ -73,23 +60,24 @@ class RunPanel(QWidget):
         policy = self.bar.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         self.bar.setSizePolicy(policy)
-        layout.addWidget(self.bar)
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        row = in_row(self.run, self.cancel, self.text, wide=[self.text])
+        in_column(row, self.bar, spacing=5, on=self, margins=(6, 6, 6, 6))
+        self.follow()
 
-    def _button(self, command: Command, *colour: str) -> QPushButton:
-        button = QPushButton(icon(command.image, *colour), command.title.replace("&", ""))
-        button.setObjectName(command.name)
+    def _button(self, command: Command, colour: str) -> QPushButton:
+        words = command.title.replace("&", "")
+        button = push_button(
+            words, command.button, lambda: command.do(main_window(self)), command.name
+        )
+        button.setIcon(icon(command.image, colour))
         button.setShortcut(command.button_key)
-        button.setToolTip(command.button)
-        button.clicked.connect(lambda _=False: command.do(main_window(self)))
         return button
 
     def sync(self, session: Session) -> None:
         """Show whether a run can start, and if not what it needs."""
         # Some checks look at the mesh: not again while only the view changes.
         key = (session.mesh, session.case, session.clash, session.invalid)
-        if key != getattr(self, "_key", None):
+        if key != self._key:
             self._key = key
             self._missing = run_requirements(session)
             self._cost = exact_cost(session.case, session.mesh) if session.mesh else ""
@@ -98,7 +86,7 @@ class RunPanel(QWidget):
         self.bar.setVisible(bool(self._busy))
         self.run.setEnabled(not self._missing)
         if self._busy or self._missing:
-            self._redden(False)
+            set_style(self.text, "bad", False)
         if self._busy:
             return
         self.bar.setValue(0)
@@ -133,13 +121,7 @@ class RunPanel(QWidget):
         else:
             link = f"<a href='{SETTINGS}'>Use its settings</a>"
             self.text.setText(f"The panels differ from run {run.number}. {link}")
-        self._redden(bool(bad))
-
-    def _redden(self, bad: bool) -> None:
-        if self.text.property("bad") != bad:
-            self.text.setProperty("bad", bad)
-            self.text.style().unpolish(self.text)
-            self.text.style().polish(self.text)
+        set_style(self.text, "bad", bool(bad))
 
     def _link(self, target: str) -> None:
         if target == SETTINGS:
@@ -147,7 +129,7 @@ class RunPanel(QWidget):
         else:
             self.place_wanted.emit(self._missing[0])
 
-    def take_theme(self, _look: Look, _colour: str) -> None:
+    def take_theme(self, _look: Look) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
         text = self.text.text()
         self.text.clear()

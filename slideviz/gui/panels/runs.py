@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from qtpy.QtCore import QPoint, Qt
+from qtpy.QtCore import QPoint, QSignalBlocker, Qt
 from qtpy.QtGui import QIcon
-from qtpy.QtWidgets import QLabel, QMenu, QTreeWidgetItem, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QMenu, QTreeWidgetItem
 
 from slideviz.color_scheme import Look
 from slideviz.gui.panels.runs_actions import RunActions
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
+from slideviz.gui.widgets.build import hint_label, in_column
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.runs_table import QUALITY, best, described
@@ -22,8 +24,8 @@ from slideviz.session.store import Store
 EMPTY = "Nothing was computed yet. Each run will be listed here with its settings and its quality."
 
 
-class RunsPanel(QWidget):
-    """Lists the runs; a click shows one, with Ctrl beside the one that is shown.
+class RunsPanel(Panel):
+    """The list of the runs; a click shows one, with Ctrl beside the one that is shown.
 
     Parameters
     ----------
@@ -43,28 +45,18 @@ class RunsPanel(QWidget):
         tell_error: Callable[[BaseException], None] = lambda _: None,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
-        super().__init__()
-        self.store = store
-        self._syncing = False
+        super().__init__(store)
         self._drawn: tuple[object, ...] = ()
-        self._colour = "#3b4652"
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(6, 6, 6, 4)
-        layout.setSpacing(4)
-        self.empty = QLabel(EMPTY)
-        self.empty.setWordWrap(True)
-        self.empty.setProperty("hint", True)
-        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
-        self.actions_ = RunActions(self, self.tree, store, save_mesh, (tell_error, say))
+        self.actions_ = RunActions(
+            self, self.tree, store, save_mesh=save_mesh, tell_error=tell_error, say=say
+        )
         self.buttons = self.actions_.buttons
         self._connect()
-        layout.addWidget(self.empty, 1)
-        layout.addWidget(self.tree, 1)
-        layout.addLayout(self.actions_.row)
-        self.actions_.set_icon_colour(self._colour)
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        parts = (self.empty, self.tree, self.actions_.row)
+        in_column(*parts, wide=parts[:2], spacing=4, on=self, margins=(6, 6, 6, 4))
+        self.follow()
 
     def _connect(self) -> None:
         self.tree.session = lambda: self.store.session
@@ -76,10 +68,8 @@ class RunsPanel(QWidget):
         )
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
 
-    def take_theme(self, _look: Look | None, colour: str) -> None:
-        """Draw the icons in the colours of another theme."""
-        self._colour = colour
-        self.actions_.set_icon_colour(colour)
+    def take_theme(self, _look: Look) -> None:
+        """Draw the icons of the rows in the colours of another theme."""
         self._drawn = ()
         if self.store.session.runs:
             self.sync(self.store.session)
@@ -92,11 +82,8 @@ class RunsPanel(QWidget):
         if key == self._drawn:
             return
         self._drawn = key
-        self._syncing = True
-        try:
+        with QSignalBlocker(self.tree):
             self._fill(session)
-        finally:
-            self._syncing = False
         self.empty.setVisible(not session.runs)
         self.tree.setVisible(bool(session.runs))
         self.actions_.sync(session)
@@ -143,12 +130,12 @@ class RunsPanel(QWidget):
         item.setData(RUN, NUMBER, run.number)
         item.setData(RUN, NAME, run.name)
         item.setData(RUN, WORDS, ("beside · " if beside else "") + brief(run, session.runs))
-        item.setIcon(RUN, icon("beside", self._colour) if beside else QIcon())
+        item.setIcon(RUN, icon("beside") if beside else QIcon())
 
     # Widgets to state ------------------------------------------------------------------
 
     def _chosen(self, item: QTreeWidgetItem | None, _before: object = None) -> None:
-        if not self._syncing and item is not None:
+        if item is not None:
             self.store.change(changes.show_run, item.data(RUN, NUMBER))
 
     def _double_clicked(self) -> None:

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from qtpy.QtCore import QSize, Qt
-from qtpy.QtWidgets import QApplication, QHBoxLayout, QMenu, QToolButton, QWidget
+from qtpy.QtWidgets import QApplication, QMenu, QToolButton, QWidget
 
 from slideviz.errors import SlidevizError
-from slideviz.gui.commands import COMPARE, Command
+from slideviz.gui.commands import COMPARE
 from slideviz.gui.panels.runs_tree import RunTree
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.build import in_row, tool_button
+from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.runs_menu import fill_compare
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.runs_table import table_text, write_table
 from slideviz.session.runs_words import run_words
@@ -22,9 +22,6 @@ from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 TABLE_FILTERS = "Table (*.csv)"
-
-Tell = tuple[Callable[[BaseException], None], Callable[[str], None]]
-"""What shows an error, and what shows that something was done."""
 
 
 class RunActions:
@@ -42,48 +39,28 @@ class RunActions:
         panel: QWidget,
         tree: RunTree,
         store: Store,
+        *,
         save_mesh: Callable[[], None],
-        tell: Tell,
+        tell_error: Callable[[BaseException], None],
+        say: Callable[[str], None],
     ) -> None:
         self.panel, self.tree, self.store, self._save = panel, tree, store, save_mesh
-        self._tell_error, self._say = tell
-        self.row = QHBoxLayout()
-        self.row.setSpacing(2)
+        self._tell_error, self._say = tell_error, say
         self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
-        self.row.addWidget(self.buttons["compare"])
-        for command in RUN_COMMANDS:
-            if command is None:
-                self.row.addStretch(1)
-                continue
-            button = self._make_button(command.name, command.image, command.tip)
-            button.clicked.connect(lambda _=False, command=command: command.do(self))
-            self.row.addWidget(button)
-            self.buttons[command.name] = button
-
-    def _make_button(self, name: str, image: str, tip: str) -> QToolButton:
-        button = QToolButton()
-        button.setObjectName(f"runs_{name}")
-        button.setToolTip(wrapped(tip))
-        button.setIconSize(QSize(18, 18))
-        button.setProperty("image", image)
-        return button
+        for command in filter(None, RUN_COMMANDS):
+            self.buttons[command.name] = tool_button(
+                command.tip, lambda _=False, command=command: command.do(self), image=command.image
+            )
+        for name, button in self.buttons.items():
+            button.setObjectName(f"runs_{name}")
+            button.setIconSize(QSize(18, 18))
+        shown = (None if one is None else self.buttons[one.name] for one in RUN_COMMANDS)
+        self.row = in_row(self.buttons["compare"], *shown, spacing=2)
 
     def _make_compare(self) -> QToolButton:
-        button = self._make_button(
-            "compare", "beside", f"{COMPARE.tip} Ctrl+click on a run does so too."
-        )
-        button.setText("Compare")
-        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        menu = QMenu(button)
+        menu, tip = QMenu(), f"{COMPARE.tip} Ctrl+click on a run does so too."
         menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
-        button.setMenu(menu)
-        return button
-
-    def set_icon_colour(self, colour: str) -> None:
-        """Draw the icons in another colour."""
-        for button in self.buttons.values():
-            button.setIcon(icon(button.property("image"), colour))
+        return tool_button(tip, image="beside", text="Compare", menu=menu)
 
     def sync(self, session: Session) -> None:
         """Show what can be done."""

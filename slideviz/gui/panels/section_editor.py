@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QStandardItemModel
-from qtpy.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLabel, QSlider, QWidget
+from qtpy.QtWidgets import QFormLayout, QLabel, QSlider, QWidget
 
 from slideviz.errors import CaseError
 from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.widgets.build import check_box, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, VectorField
 from slideviz.mesh.model import FloatArray, Mesh
@@ -66,32 +67,23 @@ class SectionEditor(QWidget):
         self.number = NumberField(0.0, self._allowed)
         self.number.setFixedWidth(84)
         self.number.changed.connect(self._position_typed)
-        self.whole = QCheckBox("Whole cells")
-        self.whole.setToolTip("Show the cells it cuts whole, instead of cut.")
-        self.whole.toggled.connect(lambda on: self._tell(whole=on))
+        tip = "Show the cells it cuts whole, instead of cut."
+        self.whole = check_box("Whole cells", tip, lambda on: self._tell(whole=on))
 
     def _place_fields(self) -> None:
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
-        form.setVerticalSpacing(4)
-        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        grow_fields(form)
         self.axis_name, self.place_name = QLabel("Normal"), QLabel("Position")
         # One width for all words, so that the fields do not jump.
         self.axis_name.setMinimumWidth(self.fontMetrics().horizontalAdvance("Position"))
-        first, second = QHBoxLayout(), QHBoxLayout()
-        for line, widgets in (
-            (first, ((self.axis, 1), (self.whole, 0))),
-            (second, ((self.slider, 1), (self.number, 0))),
-        ):
-            line.setContentsMargins(0, 0, 0, 0)
-            line.setSpacing(6)
-            for widget, stretch in widgets:
-                line.addWidget(widget, stretch)
-        form.addRow(self.axis_name, first)
+        axis = in_row(self.axis, self.whole, wide=[self.axis], spacing=6)
+        place = in_row(self.slider, self.number, wide=[self.slider], spacing=6)
+        form.addRow(self.axis_name, axis)
         form.addRow("", self.direction)
         self.centre_name = QLabel("Centre")
         form.addRow(self.centre_name, self.centre)
-        form.addRow(self.place_name, second)
+        form.addRow(self.place_name, place)
         self.form = form
 
     # What is shown ---------------------------------------------------------------------

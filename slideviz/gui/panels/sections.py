@@ -8,28 +8,25 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QKeySequence, QShortcut
-from qtpy.QtWidgets import (
-    QAbstractButton,
-    QCheckBox,
-    QHBoxLayout,
-    QLabel,
-    QListWidget,
-    QListWidgetItem,
-    QMenu,
-    QPushButton,
-    QSizePolicy,
-    QToolButton,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtWidgets import QListWidget, QListWidgetItem, QMenu, QSizePolicy, QWidget
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.color_scheme import Look
 from slideviz.export.section_job import Paper, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.build import (
+    boxed,
+    check_box,
+    hint_label,
+    in_column,
+    in_row,
+    push_button,
+    tool_button,
+)
 from slideviz.gui.widgets.elided import elide_items
-from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.panel import Panel
+from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services
 from slideviz.gui.widgets.tips import wrapped
 from slideviz.scene.passages import Period
@@ -47,7 +44,6 @@ HINTS = {
     2: f"Lay a {names(2)} through the mesh to see the cells on it, and their quality along it.",
 }
 UNSEEN = "Tick the section in the list to show it."
-PICTURES = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 SIZES = {
     "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
     "17 cm wide, a page…": Paper.of_cm(17.0, 10.6),
@@ -57,40 +53,43 @@ SIZES = {
 """Sizes of pictures, with the words of the menu; the height is the most."""
 
 
-class SectionsPanel(QWidget):
-    """A list of sections, and what can be said of the one that is chosen.
+class SectionsPanel(Panel):
+    """The list of the sections, and the form for the one that is chosen.
 
     Parameters
     ----------
     cutting : Cutting
-        Shows handle and flat view of the section that is chosen.
+        The handle and the flat view of that section.
+
+    Signals
+    -------
+    picture_wanted(Paper)
+        A picture of that section is to be written.
     """
 
     picture_wanted = Signal(object)
 
     def __init__(self, cutting: Cutting) -> None:
-        super().__init__()
+        super().__init__(cutting.store)
         self.setObjectName("sections")
-        self.cutting, self.store = cutting, cutting.store
+        self.cutting = cutting
         self._period = Period()
         self._size = 8.5, 12.0  # cm
-        self._icons: list[tuple[QAbstractButton, str]] = []
-        self._listed: tuple[object, ...] = ()
         self._make_list()
-        self._make_rest()
-        self.store.listen(self._session_changed)
-        self.sync(self.store.session)
+        self._make_tools()
+        self._place()
+        self.follow(_concerned)
 
     # Parts -----------------------------------------------------------------------------
 
     def _make_list(self) -> None:
-        self.add = {kind: QPushButton(row.words[3].name) for kind, row in SECTION_SHAPES.items()}
-        for kind, button in self.add.items():
-            button.clicked.connect(partial(self._add, kind))
-        self.remove = QToolButton()
-        self.remove.setToolTip("Remove the section (Delete)")
-        self.remove.clicked.connect(self._remove)
-        self._icons += [*((button, "add") for button in self.add.values()), (self.remove, "remove")]
+        self.add = {
+            kind: push_button(row.words[3].name, "", partial(self._add, kind))
+            for kind, row in SECTION_SHAPES.items()
+        }
+        for button in self.add.values():
+            set_icon(button, "add")
+        self.remove = tool_button("Remove the section (Delete)", self._remove, image="remove")
         self.list = QListWidget()
         self.list.setObjectName("section_list")
         self.list.setMinimumHeight(48)
@@ -101,23 +100,20 @@ class SectionsPanel(QWidget):
         delete = QShortcut(QKeySequence(QKeySequence.StandardKey.Delete), self.list)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
         delete.activated.connect(self._remove)
-        self.hint = QLabel(HINTS[3])
-        self.hint.setWordWrap(True)
-        self.hint.setProperty("hint", True)
-        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
-
-    def _make_rest(self) -> None:
+        self.hint = hint_label(HINTS[3], Qt.AlignmentFlag.AlignTop)
         self.editor = SectionEditor()
         self.editor.changed.connect(self._replace)
         self.editor.held.connect(self.store.hold)
-        self.handle, self.flat = QCheckBox("Handle"), QCheckBox("Flat view")
+
+    def _make_tools(self) -> None:
+        self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
         self.handle.clicked.connect(self._want_handle)
         self.flat.clicked.connect(self.cutting.want_flat)
-        self.look, self.picture = QToolButton(), QToolButton()
-        self.look.clicked.connect(self.cutting.look_along)
-        self.picture.setToolTip("Save a picture of this section (PNG, SVG, PDF)…")
-        self.picture.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.sizes = QMenu(self.picture)
+        self.look = tool_button("", self.cutting.look_along, image="along")
+        self.sizes = QMenu()
+        self.picture = tool_button(
+            "Save a picture of this section (PNG, SVG, PDF)…", image="picture", menu=self.sizes
+        )
         for words, paper in SIZES.items():
             choice = self.sizes.addAction(words)
             choice.triggered.connect(lambda _=False, paper=paper: self._want_picture(paper))
@@ -129,36 +125,16 @@ class SectionsPanel(QWidget):
         for part in (self.titled, self.with_axes):
             part.setCheckable(True)
             part.setChecked(True)
-        self.picture.setMenu(self.sizes)
-        self._icons += [(self.look, "along"), (self.picture, "picture")]
-        column = QVBoxLayout(self)
-        column.setContentsMargins(6, 6, 6, 6)
-        column.setSpacing(5)
-        column.addLayout(_row(*self.add.values(), None, self.remove))
-        column.addWidget(self.hint)
-        column.addWidget(self.list, 1)
-        column.addWidget(self.editor)
-        self.tools = QWidget()
-        line = _row(self.handle, self.flat, None, self.look, self.picture)
-        self.tools.setLayout(line)
-        column.addWidget(self.tools)
-        self.rest = QWidget()
-        self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        column.addWidget(self.rest)
 
-    def take_theme(self, look: Look, colour: str) -> None:
-        """Take other colours."""
-        for button, name in self._icons:
-            button.setIcon(icon(name, colour))
-        self.cutting.set_look(look)
+    def _place(self) -> None:
+        add = in_row(*self.add.values(), None, self.remove, spacing=5)
+        tools = (self.handle, self.flat, None, self.look, self.picture)
+        self.tools, self.rest = boxed(in_row(*tools, spacing=5)), QWidget()
+        self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        parts = (add, self.hint, self.list, self.editor, self.tools, self.rest)
+        in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
 
     # What is shown ---------------------------------------------------------------------
-
-    def _session_changed(self, old: Session, new: Session) -> None:
-        names = ("sections", "chosen", "handle")
-        views = ([getattr(one.view, name) for name in names] for one in (old, new))
-        if old.mesh is not new.mesh or next(views) != next(views):
-            self.sync(new)
 
     def sync(self, session: Session) -> None:
         """Show the sections of a session."""
@@ -265,6 +241,13 @@ class SectionsPanel(QWidget):
             self.store.change(changes.choose_section, row)
 
 
+def _concerned(old: Session, new: Session) -> bool:
+    """Tell whether a change is one of the mesh or the sections."""
+    names = ("sections", "chosen", "handle")
+    same = (getattr(old.view, name) == getattr(new.view, name) for name in names)
+    return old.mesh is not new.mesh or not all(same)
+
+
 def sections_panel(window: Services) -> SectionsPanel:
     """Return the panel of a window."""
     panel = SectionsPanel(window.cutting)
@@ -279,7 +262,7 @@ def save_picture(window: Services, paper: Paper) -> None:
         return
     stem = session.path.stem if session.path is not None else "mesh"
     default = window.files.folder() / f"{stem}_section.png"
-    path = questions.ask_save(window, "Save picture of the section", default, PICTURES)
+    path = questions.ask_save(window, "Save picture of the section", default, PLOT_FILTERS)
     if path is None:
         return
     window.settings.setValue("folder", str(path.parent))
@@ -292,16 +275,3 @@ def save_picture(window: Services, paper: Paper) -> None:
         section,
         paper,
     )
-
-
-def _row(*widgets: QWidget | None) -> QHBoxLayout:
-    """Return widgets in a row; None is what takes the room that is left."""
-    line = QHBoxLayout()
-    line.setContentsMargins(0, 0, 0, 0)
-    line.setSpacing(5)
-    for widget in widgets:
-        if widget is None:
-            line.addStretch(1)
-        else:
-            line.addWidget(widget)
-    return line

@@ -10,18 +10,13 @@ from html import escape
 
 from qtpy.QtCore import QModelIndex, Qt, QTimer
 from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
-from qtpy.QtWidgets import (
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QStackedWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from qtpy.QtWidgets import QLabel, QStackedWidget
 
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
 from slideviz.gui.responsiveness.settings import REST_MS
 from slideviz.gui.responsiveness.timers import later
+from slideviz.gui.widgets.build import in_column, in_row, push_button
+from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import ask_and_write, is_seen, words_label
 from slideviz.gui.widgets.services import folder_of
 from slideviz.gui.widgets.theme import alarm
@@ -40,7 +35,7 @@ from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY
 
 
-class WorstPanel(QWidget):
+class WorstPanel(Panel):
     """The hundred worst cells; the one that is marked is the current row.
 
     Parameters
@@ -53,9 +48,8 @@ class WorstPanel(QWidget):
     def __init__(
         self, store: Store, fly_to: Callable[[int], None], fly_back: Callable[[], None]
     ) -> None:
-        super().__init__()
-        self.store = store
-        self._fly_to, self._fly_back = fly_to, fly_back
+        super().__init__(store)
+        self._fly_to = fly_to
         self._seen: tuple[object, ...] = ()
         self._last = 0.0
         self._marked: int | None = None
@@ -72,12 +66,19 @@ class WorstPanel(QWidget):
         self.stack = QStackedWidget()
         self.stack.addWidget(self.words)
         self.stack.addWidget(self.table)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(4, 4, 4, 4)
-        column.setSpacing(3)
-        column.addWidget(self.stack, 1)
-        column.addWidget(self.info)
-        column.addLayout(self._make_buttons())
+        self.back = push_button(
+            "Whole mesh",
+            "Look again at all that was seen before flying to a cell.",
+            # The mark stays: that is how the cell is found in the whole mesh.
+            fly_back,
+        )
+        self.export = push_button(
+            "Export CSV…",
+            "Write the list with every digit as comma-separated values.",
+            self._export,
+        )
+        parts = (self.stack, self.info, in_row(self.back, None, self.export))
+        in_column(*parts, wide=[self.stack], spacing=3, on=self, margins=(4, 4, 4, 4))
         self._soon = later(self, lambda: self._fill(self.store.session))
         for keys, function in (
             (QKeySequence(Qt.Key.Key_Escape), self.unmark),
@@ -86,8 +87,7 @@ class WorstPanel(QWidget):
             shortcut = QShortcut(keys, self)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(function)
-        store.listen(lambda _old, new: self.sync(new))
-        self.sync(store.session)
+        self.follow()
 
     def _make_table(self) -> WorstTable:
         table = WorstTable(self.model)
@@ -95,19 +95,6 @@ class WorstPanel(QWidget):
         table.clicked.connect(self._clicked)
         self.model.modelReset.connect(lambda: self._sync_mark(self.store.session))
         return table
-
-    def _make_buttons(self) -> QHBoxLayout:
-        self.back = QPushButton("Whole mesh")
-        self.back.setToolTip("Look again at all that was seen before flying to a cell.")
-        self.back.clicked.connect(self._go_back)
-        self.export = QPushButton("Export CSV…")
-        self.export.setToolTip("Write the list with every digit as comma-separated values.")
-        self.export.clicked.connect(self._export)
-        row = QHBoxLayout()
-        row.addWidget(self.back)
-        row.addStretch(1)
-        row.addWidget(self.export)
-        return row
 
     # State to widgets ------------------------------------------------------------------
 
@@ -195,10 +182,6 @@ class WorstPanel(QWidget):
         """Take the mark away."""
         if self.store.session.view.marked is not None:
             self.store.change(changes.mark, None)
-
-    def _go_back(self) -> None:
-        # The mark stays: that is how the cell is found in the whole mesh.
-        self._fly_back()
 
     def copy_rows(self) -> None:
         """Copy the selected rows, or all, to the clipboard, with a line of names."""

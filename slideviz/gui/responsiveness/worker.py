@@ -51,7 +51,7 @@ class JobRunner(QObject):
         self._lock = Lock()
         self._stop = Event()
         self._news: Doing | None = None
-        self._told_s = float("-inf")
+        self._delivered_s = float("-inf")
         self._items: list[object] = []
         self._end: tuple[str, Any] | None = None
         self._woken = False
@@ -115,7 +115,7 @@ class JobRunner(QObject):
     def _deliver(self) -> None:
         if self._closed:
             return
-        wait = self._told_s + NEWS_S - time.monotonic()
+        wait = self._delivered_s + NEWS_S - time.monotonic()
         with self._lock:
             if wait > 0 and self._end is None and not self._items:
                 QTimer.singleShot(round(1000 * wait) + 1, self._deliver)
@@ -125,7 +125,7 @@ class JobRunner(QObject):
             end, self._end = self._end, None
             self._woken = False
         if news is not None:
-            self._told_s = time.monotonic()
+            self._delivered_s = time.monotonic()
             self.doing.emit(news)
         if items:
             self.kept.emit(items)

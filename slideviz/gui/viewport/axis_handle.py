@@ -8,12 +8,19 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from qtpy.QtCore import QPoint
+from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.mouse_handle import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, MouseHandle
-from slideviz.gui.viewport.plane_handle import HANDLE_COLOUR
+from slideviz.gui.viewport.mouse_handle import (
+    EDGE_PX,
+    HANDLE_COLOUR,
+    POINT_PX,
+    REACH_PX,
+    RIM_PX,
+    MouseHandle,
+)
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.axis_handle import frame_of, pull, pulled_size
 from slideviz.scene.marked_cell import IN_FRONT
@@ -39,8 +46,10 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         self._patch: Patch | None = None
         self.place: Place | None = None
         self._mark = HandleMark(view)
-        # Before each drawing, whatever moved the camera or changed the size of the view.
-        self._watching = view.renderer.AddObserver("StartEvent", lambda *_: self.put())
+
+    def watched(self) -> tuple[vtkObject, str]:
+        """Return the renderer: before each drawing the camera or the view's size may differ."""
+        return self.view.renderer, "StartEvent"
 
     def show(self, section: Section, patch: Patch, look: Look) -> None:
         """Stand where the section is, around that part of it."""
@@ -51,7 +60,6 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
 
     def close(self) -> None:
         """Leave the view for ever."""
-        self.view.renderer.RemoveObserver(self._watching)
         self._patch = None
         self._mark.remove()
         super().close()

@@ -11,18 +11,19 @@ from qtpy.QtGui import QResizeEvent, QShowEvent
 from qtpy.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton
 
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.elided import ElidedLabel
 from slideviz.scene.scene import Scene
 
 
 class TitleBar(QFrame):
-    """Says what a view shows, cut short where there is no room, with a button to close it.
+    """The title above a view, cut short where there is no room, with a button to close the view.
 
     Parameters
     ----------
     name : str
-    closable : bool
-        Whether there is the button to close it.
+    closing : str
+        The tooltip of the button.
     fill : callable, optional
         Puts into a menu what the view can show instead; the title is a drop-down then.
     """
@@ -30,7 +31,7 @@ class TitleBar(QFrame):
     closed = Signal()
 
     def __init__(
-        self, name: str, closable: bool, fill: Callable[[QMenu], None] | None = None
+        self, name: str, closing: str, fill: Callable[[QMenu], None] | None = None
     ) -> None:
         super().__init__()
         self.setObjectName(name)
@@ -38,28 +39,29 @@ class TitleBar(QFrame):
         # A long title may not make one view wider than the other.
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(26)
-        row = QHBoxLayout(self)
+        self._row = row = QHBoxLayout(self)
         row.setContentsMargins(6, 0, 2, 0)
         self.label: ElidedLabel | QToolButton = self._drop_down(fill) if fill else ElidedLabel()
         self.label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         row.addWidget(self.label, 1)
-        self.close_button = QToolButton()
-        self.close_button.setText("✕")
+        self.close_button = tool_button(closing, self.closed, text="✕")
         self.close_button.setAutoRaise(True)
-        self.close_button.setToolTip("End the comparison; the other view stays")
-        self.close_button.clicked.connect(self.closed)
-        self.close_button.setVisible(closable)
         row.addWidget(self.close_button)
         self.hide()
 
+    def add_button(self, image: str, tip: str, do: Callable[[], None]) -> QToolButton:
+        """Return a new button before that which closes the view."""
+        button = tool_button(tip, do, image=image)
+        button.setAutoRaise(True)
+        self._row.insertWidget(1, button)
+        return button
+
     def _drop_down(self, fill: Callable[[QMenu], None]) -> QToolButton:
-        button = QToolButton()
+        self.menu = QMenu()
+        self.menu.aboutToShow.connect(lambda: fill(self.menu))
+        button = tool_button("", menu=self.menu)
         button.setAutoRaise(True)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
-        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.menu = QMenu(button)
-        self.menu.aboutToShow.connect(lambda: fill(self.menu))
-        button.setMenu(self.menu)
         return button
 
     @property

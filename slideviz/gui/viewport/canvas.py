@@ -30,13 +30,21 @@ def one_light() -> pv.Light:
 
 
 class ViewSignals(QObject):
-    """What the view tells: a click on a place, a click with the right button, all is shown.
+    """The signals of a view, in an object of their own: a view inherits several hundred names.
 
-    Positions are pixels of the widget. They sit in an object of their own because the view
-    inherits several hundred names, which new ones must not hide.
+    Signals
+    -------
+    clicked(QPoint, KeyboardModifier), cell_clicked(QPoint), menu_wanted(QPoint)
+        A click, in pixels of the widget; one that means a cell (a double click, or with Alt); one
+        with the right button.
+    zoomed(QPoint, float)
+        The wheel was turned at a place, by a factor.
+    resized(), unveiled()
+        The view has another size; all that is new in the scene is drawn.
     """
 
     clicked = Signal(QPoint, Qt.KeyboardModifier)
+    cell_clicked = Signal(QPoint)
     menu_wanted = Signal(QPoint)
     zoomed = Signal(QPoint, float)
     resized = Signal()
@@ -50,7 +58,7 @@ class View3D(QtInteractor):
         super().__init__(parent, auto_update=False, multi_samples=multi_samples)
         # The window takes the dropped files: this widget would read them in its own way.
         self.setAcceptDrops(False)
-        self.told = ViewSignals(self)
+        self.signals = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
         self._one_paint = RepaintCoalescer(self)
@@ -87,7 +95,7 @@ class View3D(QtInteractor):
             actor.SetVisibility(True)
         if not self._veiled:
             # Perhaps something was hidden meanwhile.
-            self.told.unveiled.emit()
+            self.signals.unveiled.emit()
         self.render()
 
     def paintGL(self) -> None:
@@ -160,11 +168,20 @@ class View3D(QtInteractor):
         )
         if event.button() == Qt.MouseButton.RightButton:
             if still:
-                self.told.menu_wanted.emit(where)
+                self.signals.menu_wanted.emit(where)
             return
         super().mouseReleaseEvent(event)
-        if still and event.button() == Qt.MouseButton.LeftButton:
-            self.told.clicked.emit(where, event.modifiers())
+        if not still or event.button() != Qt.MouseButton.LeftButton:
+            return
+        if event.modifiers() & Qt.KeyboardModifier.AltModifier:
+            self.signals.cell_clicked.emit(where)
+        else:
+            self.signals.clicked.emit(where, event.modifiers())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        # Not handed on to VTK, for which it would be a press.
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.signals.cell_clicked.emit(event.position().toPoint())
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         event.accept()
@@ -172,7 +189,7 @@ class View3D(QtInteractor):
     def wheelEvent(self, event: QWheelEvent) -> None:
         steps = event.angleDelta().y() / 120.0
         if steps:
-            self.told.zoomed.emit(event.position().toPoint(), 1.2**steps)
+            self.signals.zoomed.emit(event.position().toPoint(), 1.2**steps)
         event.accept()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -184,8 +201,8 @@ class View3D(QtInteractor):
         finally:
             self._resizing = False
         self.update()
-        if hasattr(self, "told"):
-            self.told.resized.emit()
+        if hasattr(self, "signals"):
+            self.signals.resized.emit()
 
     def to_pixels(self, where: QPoint) -> tuple[float, float]:
         """Return a position in the widget as VTK counts it: device pixels from the lower left."""

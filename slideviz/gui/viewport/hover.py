@@ -1,11 +1,11 @@
-"""Cells under the mouse: told when it rests, marked by a double click or a click with Alt."""
+"""Cells under the mouse: described where it rests, marked by a click that means a cell."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
 from qtpy.QtCore import QEvent, QObject, QPoint, Qt
-from qtpy.QtGui import QHelpEvent, QKeyEvent, QMouseEvent
+from qtpy.QtGui import QHelpEvent, QKeyEvent
 from qtpy.QtWidgets import QToolTip
 
 from slideviz.gui.panels.worst import info_text
@@ -17,7 +17,7 @@ from slideviz.session.store import Store
 
 
 class CellHover(QObject):
-    """Watches the mouse over one view.
+    """The cell under the mouse, in one view: its tooltip, and its mark.
 
     Parameters
     ----------
@@ -32,24 +32,15 @@ class CellHover(QObject):
         self.view, self.scene, self.store = view, scene, store
         view.setMouseTracking(True)
         view.installEventFilter(self)
-        view.told.clicked.connect(self._clicked)
+        view.signals.cell_clicked.connect(self.mark)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
             self._tell(event)
             return True
-        twice = event.type() == QEvent.Type.MouseButtonDblClick
-        if isinstance(event, QMouseEvent) and twice:
-            if event.button() == Qt.MouseButton.LeftButton:
-                self.mark(event.position().toPoint())
-            return True
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
             return event.key() == Qt.Key.Key_Escape and self._escape()
         return False
-
-    def _clicked(self, where: QPoint, keys: Qt.KeyboardModifier) -> None:
-        if keys & Qt.KeyboardModifier.AltModifier:
-            self.mark(where)
 
     def _tell(self, event: QHelpEvent) -> None:
         cell = self.scene.pick_cell(*self.view.to_pixels(event.pos()))

@@ -8,11 +8,18 @@ from typing import Any, cast
 import numpy as np
 import pyvista as pv
 from qtpy.QtCore import QPoint
+from vtkmodules.vtkCommonCore import vtkObject
 
 from slideviz.color_scheme import SELECTED_COLOUR, Look
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.mouse_handle import EDGE_PX, POINT_PX, REACH_PX, RIM_PX, MouseHandle
-from slideviz.gui.viewport.plane_handle import HANDLE_COLOUR
+from slideviz.gui.viewport.mouse_handle import (
+    EDGE_PX,
+    HANDLE_COLOUR,
+    POINT_PX,
+    REACH_PX,
+    RIM_PX,
+    MouseHandle,
+)
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.pick import on_plane, to_display
 from slideviz.sections.handles import HandleParts, Part, dragged, handle_parts, nearest
@@ -37,7 +44,10 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         self._lift = 0.0
         self._handle_parts: HandleParts | None = None
         self._placed: tuple[object, ...] = ()
-        self._watching = view.camera.AddObserver("ModifiedEvent", lambda *_: self.put())
+
+    def watched(self) -> tuple[vtkObject, str]:
+        """Return the camera: the handle stays in the part of the plane that it shows."""
+        return self.view.camera, "ModifiedEvent"
 
     def show(self, section: Section, lift: float, look: Look) -> None:
         """Stand where the section is, so far above the mesh."""
@@ -46,7 +56,6 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
 
     def close(self) -> None:
         """Leave the view for ever."""
-        self.view.camera.RemoveObserver(self._watching)
         for name in NAMES:
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
         super().close()
@@ -72,26 +81,22 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         if key == self._placed:
             return
         self._placed = key
-        self._handle_parts = handle_parts(self.section, seen)
-        empty = np.empty((0, 2))
-        points = empty
-        if self._handle_parts is not None:
-            points = np.concatenate([self._handle_parts.middle, self._handle_parts.ends])
-        held = (
-            {"middle": self._handle_parts.middle, "end": self._handle_parts.ends}
-            if self._handle_parts
-            else {}
-        )
+        parts = self._handle_parts = handle_parts(self.section, seen)
+        points = held = np.empty((0, 2))
+        if parts is not None:
+            points = np.concatenate([parts.middle, parts.ends])
+            held = {"middle": parts.middle, "end": parts.ends}.get(self._part or "", held)
         look = self._look
         assert look is not None
         # Points are balls to VTK: one above another must be more than its radius higher.
         ball = RIM_PX * float((seen[1] - seen[0]).max()) / max(self.view.window_size)
-        self._draw(NAMES[0], points, ball, (look.text, RIM_PX))
-        self._draw(NAMES[1], points, 2.0 * ball, (HANDLE_COLOUR, POINT_PX))
-        taken = held.get(self._part or "", empty)
-        self._draw(NAMES[2], taken, 3.0 * ball, (SELECTED_COLOUR, POINT_PX))
+        self._draw(NAMES[0], points, ball, colour=look.text, size=RIM_PX)
+        self._draw(NAMES[1], points, 2.0 * ball, colour=HANDLE_COLOUR, size=POINT_PX)
+        self._draw(NAMES[2], held, 3.0 * ball, colour=SELECTED_COLOUR, size=POINT_PX)
 
-    def _draw(self, name: str, points: FloatArray, above: float, style: tuple[str, float]) -> None:
+    def _draw(
+        self, name: str, points: FloatArray, above: float, *, colour: str, size: float
+    ) -> None:
         actor = self.view.actors.get(name)
         if not len(points):
             if actor is not None:
@@ -99,7 +104,6 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
             return
         height = np.full(len(points), self._lift + above)
         shape = pv.PolyData(np.column_stack([points, height]))
-        colour, size = style
         if actor is None:
             actor = self.view.add_mesh(
                 shape,

@@ -1,4 +1,4 @@
-"""What handles have in common that the mouse pulls: which part it would take, and where it goes."""
+"""What the handles have in common that the mouse pulls: the part it takes, and where it goes."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -7,13 +7,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from qtpy.QtCore import QEvent, QObject, QPoint, Qt, QTimer
+from qtpy.QtCore import QEvent, QObject, QPoint, Qt
 from qtpy.QtGui import QMouseEvent
+from vtkmodules.vtkCommonCore import vtkObject
 
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.mesh.model import FloatArray
 from slideviz.sections.model import Section
 
+HANDLE_COLOUR = "#2f6fb5"
 POINT_PX, RIM_PX = 11.0, 15.0
 """Sizes of what is pulled, and of what sets it off."""
 REACH_PX = 10.0
@@ -53,11 +56,11 @@ class MouseHandle(QObject, Generic[Grasp]):
         self._mouse = QPoint(-1, -1)
         self._start: tuple[Grasp, FloatArray] | None = None
         self._at: FloatArray | None = None
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(0)
-        self._soon.timeout.connect(self.tell)
+        self._soon = later(self, self.tell)
         view.installEventFilter(self)
+        watched, event = self.watched()
+        tag = watched.AddObserver(event, lambda *_: self.put())  # type: ignore[arg-type]
+        self._unwatch = lambda: watched.RemoveObserver(tag)
 
     @property
     def dragging(self) -> bool:
@@ -67,12 +70,17 @@ class MouseHandle(QObject, Generic[Grasp]):
     def close(self) -> None:
         """Leave the view for ever."""
         self._soon.stop()
+        self._unwatch()
         self.view.removeEventFilter(self)
         self.view.unsetCursor()
         self._start = self.section = None
         self.deleteLater()
 
     # What differs ----------------------------------------------------------------------
+
+    def watched(self) -> tuple[vtkObject, str]:
+        """Return what belongs to the view and its event after which the handle is put again."""
+        raise NotImplementedError
 
     def part_at(self, where: QPoint) -> str | None:
         """Return what the mouse would take at a position of the widget."""

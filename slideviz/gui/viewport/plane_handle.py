@@ -6,17 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pyvista as pv
-from qtpy.QtCore import QTimer
 from vtkmodules.vtkInteractionWidgets import (
     vtkImplicitPlaneRepresentation,
     vtkImplicitPlaneWidget2,
 )
 
 from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.mouse_handle import HANDLE_COLOUR
 from slideviz.sections.model import Section, Triple
 
-HANDLE_COLOUR = "#2f6fb5"
 HANDLE_PX = 11.0
 """Size of the ball and of the arrow's tips."""
 
@@ -55,15 +55,13 @@ class PlaneHandle:
         self.widget.SetInteractor(view.iren.interactor)
         self._bounds: Bounds | None = None
         self.dragging = False
-        self._soon = QTimer()
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(0)
-        self._soon.timeout.connect(self.tell)
-        self._observers = [
-            self.widget.AddObserver("StartInteractionEvent", lambda *_: self._grab(True)),  # type: ignore[arg-type]
-            self.widget.AddObserver("InteractionEvent", lambda *_: self._soon.start()),  # type: ignore[arg-type]
-            self.widget.AddObserver("EndInteractionEvent", lambda *_: self._grab(False)),  # type: ignore[arg-type]
-        ]
+        self._soon = later(None, self.tell)
+        for event, call in (
+            ("StartInteractionEvent", lambda *_: self._grab(True)),
+            ("InteractionEvent", lambda *_: self._soon.start()),
+            ("EndInteractionEvent", lambda *_: self._grab(False)),
+        ):
+            self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
 
     def show(self, section: Section, bounds: Bounds, look: Look) -> None:
         """Stand where the section is; while it is dragged, it knows better."""
@@ -77,19 +75,12 @@ class PlaneHandle:
         if not self.widget.GetEnabled():
             self.widget.On()
 
-    def hide(self) -> None:
-        """Vanish from the view."""
-        self._soon.stop()
-        self.dragging = False
-        if self.widget.GetEnabled():
-            self.widget.Off()
-
     def close(self) -> None:
         """Leave the view for ever."""
-        self.hide()
-        for observer in self._observers:
-            self.widget.RemoveObserver(observer)
-        self._observers = []
+        self._soon.stop()
+        self.dragging = False
+        self.widget.Off()
+        self.widget.RemoveAllObservers()
         self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
 
     def tell(self) -> None:

@@ -1,17 +1,20 @@
-"""The step player under the view, and the line with the quality of the step that is shown."""
+"""The step player under the view, and the numbers of the step that is shown."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
 from __future__ import annotations
 
-from qtpy.QtCore import QElapsedTimer, Qt, QTimer
-from qtpy.QtGui import QAction, QActionGroup, QResizeEvent
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSlider, QToolButton, QWidget
+import math
+
+from qtpy.QtCore import QElapsedTimer, QSignalBlocker, Qt, QTimer
+from qtpy.QtGui import QAction, QActionGroup, QResizeEvent, QTextDocument
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QMenu, QSizePolicy, QSlider, QToolButton, QWidget
 
 from slideviz.gui.commands import STEPS
 from slideviz.gui.responsiveness.settings import TICK_MS
-from slideviz.gui.viewport.step_numbers import Results, result_parts
-from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.build import tool_button
+from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.theme import alarm
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -44,12 +47,12 @@ class Player(QWidget):
         self.buttons: dict[str, QToolButton] = {}
         for command in STEPS.commands():
             name = command.name.removeprefix("step_")
-            button = QToolButton()
-            button.setObjectName(f"player_{name}")
-            button.setIcon(icon(name))
-            button.setToolTip(command.button)
-            button.clicked.connect(lambda _=False, do=command.do: do(self.window()))
-            self.buttons[name] = button
+            self.buttons[name] = button = tool_button(
+                command.button,
+                lambda _=False, do=command.do: do(self.window()),
+                image=name,
+                name=f"player_{name}",
+            )
             row.addWidget(button)
         self._add_speed(row)
         self.slider = QSlider(Qt.Orientation.Horizontal)
@@ -69,7 +72,6 @@ class Player(QWidget):
         self._timer.timeout.connect(self._tick)
         self._clock = QElapsedTimer()
         self._owed = 0.0
-        self._colour = "#3b4652"
         store.listen(lambda _old, new: self.sync(new))
         self.sync(store.session)
 
@@ -77,18 +79,15 @@ class Player(QWidget):
         return self.step_text.fontMetrics().horizontalAdvance(text)
 
     def _add_speed(self, row: QHBoxLayout) -> None:
-        self.loop = QToolButton()
-        self.loop.setObjectName("player_loop")
+        self.loop = tool_button("Play again and again", image="loop", name="player_loop")
         self.loop.setCheckable(True)
-        self.loop.setToolTip("Play again and again")
         self.buttons["loop"] = self.loop
         self.speed = 1.0
-        self.speed_button = QToolButton()
-        self.speed_button.setObjectName("player_speed")
-        self.speed_button.setToolTip("How fast the steps are played")
-        self.speed_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu, group = QMenu(), QActionGroup(self)
+        self.speed_button = tool_button(
+            "How fast the steps are played", menu=menu, name="player_speed"
+        )
         self.speed_button.setAutoRaise(True)
-        menu, group = QMenu(self), QActionGroup(self)
         self.speeds: dict[float, QAction] = {}
         for speed in SPEEDS:
             act = menu.addAction(f"{speed:g}×")
@@ -96,11 +95,9 @@ class Player(QWidget):
             group.addAction(act)
             act.triggered.connect(lambda _=False, speed=speed: self.set_speed(speed))
             self.speeds[speed] = act
-        self.speed_button.setMenu(menu)
         for button in (self.loop, self.speed_button):
             row.addWidget(button)
         self.set_speed(self.speed)
-        self.loop.setIcon(icon("loop"))
 
     def set_speed(self, speed: float) -> None:
         """Play that many times as fast as usual, also what plays already."""
@@ -116,22 +113,13 @@ class Player(QWidget):
     def _tick_ms(self) -> int:
         return max(round(self._step_ms()), TICK_MS)
 
-    def set_icon_colour(self, colour: str) -> None:
-        """Redraw the icons in another colour."""
-        self._colour = colour
-        for name, button in self.buttons.items():
-            button.setIcon(icon("pause" if name == "play" and self.playing else name, colour))
-        # Words about inverted cells have the theme's red.
-        self.sync(self.store.session)
-
     def sync(self, session: Session) -> None:
         """Show the session."""
         last = max(len(session.frames) - 1, 0)
         at = min(session.view.frame, last)
-        self.slider.blockSignals(True)
-        self.slider.setRange(0, last)
-        self.slider.setValue(at)
-        self.slider.blockSignals(False)
+        with QSignalBlocker(self.slider):
+            self.slider.setRange(0, last)
+            self.slider.setValue(at)
         self.slider.setEnabled(last > 0)
         why = "" if last else "There are no steps yet: run the case."
         self.slider.setToolTip(why or "Which step is shown.")
@@ -189,12 +177,12 @@ class Player(QWidget):
             self._owed = 0.0
             self._timer.start(self._tick_ms())
             self._clock.start()
-            self.buttons["play"].setIcon(icon("pause", self._colour))
+            set_icon(self.buttons["play"], "pause")
 
     def stop(self) -> None:
         """Stop playing."""
         self._timer.stop()
-        self.buttons["play"].setIcon(icon("play", self._colour))
+        set_icon(self.buttons["play"], "play")
 
     def _tick(self) -> None:
         last = len(self.store.session.frames) - 1
@@ -214,3 +202,90 @@ class Player(QWidget):
         self.step(by)
         if self.store.session.view.frame >= last and not self.loop.isChecked():
             self.stop()
+
+
+SEPARATOR = "&nbsp;· "
+"""Between the numbers of a step."""
+
+
+class Results(QLabel):
+    """The numbers of a step, in the order of what matters.
+
+    In little room words and numbers are shorter; where even that is too long, the last are left
+    out.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._forms: list[list[str]] = []
+        self.setTextFormat(Qt.TextFormat.RichText)
+        self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        # Numbers that come and go may not take room from the view or the panels.
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def show_parts(self, forms: list[list[str]]) -> None:
+        """Show other numbers: the same ones, as rich text, in full and in shorter forms."""
+        if forms != self._forms:
+            self._forms = forms
+            self._fit()
+
+    @property
+    def least(self) -> int:
+        """Return the width of the most important number in its shortest form, in pixels."""
+        return math.ceil(self._width_of(self._forms[-1][:1])) + 2 if self._forms else 0
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        if not self._forms:
+            self.setText("")
+            self.setToolTip("")
+            return
+        room = self.width() - 2
+        shown = next((form for form in self._forms if self._width_of(form) <= room), None)
+        if shown is None:
+            shown = list(self._forms[-1])
+            while shown and self._width_of(shown) > room:
+                shown.pop()
+        self.setText(SEPARATOR.join(shown))
+        full = self._forms[0]
+        self.setToolTip("" if shown == full else "<br>".join(full))
+
+    def _width_of(self, parts: list[str]) -> float:
+        """Return how wide the parts are in a row, in pixels."""
+        document = QTextDocument()
+        document.setDefaultFont(self.font())
+        document.setDocumentMargin(0.0)
+        document.setHtml(SEPARATOR.join(parts))
+        return document.idealWidth()
+
+
+def plain(rich: str) -> str:
+    """Return rich text without its marks."""
+    document = QTextDocument()
+    document.setHtml(rich)
+    return document.toPlainText()
+
+
+def result_parts(session: Session) -> list[list[str]]:
+    """Return the numbers of the step that is shown, the most important first, as rich text.
+
+    In full, with a shorter word, and with fewer digits.
+    """
+    frame = session.frame
+    if frame is None:
+        return []
+    quality = frame.quality
+    colour = f" style='color:{alarm()}'" if quality.inverted else ""
+
+    def form(word: str, digits: int) -> list[str]:
+        return [
+            f"<span{colour}><b>{quality.inverted:,}</b> {word}</span>",
+            f"min <b>{quality.min:.{digits}f}</b>",
+            f"mean <b>{quality.mean:.{digits}f}</b>",
+        ]
+
+    return [form("inverted", 4), form("inv.", 4), form("inv.", 3)]

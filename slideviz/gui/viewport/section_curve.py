@@ -7,22 +7,15 @@ from functools import partial
 
 from matplotlib.figure import Figure
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QToolButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QWidget
 
 from slideviz.color_scheme import Look
 from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.viewport.beside import TitleBar
+from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.elided import ElidedLabel
-from slideviz.gui.widgets.icons import icon
-from slideviz.gui.widgets.plot_canvas import (
-    PLOT_FILTERS,
-    PlotArea,
-    ask_and_write,
-    write_plot,
-)
+from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.gui.widgets.services import folder_of
-from slideviz.gui.widgets.theme import icon_colour
 from slideviz.plots.section_curve import Colours, CurveRow, draw_curves
 from slideviz.plots.section_rows import CurveRows, colours_of, facts_of, labels_of
 from slideviz.plots.style import Style
@@ -50,27 +43,19 @@ class CurveView(QWidget):
         super().__init__()
         self.setObjectName("curve_view")
         self.store = store
-        self.title = TitleBar("curve_title", closable=True)
-        self.title.close_button.setToolTip("Close the curve")
+        self.title = TitleBar("curve_title", "Close the curve")
         self.title.closed.connect(self.closed)
         self.title.show()
-        self.save_button = QToolButton()
-        self.save_button.setAutoRaise(True)
-        self.save_button.setToolTip("Save the curve as PNG, SVG or PDF…")
-        self.save_button.clicked.connect(self._save)
-        self.title.layout().insertWidget(1, self.save_button)
+        self.save_button = self.title.add_button(
+            "picture", "Save the curve as PNG, SVG or PDF…", self._save
+        )
         self.facts = ElidedLabel()
         self.facts.setObjectName("curve_facts")
         canvas = CurveCanvas(self.drawing)
         self.area = PlotArea(canvas)
         canvas.picked = self._picked
         canvas.setToolTip("Click to mark the cell at a place.")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        for widget in (self.title, self.facts):
-            column.addWidget(widget)
-        column.addWidget(self.area, 1)
+        in_column(self.title, self.facts, self.area, wide=[self.area], spacing=0, on=self)
         self._made = CurveRows()
         self.rows: tuple[CurveRow, ...] = ()
         self._labels, self._colours = ("", ""), Colours()
@@ -98,7 +83,6 @@ class CurveView(QWidget):
     def set_look(self, look: Look) -> None:
         """Take other colours."""
         self.area.canvas.set_look(look)
-        self.save_button.setIcon(icon("picture", icon_colour(look)))
 
     def close_view(self) -> None:
         """Draw no more."""
@@ -110,11 +94,7 @@ class CurveView(QWidget):
             self.store.change(changes.mark, self.rows[-1].curve.cell_at(position))
 
     def _save(self) -> None:
-        default = folder_of(self) / "along_section.png"
-        draw = self.drawing()
-        ask_and_write(
-            self, "Save curve", default, PLOT_FILTERS, lambda path: write_plot(path, draw)
-        )
+        ask_and_write_plot(self, "Save curve", "along_section", self.drawing())
 
 
 def _draw(

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from qtpy.QtCore import QPoint, Signal
-from qtpy.QtWidgets import QGridLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import Look
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.hover import CellHover
+from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.elided import ElidedLabel
-from slideviz.gui.widgets.icons import icon
 from slideviz.gui.widgets.ruler import Ruler
-from slideviz.gui.widgets.theme import icon_colour
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
@@ -38,15 +37,10 @@ class FlatView(QWidget):
     def __init__(self, store: Store, cuts: Cuts, look: Look, multi_samples: int = 4) -> None:
         super().__init__()
         self.setObjectName("flat_view")
-        self.title = TitleBar("flat_title", closable=True)
-        self.title.close_button.setToolTip("Close the flat view")
+        self.title = TitleBar("flat_title", "Close the flat view")
         self.title.closed.connect(self.closed)
         self.title.show()
-        self.fit_button = QToolButton()
-        self.fit_button.setAutoRaise(True)
-        self.fit_button.setToolTip("Make the section fill this view")
-        self.fit_button.clicked.connect(self.fit)
-        self.title.layout().insertWidget(1, self.fit_button)
+        self.fit_button = self.title.add_button("fit", "Make the section fill this view", self.fit)
         self.facts = ElidedLabel()
         self.facts.setObjectName("flat_facts")
         self.view = View3D(self, multi_samples=multi_samples)
@@ -63,11 +57,6 @@ class FlatView(QWidget):
         self.set_look(look)
 
     def _place(self) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.title)
-        column.addWidget(self.facts)
         grid = QGridLayout()
         grid.setSpacing(0)
         grid.addWidget(self.upright, 0, 0)
@@ -75,11 +64,11 @@ class FlatView(QWidget):
         grid.addWidget(self.across, 1, 1)
         grid.setColumnStretch(1, 1)
         grid.setRowStretch(0, 1)
-        column.addLayout(grid, 1)
+        in_column(self.title, self.facts, grid, wide=[grid], spacing=0, on=self)
 
     def _connect(self, store: Store) -> None:
-        self.view.told.zoomed.connect(self._zoomed)
-        self.view.told.resized.connect(self._resized)
+        self.view.signals.zoomed.connect(self._zoomed)
+        self.view.signals.resized.connect(self._resized)
         self._refit = later(self, self.fit)
         CellHover(self.view, self.scene, store)
         # The camera moves by the mouse too: the rulers follow whatever moves it.
@@ -139,7 +128,6 @@ class FlatView(QWidget):
     def set_look(self, look: Look) -> None:
         """Take other colours."""
         self.scene.set_look(look)
-        self.fit_button.setIcon(icon("fit", icon_colour(look)))
         self.view.render()
 
     def close_view(self) -> None:

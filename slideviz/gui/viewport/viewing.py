@@ -70,7 +70,9 @@ class Viewing(QWidget):
 
     def _title(self, column: int) -> TitleBar:
         title = TitleBar(
-            f"view_title_{column}", True, lambda menu: fill_pane(menu, self.store, column)
+            f"view_title_{column}",
+            "End the comparison; the other view stays",
+            lambda menu: fill_pane(menu, self.store, column),
         )
         title.closed.connect(lambda: self.store.change(close_pane, column))
         self._grid.addWidget(title, 0, column)
@@ -85,12 +87,12 @@ class Viewing(QWidget):
         return view
 
     def _connect(self, view: View3D, scene: Scene) -> None:
-        view.told.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
-        view.told.menu_wanted.connect(lambda where: self._menu(view, scene, where))
-        view.told.resized.connect(lambda: self._resized(scene))
-        view.told.unveiled.connect(lambda: scene.update(scene.session))
+        view.signals.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
+        view.signals.menu_wanted.connect(lambda where: self._menu(view, scene, where))
+        view.signals.resized.connect(lambda: self._resized(scene))
+        view.signals.unveiled.connect(lambda: scene.update(scene.session))
         CellHover(view, scene, self.store)
-        view.told.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
+        view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
         """Make the second view; from now on what moves one camera moves the other."""
@@ -256,8 +258,6 @@ class Viewing(QWidget):
     def _clicked(
         self, view: View3D, scene: Scene, where: QPoint, modifiers: Qt.KeyboardModifier
     ) -> None:
-        if modifiers & Qt.KeyboardModifier.AltModifier:
-            return  # means a cell
         name = scene.pick(*view.to_pixels(where))
         chosen = self.store.session.view.selected
         if modifiers & Qt.KeyboardModifier.ControlModifier and name:

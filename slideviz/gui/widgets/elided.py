@@ -14,7 +14,6 @@ from qtpy.QtWidgets import (
     QSizePolicy,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QWidget,
 )
 
 ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
@@ -22,10 +21,20 @@ ModelIndex: TypeAlias = QModelIndex | QPersistentModelIndex
 
 
 class ElidedLabel(QLabel):
-    """A label of any width: its text is never cut within a letter, and is told as a whole."""
+    """A label of any width, whose text ends with an ellipsis where there is no room for all of it.
 
-    def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
-        super().__init__(text, parent)
+    Parameters
+    ----------
+    text : str
+    mode : Qt.TextElideMode
+        Where the ellipsis stands.
+    """
+
+    def __init__(
+        self, text: str = "", mode: Qt.TextElideMode = Qt.TextElideMode.ElideRight
+    ) -> None:
+        super().__init__(text)
+        self._mode = mode
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         # A long text may not make what it stands in wider.
@@ -35,7 +44,7 @@ class ElidedLabel(QLabel):
     def shown(self) -> str:
         """Return what there is room for."""
         room = self.contentsRect().width()
-        return self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, room)
+        return self.fontMetrics().elidedText(self.text(), self._mode, room)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

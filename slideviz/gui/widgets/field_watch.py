@@ -28,12 +28,12 @@ class FieldWatch(QObject):
 
     def look(self) -> None:
         """Tell the session which fields are not valid."""
-        told = tuple(
+        faults = tuple(
             f"{_title(field, self.panel)}: {field.fault}."
             for field in self._fields
             if field.fault and field.isEnabledTo(self.panel) and field.isVisibleTo(self.panel)
         )
-        self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(told)))
+        self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(faults)))
 
     def focus(self) -> bool:
         """Put the cursor into the first field that is not valid; return whether there is one."""

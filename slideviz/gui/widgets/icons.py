@@ -6,9 +6,11 @@ from functools import lru_cache
 from importlib.resources import files
 
 from qtpy.QtCore import QByteArray, QRectF, QSize, Qt
-from qtpy.QtGui import QIcon, QPainter, QPixmap
+from qtpy.QtGui import QAction, QIcon, QPainter, QPixmap
 from qtpy.QtSvg import QSvgRenderer
+from qtpy.QtWidgets import QAbstractButton, QWidget
 
+from slideviz.gui.widgets.theme import icon_colour
 from slideviz.terms import ROLES, Role
 
 STROKES = {
@@ -94,9 +96,31 @@ def _faded(pixmap: QPixmap) -> QPixmap:
     return out
 
 
+def icon(name: str, colour: str = "") -> QIcon:
+    """Return an icon of that name in a colour; without one in that of the theme."""
+    return _drawn(name, colour or icon_colour())
+
+
+def set_icon(button: QAbstractButton | QAction, name: str) -> None:
+    """Give a button or action an icon; `redraw_icons` redraws it in another theme."""
+    button.setProperty("icon_name", name)
+    button.setIcon(icon(name))
+
+
+def redraw_icons(window: QWidget) -> None:
+    """Redraw the icons of buttons and actions in the colour of the theme."""
+    drawn: list[QAbstractButton | QAction] = [
+        *window.findChildren(QAbstractButton),
+        *window.findChildren(QAction),
+    ]
+    for button in drawn:
+        name = button.property("icon_name")
+        if name:
+            set_icon(button, name)
+
+
 @lru_cache(maxsize=256)
-def icon(name: str, colour: str = "#3b4652") -> QIcon:
-    """Return an icon of that name in a colour."""
+def _drawn(name: str, colour: str) -> QIcon:
     svg = _SVG.format(c=colour, w=1.8, body=STROKES[name].format(c=colour))
     found = QIcon()
     for size in (20, 40):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPixmap
-from qtpy.QtWidgets import QApplication
+from qtpy.QtWidgets import QApplication, QLabel
 
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 
@@ -53,6 +53,15 @@ def framed(image: QImage) -> QPixmap:
     painter.drawRect(0, 0, out.width() - 1, out.height() - 1)
     painter.end()
     return out
+
+
+def preview_label(name: str, box: tuple[int, int]) -> QLabel:
+    """Return a label for a framed picture that fits into a box of pixels."""
+    label = QLabel()
+    label.setFixedSize(box[0] + 2, box[1] + 2)
+    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    label.setAccessibleName(name)
+    return label
 
 
 @contextmanager

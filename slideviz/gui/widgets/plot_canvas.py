@@ -20,8 +20,9 @@ from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.settings import LOOK_MS, MOST_REST, REST_MS, REST_TIMES
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
+from slideviz.gui.widgets.build import hint_label
 from slideviz.gui.widgets.plot_image import Draw, Paper, Picture, draw_beside
-from slideviz.gui.widgets.services import main_window
+from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.plots.draw import PRINT, Style
 from slideviz.plots.written import figure_bytes
@@ -216,10 +217,7 @@ def is_seen(widget: QWidget) -> bool:
 
 def words_label() -> QLabel:
     """Return a label for what a panel says while it has nothing to show."""
-    label = QLabel()
-    label.setWordWrap(True)
-    label.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    label.setProperty("hint", True)
+    label = hint_label(align=Qt.AlignmentFlag.AlignCenter)
     label.setMargin(12)
     return label
 
@@ -260,3 +258,9 @@ def ask_and_write(
     if window is not None:
         window.settings.setValue("folder", str(path.parent))
         window.say(f"Saved {path}")
+
+
+def ask_and_write_plot(parent: QWidget, title: str, name: str, draw_on: Draw) -> None:
+    """Ask for a file and write a plot to it, which is called ``name`` at first."""
+    default = folder_of(parent) / f"{name}.png"
+    ask_and_write(parent, title, default, PLOT_FILTERS, lambda path: write_plot(path, draw_on))

@@ -10,7 +10,7 @@ from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QMainWindow, QWidget
 
 from slideviz.gui.responsiveness.worker import JobRunner
-from slideviz.gui.widgets.questions import Banner
+from slideviz.gui.widgets.banner import Banner
 from slideviz.session.store import Store
 
 if TYPE_CHECKING:

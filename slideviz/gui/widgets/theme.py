@@ -1,4 +1,4 @@
-"""Light and dark: palettes for Qt's Fusion style, and the look of the view that goes with them."""
+"""The light and the dark theme: colours of widgets, icons and words, in Qt's Fusion style."""
 
 from __future__ import annotations
 
@@ -12,43 +12,42 @@ from slideviz.color_scheme import DARK, LIGHT, Look
 
 THEMES = ("system", "light", "dark")
 
-_COLOURS = {
-    "light": {
-        "Window": "#f4f6f8",
-        "WindowText": "#20262e",
-        "Base": "#ffffff",
-        "AlternateBase": "#f2f5f8",
-        "Text": "#20262e",
-        "Button": "#eef1f4",
-        "ButtonText": "#20262e",
-        "Highlight": "#2f6fb5",
-        "HighlightedText": "#ffffff",
-        "ToolTipBase": "#ffffff",
-        "ToolTipText": "#20262e",
-        "PlaceholderText": "#7b8591",
-        "Link": "#1f5f9f",
-        "Mid": "#c3cad2",
-        "disabled": "#7f8994",
-    },
-    "dark": {
-        "Window": "#262b31",
-        "WindowText": "#e6eaf0",
-        "Base": "#1d2126",
-        "AlternateBase": "#23282e",
-        "Text": "#e6eaf0",
-        "Button": "#333a42",
-        "ButtonText": "#e6eaf0",
-        "Highlight": "#3d7fc4",
-        "HighlightedText": "#ffffff",
-        "ToolTipBase": "#3a424b",
-        "ToolTipText": "#f2f5f8",
-        "PlaceholderText": "#8a95a2",
-        "Link": "#77b0ea",
-        "Mid": "#47505a",
-        "Light": "#4d5763",
-        "disabled": "#7d8894",
-    },
+_PALETTE = {
+    "Window": ("#f4f6f8", "#262b31"),
+    "WindowText": ("#20262e", "#e6eaf0"),
+    "Base": ("#ffffff", "#1d2126"),
+    "AlternateBase": ("#f2f5f8", "#23282e"),
+    "Text": ("#20262e", "#e6eaf0"),
+    "Button": ("#eef1f4", "#333a42"),
+    "ButtonText": ("#20262e", "#e6eaf0"),
+    "Highlight": ("#2f6fb5", "#3d7fc4"),
+    "HighlightedText": ("#ffffff", "#ffffff"),
+    "ToolTipBase": ("#ffffff", "#3a424b"),
+    "ToolTipText": ("#20262e", "#f2f5f8"),
+    "PlaceholderText": ("#7b8591", "#8a95a2"),
+    "Link": ("#1f5f9f", "#77b0ea"),
+    "Mid": ("#c3cad2", "#47505a"),
+    "disabled": ("#7f8994", "#7d8894"),
+    "Light": ("", "#4d5763"),
 }
+"""Colours of Qt's palette in the light and the dark theme, by role; empty: Qt's own."""
+
+_STYLE = {
+    "title": ("#e4e9ee", "#30363e"),
+    "hover": ("#e0e6ec", "#3a424b"),
+    "checked": ("#d3e2f2", "#34516f"),
+    "line": ("#ccd3da", "#3e464f"),
+    "soft": ("#5d6874", "#a3adb8"),
+    "bad": ("#b3261e", "#ff9186"),
+    "accent": ("#2f6fb5", "#3d7fc4"),
+    "accent_hover": ("#265c98", "#4c8fd6"),
+    "mid": ("#d9dfe5", "#3a424b"),
+    "banner": ("#fdeceb", "#45282a"),
+    "note": ("#eaf2fb", "#24364a"),
+    "noted": ("#8fb3dc", "#4f76a3"),
+    "frame": ("#87919c", "#818c98"),
+}
+"""The other colours of the style sheet, likewise."""
 
 _SHEET = """
 QDockWidget {{ font-weight: 600; titlebar-close-icon: url("{signs}/close_{name}.svg");
@@ -62,8 +61,9 @@ QToolButton:hover {{ background: {hover}; }}
 QToolButton:checked {{ background: {checked}; border: 1px solid {line}; }}
 QStatusBar {{ border-top: 1px solid {line}; }}
 QStatusBar::item {{ border: none; }}
-QMainWindow::separator {{ width: 5px; height: 5px; background: {window}; }}
-QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {tip}; color: {tip_text}; }}
+QMainWindow::separator {{ width: 5px; height: 5px; background: {Window}; }}
+QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {ToolTipBase};
+    color: {ToolTipText}; }}
 QListWidget#motions::item {{ padding: 3px 2px; }}
 QLabel[hint="true"] {{ color: {soft}; }}
 QLabel[bad="true"] {{ color: {bad}; }}
@@ -74,11 +74,11 @@ QPushButton#run {{ background: {accent}; color: white; font-weight: 600; border:
 QPushButton#run:hover {{ background: {accent_hover}; }}
 QPushButton#run:disabled {{ background: {mid}; color: {soft}; }}
 QPushButton#open_page {{ padding: 6px 17px; border: 1px solid {line}; border-radius: 4px;
-    background: {base}; }}
+    background: {Base}; }}
 QPushButton#open_page:hover {{ background: {hover}; }}
 QPushButton#open_page:focus, QPushButton#run:focus {{ border: 2px solid {noted};
     padding: 5px 16px; }}
-QToolButton[card="true"] {{ background: {base}; border: 1px solid {line}; border-radius: 6px;
+QToolButton[card="true"] {{ background: {Base}; border: 1px solid {line}; border-radius: 6px;
     padding: 8px 4px 6px 4px; }}
 QToolButton[card="true"]:hover {{ background: {note}; border: 1px solid {noted}; }}
 QToolButton[card="true"]:focus {{ border: 2px solid {accent}; }}
@@ -89,44 +89,6 @@ QPushButton[recent="true"]:focus {{ border: 1px solid {accent}; }}
 QFrame#banner {{ background: {banner}; border: 1px solid {bad}; border-radius: 4px; }}
 QFrame#banner[calm="true"] {{ background: {note}; border: 1px solid {noted}; }}
 """
-
-_EXTRA = {
-    "light": {
-        "title": "#e4e9ee",
-        "hover": "#e0e6ec",
-        "checked": "#d3e2f2",
-        "line": "#ccd3da",
-        "window": "#f4f6f8",
-        "soft": "#5d6874",
-        "base": "#ffffff",
-        "bad": "#b3261e",
-        "accent": "#2f6fb5",
-        "accent_hover": "#265c98",
-        "mid": "#d9dfe5",
-        "banner": "#fdeceb",
-        "note": "#eaf2fb",
-        "noted": "#8fb3dc",
-        "frame": "#87919c",
-    },
-    "dark": {
-        "title": "#30363e",
-        "hover": "#3a424b",
-        "checked": "#34516f",
-        "line": "#3e464f",
-        "window": "#262b31",
-        "soft": "#a3adb8",
-        "base": "#1d2126",
-        "bad": "#ff9186",
-        "accent": "#3d7fc4",
-        "accent_hover": "#4c8fd6",
-        "mid": "#3a424b",
-        "banner": "#45282a",
-        "note": "#24364a",
-        "noted": "#4f76a3",
-        "frame": "#818c98",
-    },
-}
-
 
 FRAMED = (
     "QCheckBox",
@@ -145,7 +107,7 @@ _OUTLINE = 140
 
 def resolved(theme: str) -> str:
     """Return ``light`` or ``dark`` for a theme; ``system`` asks the desktop."""
-    if theme in _COLOURS:
+    if theme in ("light", "dark"):
         return theme
     scheme = _app().styleHints().colorScheme()
     return "dark" if scheme == Qt.ColorScheme.Dark else "light"
@@ -158,12 +120,14 @@ def _app() -> QApplication:
 
 
 def apply(theme: str) -> Look:
-    """Give the application that theme and return the view's look."""
+    """Give the application a theme, and return the color scheme of the view."""
     name = resolved(theme)
-    colours, palette = _COLOURS[name], QPalette()
-    for role, colour in colours.items():
-        if role != "disabled":
-            palette.setColor(getattr(QPalette.ColorRole, role), QColor(colour))
+    dark = name == "dark"
+    colours = {role: pair[dark] for role, pair in (_PALETTE | _STYLE).items()}
+    palette = QPalette()
+    for role in _PALETTE:
+        if role != "disabled" and colours[role]:
+            palette.setColor(getattr(QPalette.ColorRole, role), QColor(colours[role]))
     for role in ("WindowText", "Text", "ButtonText"):
         group = QPalette.ColorGroup.Disabled
         palette.setColor(group, getattr(QPalette.ColorRole, role), QColor(colours["disabled"]))
@@ -173,22 +137,25 @@ def apply(theme: str) -> Look:
     # Tool tips keep a palette of their own, which no change of the application's reaches.
     QToolTip.setPalette(palette)
     framed = QPalette(palette)
-    outline = QColor(_EXTRA[name]["frame"]).lighter(_OUTLINE)
+    outline = QColor(colours["frame"]).lighter(_OUTLINE)
     framed.setColor(QPalette.ColorRole.Window, outline)
     for kind in FRAMED:
         app.setPalette(framed, kind)  # type: ignore[arg-type]  # a str is taken, too
-    tip = {"tip": colours["ToolTipBase"], "tip_text": colours["ToolTipText"]}
-    signs = {"name": name, "signs": Path(__file__).with_name("dock_signs").as_posix()}
-    app.setStyleSheet(_SHEET.format(**_EXTRA[name], **tip, **signs))
-    return DARK if name == "dark" else LIGHT
+    signs = Path(__file__).with_name("dock_signs").as_posix()
+    app.setStyleSheet(_SHEET.format(**colours, name=name, signs=signs))
+    return DARK if dark else LIGHT
 
 
-def icon_colour(look: Look) -> str:
-    """Return the colour of icons on that theme's toolbars."""
-    return "#dfe5ec" if look.name == "dark" else "#3b4652"
+def is_dark() -> bool:
+    """Tell whether the theme that is shown is dark."""
+    return QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128
+
+
+def icon_colour() -> str:
+    """Return the colour of icons in the theme that is shown."""
+    return "#dfe5ec" if is_dark() else "#3b4652"
 
 
 def alarm() -> str:
     """Return the colour of words about inverted cells, readable in the theme that is shown."""
-    window = QApplication.palette().color(QPalette.ColorRole.Window)
-    return _EXTRA["dark" if window.lightness() < 128 else "light"]["bad"]
+    return _STYLE["bad"][is_dark()]

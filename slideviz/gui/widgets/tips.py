@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QFontMetrics
+from qtpy.QtGui import QFont, QFontDatabase, QFontMetrics
 from qtpy.QtWidgets import QLabel, QToolTip, QWidget
 
 
@@ -14,6 +14,11 @@ def rich_label(text: str) -> QLabel:
     label = QLabel(text)
     label.setTextFormat(Qt.TextFormat.RichText)
     return label
+
+
+def fixed_font() -> QFont:
+    """Return the font whose letters are all as wide, for tables and messages."""
+    return QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
 
 
 def plain_labels(widget: QWidget) -> None:

@@ -1,4 +1,4 @@
-"""Compiles the numerics beside the window, so that the first run need not wait for it."""
+"""Compilation of numerics and graphics beside the window, for which the first run need not wait."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def prepare_drawing(view: Any, stage: Stage) -> None:
     draw()
 
 
-class WarmUp(QObject):
-    """Runs `slideviz.session.jit_warmup.warm_up` once, in a thread that no exit waits for.
+class WarmupThread(QObject):
+    """The thread of `slideviz.session.jit_warmup.warm_up`, for which no exit waits.
 
     Signals
     -------
@@ -56,7 +56,7 @@ class WarmUp(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._stop = Event()
-        self._told = False
+        self._compiles = False
         self.thread_: Thread | None = None
 
     def start(self) -> None:
@@ -74,12 +74,12 @@ class WarmUp(QObject):
         jit_warmup.warm_up(self._begun, self._stop.is_set)
         # What was imported stays: to look through all of it for garbage takes 100 ms each time.
         gc.freeze()
-        if self._told:
+        if self._compiles:
             self._tell(False)
 
     def _begun(self) -> None:
-        if not self._told:
-            self._told = True
+        if not self._compiles:
+            self._compiles = True
             self._tell(True)
 
     def _tell(self, compiling: bool) -> None:

@@ -1,4 +1,4 @@
-"""Looks for clashes beside the window, soon after the last change of motions or roles."""
+"""The intersection check: a job beside the window, soon after motions or roles have changed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ log = logging.getLogger("slideviz")
 
 
 class IntersectionCheck(QObject):
-    """Keeps ``Session.clash`` up to date; what was found last stays until the next is known."""
+    """The job that keeps ``Session.clash`` up to date; its last answer stays until the next."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -62,7 +62,7 @@ class IntersectionCheck(QObject):
         self._again()
 
     def _failed(self, error: Exception) -> None:
-        log.error("looking for clashes failed: %s", error)
+        log.error("the intersection check failed: %s", error)
         self._known = self._asked
 
     def _again(self) -> None:

@@ -1,4 +1,4 @@
-"""Offers the sessions that did not end properly, in a banner, one after the other."""
+"""Session recovery: a banner offers the sessions that did not end properly, one by one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from qtpy.QtCore import QObject
 
 from slideviz.gui.autosave import Autosave, Found, find_sessions
+from slideviz.gui.widgets.banner import Banner
 from slideviz.gui.widgets.faults import old_crashes
-from slideviz.gui.widgets.questions import Banner
 from slideviz.session import jobs
 from slideviz.session.keep import restored
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("slideviz")
 
 
-class Restore(QObject):
-    """What a window does about sessions of earlier starts.
+class SessionRecovery(QObject):
+    """The sessions of earlier starts, and the banner that offers them.
 
     Parameters
     ----------

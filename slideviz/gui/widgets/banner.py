@@ -1,0 +1,140 @@
+"""The banner above the view: a message or a question that stays until it is closed."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Mapping
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QFrame,
+    QPlainTextEdit,
+    QPushButton,
+    QWidget,
+)
+
+from slideviz.errors import SlidevizError
+from slideviz.gui.widgets.build import (
+    dialog_buttons,
+    in_column,
+    in_row,
+    push_button,
+    set_style,
+    tool_button,
+)
+from slideviz.gui.widgets.faults import details_of
+from slideviz.gui.widgets.tips import rich_label
+
+MOST_LINES = 4
+"""Of a message; the rest is behind “Details”."""
+
+
+class DetailsDialog(QDialog):
+    """The full text of an error, to be copied."""
+
+    def __init__(self, parent: QWidget, text: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Details")
+        self.resize(720, 380)
+        self.text = QPlainTextEdit(text)
+        self.text.setReadOnly(True)
+        self.text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        buttons = dialog_buttons(self, QDialogButtonBox.StandardButton.Close)
+        self.copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        self.copy.clicked.connect(lambda: QApplication.clipboard().setText(text))
+        self.setLayout(in_column(self.text, buttons))
+
+
+class Banner(QFrame):
+    """A message across the top of the view that stays until it is closed.
+
+    Signals
+    -------
+    shown(str)
+        The message.
+    """
+
+    shown = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("banner")
+        self._full = self._brief = ""
+        self.text = rich_label("")
+        self.text.setWordWrap(True)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.details = push_button("Details…", "", self._show_details)
+        self.copy = push_button(
+            "Copy details",
+            "Copy the message with its trace, versions and platform.",
+            lambda: QApplication.clipboard().setText(self._full),
+        )
+        close = tool_button("Close the message", self._closed, text="✕")
+        self._row = in_row(self.text, self.details, self.copy, close, wide=[self.text])
+        self._row.setContentsMargins(10, 6, 6, 6)
+        self.setLayout(self._row)
+        self.answers: dict[str, QPushButton] = {}
+        self._later: Callable[[], object] | None = None
+        self.hide()
+
+    def tell(self, text: str, full: str = "", calm: bool = True) -> None:
+        """Show a message, with a longer text behind “Details”; calm ones are no error."""
+        set_style(self, "calm", calm)
+        lines = text.splitlines() or [""]
+        brief = "\n".join(lines[:MOST_LINES]) + ("\n…" if len(lines) > MOST_LINES else "")
+        self._brief = html.escape(brief, quote=False).replace("\n", "<br>")
+        self.text.setText(self._brief)
+        self._full = full or (text if len(lines) > MOST_LINES else "")
+        self.details.setVisible(bool(self._full))
+        self.copy.setVisible(bool(full))
+        self.show()
+        self.shown.emit(text)
+
+    def tell_error(self, error: BaseException) -> None:
+        """Show what an error means; the trace is behind “Details” if it was not expected."""
+        if isinstance(error, SlidevizError):
+            self.tell(str(error), calm=False)
+        else:
+            kind = type(error).__name__
+            text = f"Something unexpected went wrong ({kind}): {error}"
+            self.tell(text, details_of(error), calm=False)
+
+    def ask(
+        self,
+        text: str,
+        answers: Mapping[str, Callable[[], object]],
+        full: str = "",
+        later: Callable[[], object] | None = None,
+    ) -> None:
+        """Show a question with a button for each answer; ``later`` when it is closed instead."""
+        self._forget_answers()
+        for name, function in answers.items():
+            button = push_button(name, "", lambda _=False, function=function: function())
+            self.answers[name] = button
+            self._row.insertWidget(self._row.count() - 1, button)
+        self._later = later
+        self.tell(text, full)
+
+    def _forget_answers(self) -> None:
+        for button in self.answers.values():
+            self._row.removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        self.answers = {}
+
+    def _closed(self) -> None:
+        later, self._later = self._later, None
+        self.hide()
+        if later is not None:
+            later()
+
+    def count(self, times: int) -> None:
+        """Show how often what the message tells has happened."""
+        self.text.setText(f"{self._brief} <i>({times:,} times)</i>")
+
+    def _show_details(self) -> None:
+        self.dialog = DetailsDialog(self, self._full)
+        self.dialog.open()

@@ -1,0 +1,206 @@
+"""Layouts, buttons and labels in a line each, for panels and dialogs."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from qtpy.QtCore import QPoint, QRect, Qt, SignalInstance
+from qtpy.QtWidgets import (
+    QBoxLayout,
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLayout,
+    QMenu,
+    QProgressBar,
+    QPushButton,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.tips import wrapped
+
+Part = QWidget | QLayout | int | None
+"""What stands in a row or column: None takes the room that is left, a number is pixels of air."""
+Do = Callable[..., object] | SignalInstance
+Box = TypeVar("Box", bound=QBoxLayout)
+
+# Layouts -----------------------------------------------------------------------------------
+
+
+def in_row(*parts: Part, wide: Sequence[Part] = (), spacing: int = -1) -> QHBoxLayout:
+    """Return a layout of parts side by side, of which those in ``wide`` take the room."""
+    return _filled(QHBoxLayout(), parts, wide, spacing)
+
+
+def in_column(
+    *parts: Part,
+    wide: Sequence[Part] = (),
+    spacing: int = -1,
+    on: QWidget | None = None,
+    margins: tuple[int, int, int, int] = (0, 0, 0, 0),
+) -> QVBoxLayout:
+    """Return a layout of parts below each other, as that of a widget where one is given."""
+    layout = QVBoxLayout()
+    if on is not None:
+        on.setLayout(layout)
+        layout.setContentsMargins(*margins)
+    return _filled(layout, parts, wide, spacing)
+
+
+def _filled(layout: Box, parts: Sequence[Part], wide: Sequence[Part], spacing: int) -> Box:
+    if spacing >= 0:
+        layout.setSpacing(spacing)
+    for part in parts:
+        stretch = int(any(part is one for one in wide))
+        if part is None:
+            layout.addStretch(1)
+        elif isinstance(part, int):
+            layout.addSpacing(part)
+        elif isinstance(part, QLayout):
+            layout.addLayout(part, stretch)
+        else:
+            layout.addWidget(part, stretch)
+    return layout
+
+
+def boxed(layout: QLayout) -> QWidget:
+    """Return a widget that has a layout, without a margin."""
+    widget = QWidget()
+    layout.setContentsMargins(0, 0, 0, 0)
+    widget.setLayout(layout)
+    return widget
+
+
+def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
+    """Let the fields of a form be as wide as it, at a distance in pixels."""
+    form.setVerticalSpacing(spacing)
+    form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+
+
+class PanelScroll(QScrollArea):
+    """The scroll area that fills a panel; a field that the tab key comes to is shown whole."""
+
+    def __init__(self, panel: QWidget) -> None:
+        super().__init__()
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setWidget(QWidget())
+        in_column(self, on=panel)
+
+    def focusNextPrevChild(self, forwards: bool) -> bool:
+        moved = super().focusNextPrevChild(forwards)
+        inside = self.widget()
+        field = inside.focusWidget() if inside is not None else None
+        if moved and inside is not None and field is not None:
+            # Qt shows only where its cursor is.
+            place = QRect(field.mapTo(inside, QPoint(0, 0)), field.size())
+            for y in (place.bottom(), place.top()):
+                self.ensureVisible(place.left(), y, 0, 6)
+        return moved
+
+
+# Buttons -----------------------------------------------------------------------------------
+
+
+def push_button(text: str, tip: str, do: Do, name: str = "") -> QPushButton:
+    """Return a button with words."""
+    button = QPushButton(text)
+    button.setObjectName(name)
+    button.setToolTip(wrapped(tip))
+    button.clicked.connect(do)
+    return button
+
+
+def tool_button(
+    tip: str,
+    do: Do | None = None,
+    *,
+    image: str = "",
+    text: str = "",
+    menu: QMenu | None = None,
+    name: str = "",
+) -> QToolButton:
+    """Return a button with an icon, words or both, which does something or opens a menu."""
+    button = QToolButton()
+    button.setObjectName(name)
+    button.setToolTip(wrapped(tip))
+    button.setText(text)
+    if image:
+        set_icon(button, image)
+    if image and text:
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+    if menu is not None:
+        if menu.parent() is None:
+            menu.setParent(button, menu.windowFlags())
+        button.setMenu(menu)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+    if do is not None:
+        button.clicked.connect(do)
+    return button
+
+
+def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") -> QCheckBox:
+    """Return a box to tick."""
+    box = QCheckBox(text)
+    box.setObjectName(name)
+    box.setToolTip(wrapped(tip))
+    if toggled is not None:
+        box.toggled.connect(toggled)
+    return box
+
+
+def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> QDialogButtonBox:
+    """Return the buttons of a dialog: those that accept it and those that reject it do so."""
+    buttons = QDialogButtonBox()
+    for kind in kinds:
+        buttons.addButton(kind)
+    buttons.accepted.connect(dialog.accept)
+    buttons.rejected.connect(dialog.reject)
+    return buttons
+
+
+# Labels and bars ---------------------------------------------------------------------------
+
+
+def hint_label(text: str = "", align: Qt.AlignmentFlag | None = None) -> QLabel:
+    """Return a label for a hint, in soft letters and as many lines as it needs."""
+    label = QLabel(text)
+    label.setWordWrap(True)
+    label.setProperty("hint", True)
+    if align is not None:
+        label.setAlignment(align)
+    return label
+
+
+def set_style(widget: QWidget, name: str, value: bool) -> None:
+    """Set a property of a widget by which the style sheet draws it, as ``bad``."""
+    if widget.property(name) != value:
+        widget.setProperty(name, value)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
+
+
+class QuietBar(QProgressBar):
+    """A progress bar that waits for the next turn of the event loop to be painted.
+
+    Qt's own paints itself at once, with each value. Around a view drawn by OpenGL the whole window
+    goes to the screen for that, 10 to 20 ms each time where no graphics card does it; with
+    everything else that has changed it does so anyway.
+    """
+
+    def setValue(self, value: int) -> None:
+        self.setUpdatesEnabled(False)
+        super().setValue(value)
+        self.setUpdatesEnabled(True)

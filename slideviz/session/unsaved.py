@@ -1,0 +1,81 @@
+"""Unsaved work, which closing or opening another mesh would lose, and the question about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from slideviz.session.state import Session
+
+
+@dataclass(frozen=True, eq=False)
+class Unsaved:
+    """Unsaved work of a session.
+
+    Attributes
+    ----------
+    session : Session
+    what : mapping
+        The words for what would be lost: of a case, of a mesh, or of a run that goes on.
+    """
+
+    session: Session
+    what: Mapping[str, str]
+
+    @classmethod
+    def of(cls, session: Session, busy: bool) -> Unsaved:
+        """Return the unsaved work of a session, while a job runs or none does."""
+        what = {}
+        if session.unsaved_case:
+            source = session.case.source
+            what["case"] = (
+                f"the changes to {source.name}" if source else "roles, motions and method as a case"
+            )
+        run = session.run_shown
+        if session.unsaved_mesh and run is not None:
+            # While it goes on there is no last step to save.
+            name = "mesh" if run.end and not busy else "run"
+            what[name] = f"the deformed mesh of run {run.number}"
+        return cls(session, what)
+
+    @property
+    def can_save(self) -> list[str]:
+        """Return what can be saved now, ``case`` and ``mesh``."""
+        return [name for name in self.what if name != "run"]
+
+    def question(self, before: str) -> str:
+        """Return the question to the user; a second line says what saving is good for.
+
+        Parameters
+        ----------
+        before : str
+            What the work would be lost by, as ``closing``.
+        """
+        number = self.session.shown
+        if "run" in self.what:
+            rest = {name: words for name, words in self.what.items() if name != "run"}
+            if not rest:
+                return f"Run {number} goes on. Lose its steps?"
+            lost = "Its steps are lost, for it goes on; cancel it to save what there is."
+            return f"{replace(self, what=rest).question(before)}\nRun {number} goes on. {lost}"
+        text = f"Save {' and '.join(self.what.values())} before {before}?"
+        more = " ".join(filter(None, (self._repeats(), self._others())))
+        return f"{text}\n{more}" if more else text
+
+    def _repeats(self) -> str:
+        run = self.session.run_shown
+        if "case" in self.what and run and run.end == "done" and not self.session.outdated:
+            return f"The case repeats run {run.number} exactly."
+        return ""
+
+    def _others(self) -> str:
+        """Return a sentence about the runs that are not shown and whose meshes are not saved."""
+        runs = [run for run in self.session.runs if run.frames and not run.saved]
+        others = [str(run.number) for run in runs if run is not self.session.run_shown]
+        several = len(others) > 1
+        return (
+            f"The mesh{'es' * several} of run{'s' * several} {', '.join(others)} "
+            f"{'are' if several else 'is'} not saved either."
+            if others
+            else ""
+        )
