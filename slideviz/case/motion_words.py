@@ -129,6 +129,15 @@ def _exactly(motion: Motion) -> str:
     return turned + _along(motion.axis)
 
 
+def mesh_words(mesh: Mesh) -> tuple[str, str]:
+    """Return dimensions, counts and size of a mesh in a line, and in other lines its ends."""
+    halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
+    about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
+    size, ends = box_words(mesh)
+    count = f"{len(mesh.cells):,} cells{halo}   {len(mesh.points):,} points"
+    return f"{mesh.dim}D   {count}   {size}", about + ends
+
+
 def box_words(mesh: Mesh) -> tuple[str, str]:
     """Return the size of a mesh along each axis, and the ends of it, a line for each axis."""
     if not len(mesh.points):

@@ -267,7 +267,7 @@ _VIEW = Menu("view", "&View", entries=(
                 lambda window: window.docks_.toggle_all(), ("F9",)),
         Command("restore_layout", "&Restore layout",
                 "Put every panel back to where it was at first.",
-                lambda window: window.restore_layout()),
+                lambda window: window.docks_.restore_layout()),
     ), fill=_fill_panels),
 ))
 

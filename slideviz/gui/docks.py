@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from qtpy.QtCore import QByteArray, QEvent, QObject, Qt, QTimer
+from qtpy.QtCore import QByteArray, QEvent, QObject, QSettings, Qt, QTimer
 from qtpy.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.dock_tabs import DockTabs
@@ -128,15 +128,26 @@ class Docks(QObject):
         """Return the panel of a kind."""
         return next(panel for panel in self.panels.values() if isinstance(panel, kind))
 
-    def restore(self, state: QByteArray | None) -> None:
-        """Put every dock where it was, or, where nobody knows of that, where it belongs at first.
-
-        Not one after the other: Qt would leave tab bars that belong to nothing over the panels.
-        """
+    def save(self, settings: QSettings) -> None:
+        """Write down where the window and every dock are."""
+        # The next window begins with its panels, and with a frame.
+        self.show_hidden()
         window = self.window
+        window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
+        settings.setValue("geometry", window.saveGeometry())
+        settings.setValue("state", window.saveState())
+
+    def restore(self, settings: QSettings) -> None:
+        """Put the window and every dock where they were, or else where they belong at first.
+
+        Not one dock after the other: Qt would leave tab bars over the panels that belong to none.
+        """
+        window, state, geometry = self.window, settings.value("state"), settings.value("geometry")
+        if geometry is not None:
+            window.restoreGeometry(geometry)
+        self._fit_screen()
         if state is None or not window.restoreState(state):
-            self.arrange()
-            self.share_room()
+            self.restore_layout()
             return
         for row in DOCKS:
             dock = self.by_name[row.name]
@@ -145,8 +156,22 @@ class Docks(QObject):
         # When the docks have their places.
         QTimer.singleShot(0, self, self.follow)
 
-    def arrange(self) -> None:
-        """Put every dock where it belongs at first."""
+    def _fit_screen(self) -> None:
+        """Make the window no larger than the screen, and keep all of it there."""
+        window, room = self.window, self.window.screen().availableGeometry()
+        window.resize(window.size().boundedTo(room.size()))
+        corner = window.pos()
+        x = min(max(corner.x(), room.left()), room.right() + 1 - window.width())
+        y = min(max(corner.y(), room.top()), room.bottom() + 1 - window.height())
+        if (x, y) != (corner.x(), corner.y()):
+            window.move(x, y)
+
+    def restore_layout(self) -> None:
+        """Put every dock where it belongs at first, with the room it needs."""
+        self._arrange()
+        self._share_room()
+
+    def _arrange(self) -> None:
         window = self.window
         for row in DOCKS:
             dock = self.by_name[row.name]
@@ -163,8 +188,7 @@ class Docks(QObject):
             if not row.after and any(other.after == row.name for other in DOCKS):
                 self.by_name[row.name].raise_()
 
-    def share_room(self) -> None:
-        """Give every dock the room it needs."""
+    def _share_room(self) -> None:
         window = self.window
         heights = {"boundaries": 240, "motion": 330, "run": 90}
         docks = [self.by_name[name] for name in heights]

@@ -12,9 +12,9 @@ from typing import Any
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
 
-from slideviz.case.motion_words import box_words
+from slideviz.case.motion_words import mesh_words
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
 from slideviz.gui.dialogs.exporter import Exports
@@ -37,6 +37,7 @@ from slideviz.gui.viewport.player import Player
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
+from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.icons import redraw_icons
@@ -49,6 +50,7 @@ from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
 from slideviz.session.run_messages import Requirement
 from slideviz.session.store import Store
+from slideviz.session.unsaved import title_of
 
 log = logging.getLogger("slideviz")
 
@@ -99,7 +101,7 @@ class MainWindow(Services):
         self.actions_ = Actions(self)
         self._connect()
         self.set_theme(str(self.settings.value("theme", "system")))
-        self._restore()
+        self.docks_.restore(self.settings)
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
         self.intersection_check = IntersectionCheck(self.store, self)
@@ -112,13 +114,7 @@ class MainWindow(Services):
     # Parts -----------------------------------------------------------------------------
 
     def _make_centre(self, multi_samples: int) -> None:
-        centre = QWidget()
-        column = QVBoxLayout(centre)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.banner)
-        column.addWidget(self.offer)
-        stack = QWidget()
+        centre, stack = QWidget(), QWidget()
         grid = QGridLayout(stack)
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page lies over the view: a view that is never shown has no size.
@@ -130,13 +126,12 @@ class MainWindow(Services):
         grid.addWidget(self.start, 0, 0)
         self.start.raise_()
         self.start.show_recent(self.files.recent())
-        column.addWidget(stack, 1)
         self.player = Player(self.store)
-        column.addWidget(self.player)
+        parts = (self.banner, self.offer, stack, self.player)
+        in_column(*parts, wide=[stack], spacing=0, on=centre)
         self.setCentralWidget(centre)
 
     def _inputs(self) -> Mapping[Path, str]:
-        """Return the files that are not to be written over, and what they are."""
         return self.store.session.inputs()
 
     @property
@@ -195,23 +190,6 @@ class MainWindow(Services):
         self.start.sample_wanted.connect(self.files.open_sample)
         self.start.try_wanted.connect(self.files.try_sample)
 
-    def _restore(self) -> None:
-        state, geometry = self.settings.value("state"), self.settings.value("geometry")
-        if geometry is not None:
-            self.restoreGeometry(geometry)
-        self._fit_screen()
-        self.docks_.restore(state)
-
-    def _fit_screen(self) -> None:
-        """Make the window no larger than the screen, and keep all of it there."""
-        room = self.screen().availableGeometry()
-        self.resize(self.size().boundedTo(room.size()))
-        corner = self.pos()
-        x = min(max(corner.x(), room.left()), room.right() + 1 - self.width())
-        y = min(max(corner.y(), room.top()), room.bottom() + 1 - self.height())
-        if (x, y) != (corner.x(), corner.y()):
-            self.move(x, y)
-
     def toggle_full_screen(self) -> None:
         """Fill the screen with the window, or end that."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
@@ -222,11 +200,6 @@ class MainWindow(Services):
         if folder is not None:
             self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.place, self)
             self.recovery = SessionRecovery(self, self.offer, self.autosave)
-
-    def restore_layout(self) -> None:
-        """Put every panel back to where it was at first."""
-        self.docks_.arrange()
-        self.docks_.share_room()
 
     # The session -----------------------------------------------------------------------
 
@@ -243,20 +216,12 @@ class MainWindow(Services):
                 theme=str(self.settings.value("theme")),
             )
         )
-        name = session.case.source or session.path
-        # The mesh of a run that the case on disk repeats is not what is unsaved of it.
-        lost = session.unsaved_mesh and not session.repeatable
-        changed = "*" if session.unsaved_case or lost else ""
-        self.setWindowTitle(f"{changed}{name.name} – slideviz" if name else "slideviz")
-        mesh = session.mesh
-        if mesh is not None and mesh is not self._measured:
-            self._measured = mesh
-            halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
-            cells = f"{len(mesh.cells):,} cells{halo}"
-            size, box = box_words(mesh)
-            self.mesh_text.setText(f"{mesh.dim}D   {cells}   {len(mesh.points):,} points   {size} ")
-            about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
-            self.mesh_text.setToolTip(about + box)
+        self.setWindowTitle(title_of(session))
+        if session.mesh is not None and session.mesh is not self._measured:
+            self._measured = session.mesh
+            words, about = mesh_words(session.mesh)
+            self.mesh_text.setText(f"{words} ")
+            self.mesh_text.setToolTip(about)
 
     def show_opened(self, opened: jobs.Opened) -> None:
         """Show a mesh that was just opened."""
@@ -365,11 +330,7 @@ class MainWindow(Services):
                 event.ignore()
                 return
             self._closed = True
-            # The next window begins with its panels, and with a frame.
-            self.docks_.show_hidden()
-            self.setWindowState(self.windowState() & ~Qt.WindowState.WindowFullScreen)
-            self.settings.setValue("geometry", self.saveGeometry())
-            self.settings.setValue("state", self.saveState())
+            self.docks_.save(self.settings)
             self.hide()
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()

@@ -79,3 +79,12 @@ class Unsaved:
             if others
             else ""
         )
+
+
+def title_of(session: Session) -> str:
+    """Return the title of the window that shows a session, with a star if something is unsaved."""
+    file = session.case.source or session.path
+    # The mesh of a run that the case on disk repeats is not what is unsaved of it.
+    lost = session.unsaved_mesh and not session.repeatable
+    star = "*" if session.unsaved_case or lost else ""
+    return f"{star}{file.name} – slideviz" if file else "slideviz"

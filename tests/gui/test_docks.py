@@ -297,7 +297,7 @@ for _ in range(2):
     print(tabs(window))
     window.docks["curves"].setFloating(True)
     tabs(window)
-    window.restore_layout()
+    window.docks_.restore_layout()
     print(tabs(window))
     window.close()
     window.deleteLater()

@@ -8,7 +8,8 @@ from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, VectorField, short_text
+from slideviz.gui.widgets.fields import NumberField, short_text
+from slideviz.gui.widgets.vector_field import VectorField
 
 THIRD = 0.005596983152812345
 

@@ -7,7 +7,8 @@ from slideviz.case.key import REDUCTION
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Reduction
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch, VectorField
+from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch
+from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.session import changes
 
 OWN = {"multilevel": "levels", "level_size": "level_end"}

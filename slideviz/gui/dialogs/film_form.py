@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from qtpy.QtCore import QSignalBlocker, Signal
-from qtpy.QtWidgets import QDoubleSpinBox, QFormLayout, QSpinBox, QWidget
+from qtpy.QtWidgets import QFormLayout, QWidget
 
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import LARGEST, SMALLEST
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import FPS, SIZES, Reel, check_film
-from slideviz.gui.widgets.build import check_box, in_row
+from slideviz.gui.widgets.build import check_box, decimal_box, in_row, number_box
 from slideviz.gui.widgets.choice import Choice
 
 KINDS = {
@@ -75,33 +75,28 @@ class FilmForm(QWidget):
         self.kind, self.size_choice = Choice(KINDS), Choice(SIZE_WORDS)
         self.kind.chosen.connect(self._kind_chosen)
         self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = QSpinBox(), QSpinBox()
+        self.width_px, self.height_px = (
+            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
+        )
         self._pixels = in_row(self.width_px, self.height_px)
-        for box in (self.width_px, self.height_px):
-            box.setRange(SMALLEST, LARGEST)
-            box.setSuffix(" px")
-            box.valueChanged.connect(self._pixels_typed)
 
     def _make_pace(self) -> None:
-        self.fps, self.hold = QDoubleSpinBox(), QDoubleSpinBox()
-        self.between = QSpinBox()
-        for box, low, high, value, unit in (
-            (self.fps, 0.5, 50.0, FPS, ""),
-            (self.hold, 0.0, 60.0, Reel().hold, " s"),
-        ):
-            box.setRange(low, high)
-            box.setDecimals(1)
-            box.setSuffix(unit)
-            box.setValue(value)
-            box.valueChanged.connect(self._changed)
-        self.between.setRange(0, 100)
-        # Few steps jump; images in between make about three seconds of them.
-        self.between.setValue(0 if self.frames > 15 else round(3 * FPS / self.frames) - 1)
-        self.between.valueChanged.connect(self._changed)
-        self.fps.setToolTip("Images shown in a second.")
-        self.hold.setToolTip("How long the last image stays before the film ends or begins again.")
-        self.between.setToolTip(
-            "Images between two steps, with the nodes on straight lines from one to the next."
+        self.fps = decimal_box(0.5, 50.0, FPS, self._changed, tip="Images shown in a second.")
+        self.hold = decimal_box(
+            0.0,
+            60.0,
+            Reel().hold,
+            self._changed,
+            unit=" s",
+            tip="How long the last image stays before the film ends or begins again.",
+        )
+        self.between = number_box(
+            0,
+            100,
+            # Few steps jump; images in between make about three seconds of them.
+            0 if self.frames > 15 else round(3 * FPS / self.frames) - 1,
+            self._changed,
+            tip="Images between two steps, with the nodes on straight lines from one to the next.",
         )
 
     # What was chosen -------------------------------------------------------------------

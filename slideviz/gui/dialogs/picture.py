@@ -15,10 +15,8 @@ from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
     QDialogButtonBox,
-    QDoubleSpinBox,
     QFormLayout,
     QLabel,
-    QSpinBox,
     QWidget,
 )
 
@@ -32,10 +30,12 @@ from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.build import (
     boxed,
     check_box,
+    decimal_box,
     dialog_buttons,
     hint_label,
     in_column,
     in_row,
+    number_box,
     set_style,
 )
 from slideviz.gui.widgets.choice import Choice
@@ -127,24 +127,14 @@ class PictureDialog(QDialog):
     def _make_size(self) -> None:
         self.size_choice = Choice(SIZES)
         self.size_choice.chosen.connect(self._size_chosen)
-        self.width_px, self.height_px = QSpinBox(), QSpinBox()
-        for box in (self.width_px, self.height_px):
-            box.setRange(SMALLEST, LARGEST)
-            box.setSuffix(" px")
-            box.valueChanged.connect(self._pixels_typed)
-        self.width_cm, self.height_cm = QDoubleSpinBox(), QDoubleSpinBox()
-        for length, value in zip((self.width_cm, self.height_cm), PAPER, strict=False):
-            length.setRange(1.0, 200.0)
-            length.setDecimals(1)
-            length.setSuffix(" cm")
-            length.setValue(value)
-            length.valueChanged.connect(self._changed)
-        self.dpi = QSpinBox()
-        self.dpi.setRange(50, 1200)
-        self.dpi.setValue(round(PAPER[2]))
-        self.dpi.setSuffix(" dpi")
-        self.dpi.setToolTip("Pixels per inch on paper; journals ask for 300 or more.")
-        self.dpi.valueChanged.connect(self._changed)
+        self.width_px, self.height_px = (
+            number_box(SMALLEST, LARGEST, SMALLEST, self._pixels_typed, unit=" px") for _ in "wh"
+        )
+        self.width_cm, self.height_cm = (
+            decimal_box(1.0, 200.0, length, self._changed, unit=" cm") for length in PAPER[:2]
+        )
+        tip = "Pixels per inch on paper; journals ask for 300 or more."
+        self.dpi = number_box(50, 1200, round(PAPER[2]), self._changed, unit=" dpi", tip=tip)
         self._form = QFormLayout()
         self._form.addRow("Size", self.size_choice)
         self._pixels = boxed(in_row(self.width_px, QLabel("×"), self.height_px, None))

@@ -17,11 +17,10 @@ from slideviz.gui.widgets.fields import (
     NumberBox,
     NumberField,
     Switch,
-    VectorField,
-    a_direction,
     number_text,
 )
 from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.vector_field import VectorField, a_direction
 
 
 def number_field(kind: Kind) -> NumberField:

@@ -21,7 +21,8 @@ from slideviz.case.model import (
 )
 from slideviz.case.motion_words import direction_words, target_words
 from slideviz.gui.panels.motion_form import ABOUT, MotionForm, new_motion
-from slideviz.gui.widgets.fields import NumberField, VectorField
+from slideviz.gui.widgets.fields import NumberField
+from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.session.motions import Axis, radial
 
 Z = (0.0, 0.0, 1.0)

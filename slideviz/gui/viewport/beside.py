@@ -103,6 +103,8 @@ class CameraLink:
     def __init__(self, views: tuple[View3D, View3D], scenes: tuple[Scene, Scene]) -> None:
         self._following = False
         self._tags = []
+        scenes[0].camera.beside, scenes[1].camera.beside = scenes[1].camera, scenes[0].camera
+        self._scenes = scenes
         for leader, follower, view in (
             (scenes[0], scenes[1], views[1]),
             (scenes[1], scenes[0], views[0]),
@@ -128,6 +130,8 @@ class CameraLink:
 
     def end(self) -> None:
         """Let each camera go its own way."""
+        for scene in self._scenes:
+            scene.camera.beside = None
         for camera, tag in self._tags:
             camera.RemoveObserver(tag)
         self._tags = []

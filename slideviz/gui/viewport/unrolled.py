@@ -9,7 +9,7 @@ from slideviz.color_scheme import Look
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.hover import CellHover
+from slideviz.gui.viewport.view_mouse import CellMouse
 from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.elided import ElidedLabel
 from slideviz.gui.widgets.ruler import Ruler
@@ -70,7 +70,7 @@ class FlatView(QWidget):
         self.view.signals.zoomed.connect(self._zoomed)
         self.view.signals.resized.connect(self._resized)
         self._refit = later(self, self.fit)
-        CellHover(self.view, self.scene, store)
+        CellMouse(self.view, self.scene, store)
         # The camera moves by the mouse too: the rulers follow whatever moves it.
         self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
 

@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import QPoint, Qt, Signal
+from qtpy.QtCore import QPoint, Signal
 from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from slideviz.color_scheme import Look
-from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.viewport.beside import CameraLink, TitleBar
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.hover import CellHover
+from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse
 from slideviz.gui.widgets.runs_menu import fill_pane
 from slideviz.scene.color_legend import STRIP
 from slideviz.scene.scene import Scene
@@ -87,11 +86,10 @@ class Viewing(QWidget):
         return view
 
     def _connect(self, view: View3D, scene: Scene) -> None:
-        view.signals.clicked.connect(lambda where, keys: self._clicked(view, scene, where, keys))
-        view.signals.menu_wanted.connect(lambda where: self._menu(view, scene, where))
         view.signals.resized.connect(lambda: self._resized(scene))
         view.signals.unveiled.connect(lambda: scene.update(scene.session))
-        CellHover(view, scene, self.store)
+        CellMouse(view, scene, self.store)
+        BoundaryMouse(view, scene, self.store)
         view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
 
     def _make_second(self, session: Session) -> None:
@@ -110,10 +108,6 @@ class Viewing(QWidget):
         self.second_scene.take_camera(self.scene)
         self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
-        self.scene.camera.beside, self.second_scene.camera.beside = (
-            self.second_scene.camera,
-            self.scene.camera,
-        )
         self._rearranged(not detail)
         self.second.unveil()
         self.second_made.emit()
@@ -180,7 +174,6 @@ class Viewing(QWidget):
         whole = self.scene.sees_all()
         self._link.end()
         self._link = None
-        self.scene.camera.beside = None
         for view in (second, self.view):
             self._grid.removeWidget(view)
         self._grid.addWidget(self.view, 1, 0)
@@ -254,28 +247,6 @@ class Viewing(QWidget):
         return (self.scene,) if self.second_scene is None else (self.scene, self.second_scene)
 
     # Mouse -----------------------------------------------------------------------------
-
-    def _clicked(
-        self, view: View3D, scene: Scene, where: QPoint, modifiers: Qt.KeyboardModifier
-    ) -> None:
-        name = scene.pick(*view.to_pixels(where))
-        chosen = self.store.session.view.selected
-        if modifiers & Qt.KeyboardModifier.ControlModifier and name:
-            rest = tuple(other for other in chosen if other != name)
-            self.store.change(changes.select, rest if name in chosen else (*chosen, name))
-        else:
-            self.store.change(changes.select, (name,) if name else ())
-
-    def _menu(self, view: View3D, scene: Scene, where: QPoint) -> None:
-        if self.store.session.mesh is None:
-            return
-        name = scene.pick(*view.to_pixels(where))
-        chosen = self.store.session.view.selected
-        if name is not None and name not in chosen:
-            self.store.change(changes.select, (name,))
-            chosen = (name,)
-        if chosen:
-            boundary_menu(self.window(), self.store, chosen).popup(view.mapToGlobal(where))
 
     def _zoomed(self, view: View3D, scene: Scene, where: QPoint, factor: float) -> None:
         scene.zoom_at(*view.to_pixels(where), factor)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from qtpy.QtCore import QPoint, QRect, Qt, SignalInstance
 from qtpy.QtWidgets import (
@@ -13,6 +13,7 @@ from qtpy.QtWidgets import (
     QCheckBox,
     QDialog,
     QDialogButtonBox,
+    QDoubleSpinBox,
     QFormLayout,
     QFrame,
     QHBoxLayout,
@@ -22,6 +23,7 @@ from qtpy.QtWidgets import (
     QProgressBar,
     QPushButton,
     QScrollArea,
+    QSpinBox,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -158,6 +160,40 @@ def check_box(text: str, tip: str, toggled: Do | None = None, name: str = "") ->
     box.setToolTip(wrapped(tip))
     if toggled is not None:
         box.toggled.connect(toggled)
+    return box
+
+
+def number_box(
+    low: int, high: int, value: int, changed: Do | None = None, *, unit: str = "", tip: str = ""
+) -> QSpinBox:
+    """Return a field for a whole number in a range, with its unit behind it."""
+    box = QSpinBox()
+    box.setRange(low, high)
+    return _completed(box, value, changed, unit, tip)
+
+
+def decimal_box(
+    low: float,
+    high: float,
+    value: float,
+    changed: Do | None = None,
+    *,
+    unit: str = "",
+    tip: str = "",
+) -> QDoubleSpinBox:
+    """Return a field for a number with one decimal in a range, with its unit behind it."""
+    box = QDoubleSpinBox()
+    box.setRange(low, high)
+    box.setDecimals(1)
+    return _completed(box, value, changed, unit, tip)
+
+
+def _completed(box: Any, value: float, changed: Do | None, unit: str, tip: str) -> Any:
+    box.setValue(value)
+    box.setSuffix(unit)
+    box.setToolTip(tip)
+    if changed is not None:
+        box.valueChanged.connect(changed)
     return box
 
 

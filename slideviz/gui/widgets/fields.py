@@ -5,21 +5,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-from qtpy.QtCore import QEvent, QLocale, Qt, QTimer, Signal
+from qtpy.QtCore import QEvent, QLocale, QSignalBlocker, Qt, Signal
 from qtpy.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QWheelEvent
-from qtpy.QtWidgets import (
-    QApplication,
-    QCheckBox,
-    QHBoxLayout,
-    QLabel,
-    QLineEdit,
-    QSizePolicy,
-    QSpinBox,
-    QWidget,
-)
+from qtpy.QtWidgets import QApplication, QCheckBox, QLineEdit, QSpinBox, QWidget
 
+from slideviz.gui.widgets.build import set_style
 from slideviz.gui.widgets.tips import wrapped
 
 
@@ -195,10 +187,7 @@ class NumberField(QLineEdit):
         """Show that the number is not valid, and why, or that it is."""
         problem = self.problem or self.together
         self.setToolTip(wrapped(problem or self._tip))
-        if bool(self.property("bad")) != bool(problem):
-            self.setProperty("bad", bool(problem))
-            self.style().unpolish(self)
-            self.style().polish(self)
+        set_style(self, "bad", bool(problem))
         if problem != self.fault:
             self.fault = problem
             self.marked.emit()
@@ -232,17 +221,14 @@ class NumberBox(QSpinBox):
     def show_value(self, value: int) -> None:
         """Show a number without telling."""
         if self.value() != value:
-            self.blockSignals(True)
-            self.setValue(value)
-            self.blockSignals(False)
+            with QSignalBlocker(self):
+                self.setValue(value)
 
     def _look(self) -> None:
         fault = "" if self.lineEdit().hasAcceptableInput() else "a number is needed"
         if fault != self.fault:
             self.fault = fault
-            self.setProperty("bad", bool(fault))
-            self.style().unpolish(self)
-            self.style().polish(self)
+            set_style(self, "bad", bool(fault))
             self.marked.emit()
 
 
@@ -254,116 +240,6 @@ class Switch(QCheckBox):
         self.setChecked(on)
 
 
-class VectorField(QWidget):
-    """Two or three numbers in a row.
-
-    ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
-    then, and the change is not told. When the last of them is left, they go back to what they were.
-    """
-
-    changed = Signal(tuple)
-
-    def __init__(
-        self,
-        values: Sequence[float] = (0.0, 0.0, 0.0),
-        allowed: Callable[[Sequence[float]], str] | None = None,
-        names: str = "xyz",
-    ) -> None:
-        super().__init__()
-        self._allowed = allowed or (lambda _: "")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(4)
-        self.fields: list[NumberField] = []
-        self._labels: list[QLabel] = []
-        for name, value in zip(names, values, strict=True):
-            label, field = QLabel(name), NumberField(value)
-            field.setAccessibleName(name)
-            field.changed.connect(lambda _: self._tell())
-            # When it is known where the focus goes.
-            field.editingFinished.connect(lambda: QTimer.singleShot(0, self, self._tidy))
-            row.addWidget(label)
-            row.addWidget(field, 1)
-            self.fields.append(field)
-            self._labels.append(label)
-        self.count = len(self.fields)
-        self._good = self.value
-        self._scale = 0.0
-        self._compare()
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-
-    @property
-    def value(self) -> tuple[float, ...]:
-        """Return the numbers, as many as the mesh has dimensions."""
-        return tuple(field.value for field in self.fields[: self.count])
-
-    @property
-    def problem(self) -> str:
-        """Return why the numbers together are not valid, or an empty text."""
-        return self._allowed(self.value)
-
-    def _tell(self) -> None:
-        if not self.problem:
-            self._good = self.value
-            self.changed.emit(self.value)
-        self._mark()
-
-    def _tidy(self) -> None:
-        if self.problem and not any(field.hasFocus() for field in self.fields):
-            self._write(self._good)
-
-    def _mark(self) -> None:
-        for field in self.fields:
-            field.together = self.problem
-            field.mark()
-
-    def set_count(self, count: int) -> None:
-        """Show the first ``count`` numbers only."""
-        self.count = count
-        for index, (label, field) in enumerate(zip(self._labels, self.fields, strict=True)):
-            label.setVisible(index < count)
-            field.setVisible(index < count)
-
-    def set_scale(self, scale: float) -> None:
-        """Take a length, of the mesh, beside which the smallest numbers are shown as 0."""
-        self._scale = scale
-        self._compare()
-
-    def show_value(self, values: Sequence[float]) -> None:
-        """Show numbers without telling; what is being typed is left if it means the same."""
-        if not (self.problem and tuple(values) == self._good):
-            self._write(values)
-
-    def _write(self, values: Sequence[float]) -> None:
-        self._good = tuple(values)
-        for field, value in zip(self.fields, values, strict=False):
-            field.show_value(value)
-        self._compare()
-        self._mark()
-
-    def _compare(self) -> None:
-        """Show as 0 what is left of it by rounding beside the other numbers."""
-        scale = max(self._scale, *(abs(field.value) for field in self.fields))
-        for field in self.fields:
-            field.set_scale(scale)
-
-    def set_tip(self, text: str) -> None:
-        """Explain the field."""
-        for field in self.fields:
-            field.set_tip(text)
-        self._mark()
-
-
-def positive(value: float) -> str:
-    """Return why a number is not above zero."""
-    return "" if value > 0 else f"{number_text(value)} must be greater than 0"
-
-
 def not_zero(value: float) -> str:
     """Return why a number may not be zero."""
     return "" if value else "0 would flatten the boundary"
-
-
-def a_direction(values: Sequence[float]) -> str:
-    """Return why numbers are no direction."""
-    return "" if any(values) else "an axis needs a direction: not all may be 0"

@@ -9,14 +9,13 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import (
     QDialog,
     QDialogButtonBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QMessageBox,
     QWidget,
 )
 
-from slideviz.gui.widgets.build import dialog_buttons, hint_label
+from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
@@ -142,17 +141,13 @@ def ask_paper(parent: QWidget, width: float, height: float) -> tuple[float, floa
     dialog = QDialog(parent)
     dialog.setWindowTitle("Size of the picture")
     form = QFormLayout(dialog)
-    boxes = QDoubleSpinBox(), QDoubleSpinBox()
-    for box, words, value in zip(boxes, ("Width", "Height, at most"), (width, height), strict=True):
-        box.setRange(4.0, 100.0)
-        box.setDecimals(1)
-        box.setSuffix(" cm")
-        box.setValue(value)
-        form.addRow(words, box)
+    wide, high = (decimal_box(4.0, 100.0, value, unit=" cm") for value in (width, height))
+    form.addRow("Width", wide)
+    form.addRow("Height, at most", high)
     kinds = QDialogButtonBox.StandardButton
     form.addRow(dialog_buttons(dialog, kinds.Ok, kinds.Cancel))
     accepted = dialog.exec() == QDialog.DialogCode.Accepted
-    return (boxes[0].value(), boxes[1].value()) if accepted else None
+    return (wide.value(), high.value()) if accepted else None
 
 
 def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:

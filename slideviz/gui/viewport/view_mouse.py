@@ -1,4 +1,4 @@
-"""Cells under the mouse: described where it rests, marked by a click that means a cell."""
+"""The mouse over a view: tooltips and marks of cells, selection and menu of boundaries."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -8,6 +8,7 @@ from qtpy.QtCore import QEvent, QObject, QPoint, Qt
 from qtpy.QtGui import QHelpEvent, QKeyEvent
 from qtpy.QtWidgets import QToolTip
 
+from slideviz.gui.panels.boundaries import boundary_menu
 from slideviz.gui.panels.worst import info_text
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.scene.flat_scene import FlatScene
@@ -16,7 +17,7 @@ from slideviz.session import changes
 from slideviz.session.store import Store
 
 
-class CellHover(QObject):
+class CellMouse(QObject):
     """The cell under the mouse, in one view: its tooltip, and its mark.
 
     Parameters
@@ -65,3 +66,41 @@ class CellHover(QObject):
         else:
             return False
         return True
+
+
+class BoundaryMouse(QObject):
+    """The boundary under the mouse, in one view: a click selects it, the right button has its menu.
+
+    Parameters
+    ----------
+    view : View3D
+    scene : Scene
+        What it draws.
+    store : Store
+    """
+
+    def __init__(self, view: View3D, scene: Scene, store: Store) -> None:
+        super().__init__(view)
+        self.view, self.scene, self.store = view, scene, store
+        view.signals.clicked.connect(self._select)
+        view.signals.menu_wanted.connect(self._show_menu)
+
+    def _select(self, where: QPoint, modifiers: Qt.KeyboardModifier) -> None:
+        name = self.scene.pick(*self.view.to_pixels(where))
+        selected = self.store.session.view.selected
+        if modifiers & Qt.KeyboardModifier.ControlModifier and name:
+            rest = tuple(other for other in selected if other != name)
+            self.store.change(changes.select, rest if name in selected else (*selected, name))
+        else:
+            self.store.change(changes.select, (name,) if name else ())
+
+    def _show_menu(self, where: QPoint) -> None:
+        if self.store.session.mesh is None:
+            return
+        name = self.scene.pick(*self.view.to_pixels(where))
+        if name is not None and name not in self.store.session.view.selected:
+            self.store.change(changes.select, (name,))
+        selected = self.store.session.view.selected
+        if selected:
+            menu = boundary_menu(self.view.window(), self.store, selected)
+            menu.popup(self.view.mapToGlobal(where))

@@ -1,0 +1,114 @@
+"""A field for a point or a direction: two or three numbers that are checked together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import chain
+
+from qtpy.QtCore import QTimer, Signal
+from qtpy.QtWidgets import QLabel, QSizePolicy, QWidget
+
+from slideviz.gui.widgets.build import in_row
+from slideviz.gui.widgets.fields import NumberField
+
+
+class VectorField(QWidget):
+    """Two or three numbers in a row.
+
+    ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
+    then, and ``changed`` is not emitted. When the last of them is left, they go back to what they
+    were.
+    """
+
+    changed = Signal(tuple)
+
+    def __init__(
+        self,
+        values: Sequence[float] = (0.0, 0.0, 0.0),
+        allowed: Callable[[Sequence[float]], str] | None = None,
+        names: str = "xyz",
+    ) -> None:
+        super().__init__()
+        self._allowed = allowed or (lambda _: "")
+        self.fields = [NumberField(value) for value in values]
+        self._labels = [QLabel(name) for name in names]
+        for label, field in zip(self._labels, self.fields, strict=True):
+            field.setAccessibleName(label.text())
+            field.changed.connect(lambda _: self._tell())
+            # When it is known where the focus goes.
+            field.editingFinished.connect(lambda: QTimer.singleShot(0, self, self._tidy))
+        pairs = chain(*zip(self._labels, self.fields, strict=True))
+        line = in_row(*pairs, wide=self.fields, spacing=4)
+        line.setContentsMargins(0, 0, 0, 0)
+        self.setLayout(line)
+        self.count = len(self.fields)
+        self._good = self.value
+        self._scale = 0.0
+        self._compare()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    @property
+    def value(self) -> tuple[float, ...]:
+        """Return the numbers, as many as the mesh has dimensions."""
+        return tuple(field.value for field in self.fields[: self.count])
+
+    @property
+    def problem(self) -> str:
+        """Return why the numbers together are not valid, or an empty text."""
+        return self._allowed(self.value)
+
+    def _tell(self) -> None:
+        if not self.problem:
+            self._good = self.value
+            self.changed.emit(self.value)
+        self._mark()
+
+    def _tidy(self) -> None:
+        if self.problem and not any(field.hasFocus() for field in self.fields):
+            self._write(self._good)
+
+    def _mark(self) -> None:
+        for field in self.fields:
+            field.together = self.problem
+            field.mark()
+
+    def set_count(self, count: int) -> None:
+        """Show the first ``count`` numbers only."""
+        self.count = count
+        for index, (label, field) in enumerate(zip(self._labels, self.fields, strict=True)):
+            label.setVisible(index < count)
+            field.setVisible(index < count)
+
+    def set_scale(self, scale: float) -> None:
+        """Take a length, of the mesh, beside which the smallest numbers are shown as 0."""
+        self._scale = scale
+        self._compare()
+
+    def show_value(self, values: Sequence[float]) -> None:
+        """Show numbers without telling; what is being typed is left if it means the same."""
+        if not (self.problem and tuple(values) == self._good):
+            self._write(values)
+
+    def _write(self, values: Sequence[float]) -> None:
+        self._good = tuple(values)
+        for field, value in zip(self.fields, values, strict=False):
+            field.show_value(value)
+        self._compare()
+        self._mark()
+
+    def _compare(self) -> None:
+        """Show as 0 what is left of it by rounding beside the other numbers."""
+        scale = max(self._scale, *(abs(field.value) for field in self.fields))
+        for field in self.fields:
+            field.set_scale(scale)
+
+    def set_tip(self, text: str) -> None:
+        """Explain the field."""
+        for field in self.fields:
+            field.set_tip(text)
+        self._mark()
+
+
+def a_direction(values: Sequence[float]) -> str:
+    """Return why numbers are no direction."""
+    return "" if any(values) else "an axis needs a direction: not all may be 0"
