@@ -207,6 +207,18 @@ SELECTIONS: dict[Selection, Term] = {
 }
 """How many control nodes data reduction takes in a cycle."""
 
+DataReduction = Literal["AUTO", "NO", "YES"]
+DATA_REDUCTIONS: dict[DataReduction, Term] = {
+    "AUTO": Term(
+        "automatic",
+        "All boundary nodes where they are few; where they are more than some thousands, as many "
+        "as it takes to follow the motion to a thousandth of it.",
+    ),
+    "NO": Term("off", "All boundary nodes are control nodes: exact, for up to some thousands."),
+    "YES": Term("on", "As many boundary nodes as the tolerance needs; the rest is corrected."),
+}
+"""Whether some of the boundary nodes only are control nodes."""
+
 LevelCriterion = Literal["size", "tol"]
 LEVEL_CRITERIA: dict[LevelCriterion, Term] = {
     "size": Term("by size"),

@@ -9,6 +9,7 @@ from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
 from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, moves, named
 from slideviz.case.motion_text import read_motions, write_motions
+from slideviz.case.reduction_keys import no_tolerance
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, Note
 from slideviz.terms import ROLES, SLIDES
@@ -231,6 +232,14 @@ def idle_settings(case: Case) -> tuple[str, ...]:
         f"{_with_switch(key, case)} is without effect: {key.no_effect}"
         for key in KEYS.values()
         if key.no_effect and key.get(case) != key.get(usual)
+    ]
+    found += [
+        f"{key.name} is without effect: DATA_REDUCTION= AUTO finds the tolerance, YES takes it"
+        for key in KEYS.values()
+        if key.unless is no_tolerance
+        and case.reduction is not None
+        and case.reduction.auto
+        and key.get(case) != key.get(usual)
     ]
     return tuple(Note(text) for text in found)
 

@@ -116,6 +116,9 @@ class Reduction:
         Stop at so many control nodes, whatever the error.
     gamma : float
         The correction reaches ``gamma`` times the largest error (thesis Eq. 2.31).
+    auto : bool
+        Only where the boundary has many nodes, and with a tolerance that is a part of the largest
+        displacement, whatever ``tolerance`` and ``relative`` are.
     """
 
     tolerance: float = 1e-3
@@ -127,6 +130,10 @@ class Reduction:
     relative: float | None = None
     max_nodes: int | None = None
     gamma: float = 25.0
+    auto: bool = False
+
+
+AUTO = Reduction(auto=True)
 
 
 @dataclass(frozen=True)
@@ -140,8 +147,8 @@ class Case:
     where none is given; it and ``curved`` are RBF-SliDe's and without effect, since the matching
     of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0 for as
     many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
-    control nodes are used, ``idw_power`` where it is the number of dimensions. ``view`` has how
-    a window showed the case, by key: it changes no result.
+    boundary nodes are control nodes, however many, ``idw_power`` where it is the number of
+    dimensions. ``view`` has how a window showed the case, by key: it changes no result.
 
     Examples
     --------
@@ -178,7 +185,7 @@ class Case:
     steps_gain: float = 0.02
     influence_factor: float = 2.5
     kernel: str = "wendland-c2"
-    reduction: Reduction | None = None
+    reduction: Reduction | None = AUTO
     idw_power: float | None = None
     idw_fixed_weight: float = 1.0
     quality_metric: Metric = "knupp"

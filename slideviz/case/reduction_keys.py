@@ -8,13 +8,19 @@ from typing import Any
 from slideviz.case.key import NO_DEFAULT, REDUCTION, Key, other_method
 from slideviz.case.model import Case, Reduction
 from slideviz.case.values import YES_NO, Kind, one_of, real, whole
-from slideviz.terms import LEVEL_CRITERIA, SELECTIONS
+from slideviz.terms import DATA_REDUCTIONS, LEVEL_CRITERIA, SELECTIONS, DataReduction
 
 
 def no_reduction(case: Case) -> str:
     """Return why settings of data reduction do nothing in a case."""
     off = "" if case.reduction is not None else "data reduction is off"
     return other_method(case, "rbf") or off
+
+
+def no_tolerance(case: Case) -> str:
+    """Return why a given tolerance of data reduction does nothing in a case."""
+    auto = case.reduction is not None and case.reduction.auto
+    return no_reduction(case) or ("it is automatic" if auto else "")
 
 
 def no_levels(case: Case) -> str:
@@ -47,25 +53,35 @@ def put_double_edge(case: Case, wanted: bool) -> Case:
     return case.change(reduction=replace(case.reduction, selection="double" if wanted else "one"))
 
 
-def put_reduction(case: Case, wanted: bool) -> Case:
+def put_reduction(case: Case, wanted: DataReduction) -> Case:
     """Return the case with data reduction (its settings kept) or without."""
-    return case.change(reduction=(case.reduction or Reduction()) if wanted else None)
+    given = replace(case.reduction or Reduction(), auto=wanted == "AUTO")
+    return case.change(reduction=None if wanted == "NO" else given)
+
+
+def get_reduction(case: Case) -> DataReduction:
+    """Return whether a case asks for data reduction."""
+    if case.reduction is None:
+        return "NO"
+    return "AUTO" if case.reduction.auto else "YES"
 
 
 REDUCTION_ROWS = (
     Key(
         "DATA_REDUCTION",
         REDUCTION,
-        YES_NO,
-        "Interpolate with some of the boundary nodes only; without it the keys below do nothing.",
+        one_of(DATA_REDUCTIONS, {"TRUE": "YES", "FALSE": "NO"}),
+        "Interpolate with some of the boundary nodes only; with NO the keys below do nothing. AUTO "
+        "does so where they are more than 2000, to a thousandth of the largest displacement.",
         put_reduction,
-        lambda case: case.reduction is not None,
-        "NO",
+        get_reduction,
+        "AUTO",
         field="reduction",
         label="Data reduction",
         form="main",
         tip="Interpolate with some of the boundary nodes, as many as the tolerance needs, and "
-        "correct the rest: for meshes whose boundary has more than some thousand nodes.",
+        "correct the rest: for meshes whose boundary has more than some thousand nodes. Automatic: "
+        "where it has.",
         method="rbf",
     ),
     greedy(
@@ -78,6 +94,7 @@ REDUCTION_ROWS = (
         tip="The largest error at the boundary that the control nodes may leave to the "
         "correction, in the mesh's length unit.",
         said="",
+        unless=no_tolerance,
     ),
     greedy(
         "DATA_RED_RELATIVE",
@@ -86,6 +103,7 @@ REDUCTION_ROWS = (
         "The tolerance as a part of the mesh's largest extent, instead of DATA_RED_TOLERANCE.",
         label="a relative tolerance of a case file,",
         said="",
+        unless=no_tolerance,
     ),
     greedy(
         "MULTILEVEL",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.case.reduction_keys import get_reduction
 from slideviz.deformation.solver import Step, folded_at
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
@@ -66,6 +67,12 @@ def run_report(
         },
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
         "control_nodes": [step.control_nodes for step in steps],
+        "control_candidates": last.candidates,
+        "data_reduction": {
+            "asked": get_reduction(case),
+            "used": last.tolerance is not None,
+            "tolerance": last.tolerance,
+        },
         "condition": [s.condition if isfinite(s.condition) else None for s in steps],
         "max_error": max(step.max_error for step in steps),
         "periodic_misfit": max(

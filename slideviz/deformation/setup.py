@@ -36,6 +36,12 @@ from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 
+EXACT_NODES = 2000
+"""Control candidates up to which DATA_REDUCTION= AUTO takes them all."""
+
+AUTO_TOLERANCE = 1e-3
+"""The tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement."""
+
 LOOSE = 0.1
 """A tolerance above this part of the largest displacement leaves much to the correction."""
 
@@ -62,6 +68,8 @@ class Setup:
         The node that stands for all that coincide with it.
     images : (p, 2) int64
         Nodes that stand for their periodic images, and these: they move alike.
+    candidates : int
+        Nodes that could be control nodes; periodic images count as one.
     reduction : Reduction or None
         Settings of the greedy selection; None: all candidates are control nodes.
     axis : (n,) bool
@@ -86,6 +94,7 @@ class Setup:
     target: FloatArray
     same_as: IntArray
     images: IntArray
+    candidates: int
     reduction: Reduction | None
     axis: np.ndarray
     held: IntArray
@@ -169,7 +178,8 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
         case, mesh, moved, alike, boundary=boundary, fans=fans, classes=classes, frame=frame
     )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
-    reduction = _reduction(case, mesh.extent)
+    candidates = _candidates(classes, known)
+    reduction = _reduction(case, mesh.extent, largest, candidates)
     loose = _loose(case, reduction, largest, mesh.extent)
     tracks = find_tracks(
         boundary,
@@ -194,6 +204,7 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
         target=target,
         same_as=_coinciding(mesh, boundary.nodes, images),
         images=images,
+        candidates=candidates,
         reduction=reduction,
         axis=axis,
         held=hold_on_axis(*directions(classes, normals), axis)[2],
@@ -249,11 +260,29 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     return out
 
 
-def _reduction(case: Case, extent: float) -> Reduction | None:
-    """Return the settings of the selection in the solver's terms."""
+def _candidates(classes: Classes, known: IntArray) -> int:
+    """Return how many nodes could be control nodes."""
+    nodes = np.concatenate([known, classes.edge, classes.surface])
+    return int((classes.stands[nodes] == nodes).sum())
+
+
+def _reduction(case: Case, extent: float, largest: float, candidates: int) -> Reduction | None:
+    """Return the settings of the selection in the solver's terms; None for the exact method.
+
+    Parameters
+    ----------
+    extent, largest : float
+        Of the mesh, and the largest displacement.
+    candidates : int
+        Nodes that could be control nodes.
+    """
     given = case.reduction
     if given is None or case.method != "rbf":
         return None
+    if given.auto:
+        if candidates <= EXACT_NODES or not largest > 0.0:
+            return None
+        given = replace(given, tolerance=AUTO_TOLERANCE * largest, relative=None)
     level: Literal["none", "size", "ratio"] = "none"
     if given.multilevel:
         level = "size" if given.criterion == "size" else "ratio"

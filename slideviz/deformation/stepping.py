@@ -92,6 +92,10 @@ class Step:
         The numbers of steps tried by STEPS= auto, in the last step of the run.
     control : (c,) int64
         The control nodes of this step; empty where a method has none.
+    candidates : int
+        Nodes that could have been control nodes; periodic images count as one.
+    tolerance : float or None
+        Of the data reduction, in the mesh's length unit; None where there was none.
     periodic_misfit : float or None
         Largest difference of the displacements of periodic images so far, in the mesh's length
         unit: rounding, for more is an error. None where images need not move alike.
@@ -109,6 +113,8 @@ class Step:
     history: tuple[Cycle, ...] = ()
     tried: tuple[Trial, ...] = ()
     control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    candidates: int = 0
+    tolerance: float | None = None
     periodic_misfit: float | None = None
 
 
@@ -212,6 +218,8 @@ class Stepping:
             warnings=tuple(warnings),
             history=solution.history,
             control=solution.control,
+            candidates=setup.candidates,
+            tolerance=setup.reduction.tolerance if setup.reduction else None,
             periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
         )
 

@@ -234,12 +234,10 @@ class MainWindow(Services):
         self.player.stop()
         self.viewing.open(opened, session)
         self.store.put(session)
-        if session.reduction_guess:
-            log.info("%s", session.reduction_guess)
         remarks = () if session.mesh is None else session.mesh.remarks
         for remark in remarks:
             log.warning("%s", remark)
-        note = "".join(f". {text}" for text in (*remarks, session.reduction_guess) if text)
+        note = "".join(f". {text}" for text in remarks)
         self.say(f"Opened {(session.case.source or session.path).name}{note}")
 
     # Jobs ------------------------------------------------------------------------------

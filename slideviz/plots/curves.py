@@ -58,18 +58,9 @@ def greedy_run(session: Session) -> GreedyRun | None:
         np.array([cycle.control_nodes for cycle in cycles]),
         np.array([cycle.error for cycle in cycles]),
         np.array([cycle.level for cycle in cycles]),
-        _tolerance(run, session),
+        frame.step.tolerance,
         look_of(run),
     )
-
-
-def _tolerance(run: Run, session: Session) -> float | None:
-    reduction = run.case.reduction
-    if reduction is None or session.mesh is None:
-        return None
-    if reduction.relative is None:
-        return reduction.tolerance
-    return reduction.relative * session.mesh.extent
 
 
 class Profiles:

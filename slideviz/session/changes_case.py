@@ -52,8 +52,7 @@ def confirm(session: Session, names: Iterable[str] | None = None) -> Session:
 @undoable("settings")
 def set_case(session: Session, **values: Any) -> Session:
     """Return the session with other settings of the case."""
-    guess = "" if "reduction" in values else session.reduction_guess
-    return replace(session, case=session.case.change(**values), reduction_guess=guess)
+    return replace(session, case=session.case.change(**values))
 
 
 def set_invalid(session: Session, place: Place, sentences: tuple[str, ...]) -> Session:

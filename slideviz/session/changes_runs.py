@@ -113,7 +113,7 @@ def take_settings(session: Session, number: int) -> Session:
     run = session.run(number)
     if run is None:
         return session
-    return replace(session, case=run.case, guesses={}, reduction_guess="")
+    return replace(session, case=run.case, guesses={})
 
 
 def seen_beside(session: Session) -> Session:

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from slideviz.case.model import Case, Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
@@ -16,10 +14,6 @@ from slideviz.session.changes_view import flat_one
 from slideviz.session.keep import kept_view
 from slideviz.session.state import Frame, Guess, Run, Session, ViewState
 from slideviz.terms import ColourBy, Role
-
-MANY_NODES = 20_000
-"""Boundary nodes from which on a mesh is opened with data reduction."""
-
 
 RELATIVE_TOLERANCE = 1e-5
 
@@ -39,23 +33,7 @@ def open_mesh(
     view = replace(view, chosen=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
-    session = Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
-    return session if case is not None else _guess_reduction(session, mesh)
-
-
-def _guess_reduction(session: Session, mesh: Mesh) -> Session:
-    """Return the session with data reduction where all boundary nodes would be too many."""
-    if not mesh.markers:
-        return session
-    count = len(np.unique(np.concatenate([marker.nodes for marker in mesh.markers])))
-    if count <= MANY_NODES:
-        return session
-    case = session.case.change(reduction=suggested_reduction(mesh))
-    why = (
-        f"Data reduction is a guess: without it, {count:,} boundary nodes would need up to "
-        f"{2.6 * 8 * count**2 / 1e9:.0f} GB of memory."
-    )
-    return replace(session, case=case, saved=case, reduction_guess=why)
+    return Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
 
 
 def suggested_reduction(mesh: Mesh) -> Reduction:

@@ -35,6 +35,8 @@ def reduction_words(case: Case) -> str:
     given = case.reduction
     if given is None or case.method != "rbf":
         return "all nodes"
+    if given.auto:
+        return "automatic data reduction"
     part = _number_words(given.relative or given.tolerance)
     part += " of the extent" if given.relative else ""
     levels = ", in levels" if given.multilevel else ""

@@ -153,8 +153,6 @@ class Session:
         The highest number that a run was given, removed ones too.
     saved : Case or None
         What is on disk, or what was there at the start.
-    reduction_guess : str
-        Why data reduction was switched on without being asked for; empty when it was not.
     clash : str
         What the motions put through what, in a sentence; empty as far as is known.
     invalid : tuple of (Place, str)
@@ -172,7 +170,6 @@ class Session:
     shown: int | None = None
     saved: Case | None = None
     view: ViewState = field(default_factory=ViewState)
-    reduction_guess: str = ""
     clash: str = ""
     invalid: tuple[tuple[Place, str], ...] = ()
     removed: tuple[Run, ...] = ()

@@ -56,7 +56,6 @@ class Memento:
 
     case: Case
     guesses: Mapping[str, Guess]
-    reduction_guess: str
     style: ViewState
     removed: frozenset[int] = frozenset()
     shown: int | None = field(default=None, compare=False)
@@ -67,7 +66,6 @@ class Memento:
         return cls(
             session.case,
             session.guesses,
-            session.reduction_guess,
             session.view.style,
             frozenset(run.number for run in session.removed),
             session.shown,
@@ -89,7 +87,6 @@ class Memento:
             session,
             case=case,
             guesses=self.guesses,
-            reduction_guess=self.reduction_guess,
             view=replace(style, **passing),
         )
 

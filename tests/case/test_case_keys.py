@@ -268,7 +268,13 @@ class TestSetKey:
         case = set_key(set_key(Case(), "DATA_REDUCTION", "YES"), "GAMMA", "3")
         assert case.reduction == Reduction(gamma=3.0)
         assert set_key(case, "DATA_REDUCTION", "YES").reduction == case.reduction
-        assert set_key(case, "DATA_REDUCTION", "NO") == Case()
+        assert set_key(case, "DATA_REDUCTION", "NO") == Case(reduction=None)
+        assert set_key(case, "DATA_REDUCTION", "AUTO").reduction == Reduction(gamma=3.0, auto=True)
+        assert set_key(Case(), "DATA_REDUCTION", "auto") == Case()
+
+    def test_settings_of_data_reduction_need_it(self):
+        with pytest.raises(CaseError, match="--set GAMMA=5: it needs DATA_REDUCTION= YES; set tha"):
+            set_key(Case(reduction=None), "GAMMA", "5")
 
     @pytest.mark.parametrize(("word", "selection"), [("YES", "double"), ("NO", "one")])
     def test_double_edge_is_a_selection(self, word, selection):
@@ -285,7 +291,6 @@ class TestSetKey:
         [
             ("STEP", "1", "--set STEP=1: unknown key 'STEP'; did you mean STEPS?"),
             ("STEPS", "0", "--set STEPS=0: 0 is too small; needed is a whole number from 1"),
-            ("GAMMA", "5", "--set GAMMA=5: it needs DATA_REDUCTION= YES; set that first"),
             ("MOTION", "(A)", "--set MOTION=(A): motion 1: needed are a marker and one of"),
         ],
     )
@@ -340,7 +345,10 @@ def test_a_kind_says_why_a_text_is_no_value_and_what_the_window_calls_one():
         ("IDW_POWER", Case(), "RBF interpolation does not use it"),
         ("IDW_POWER", Case(method="elastic"), "linear elasticity does not use it"),
         ("GAMMA", Case(method="elastic"), "linear elasticity does not use it"),
-        ("GAMMA", Case(), "data reduction is off"),
+        ("GAMMA", Case(reduction=None), "data reduction is off"),
+        ("GAMMA", Case(), ""),
+        ("DATA_RED_TOLERANCE", Case(), "it is automatic"),
+        ("DATA_RED_TOLERANCE", Case(reduction=Reduction()), ""),
         ("LVL_SIZE", Case(reduction=Reduction()), "there are no levels"),
         ("LVL_SIZE", Case(reduction=Reduction(multilevel=True)), ""),
         ("PERIODIC_AXIS", Case(), "no boundary has the role “periodic”"),

@@ -92,7 +92,7 @@ def test_convergence_of_the_shown_step_or_why_there_is_none(full, qtbot):
         SimpleNamespace(control_nodes=4 * k, error=0.1 / k, level=1) for k in range(1, 6)
     )
     run = session.runs[1]
-    step = SimpleNamespace(index=2, history=cycles, seconds={})
+    step = SimpleNamespace(index=2, history=cycles, seconds={}, tolerance=0.02)
     frames = (run.frames[0], replace(run.frames[1], step=step))
     with qtbot.waitSignal(full.canvas.drawn):
         full.store.put(replace(session, runs=(session.runs[0], replace(run, frames=frames))))

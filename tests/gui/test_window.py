@@ -12,12 +12,12 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QMenu, QToolButton
 
 from slideviz import Case, read
-from slideviz.case.model import FromFile, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import AUTO, FromFile, Reduction, Rotate, Scale, Translate
 from slideviz.errors import Note
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
 from slideviz.mesh.quality import INVERTED
-from slideviz.session import changes, jobs, opening
+from slideviz.session import changes, jobs
 from slideviz.session.run_messages import ended
 from slideviz.session.runs_table import described
 
@@ -450,10 +450,15 @@ def test_data_reduction_has_a_tolerance_and_keeps_its_settings(opened):
     method, more = opened.window.method, opened.window.method.more
     opened.window.docks["method"].raise_()
     opened.click(more.button)
-    assert not method.tolerance.isEnabled()
-    assert "data reduction is off" in method.tolerance.toolTip()
+    assert opened.session.case.reduction == AUTO
+    assert method.reduction.currentText() == "automatic"
+    assert not method.tolerance.isVisible()
+    assert more.selection.isEnabled()
+    opened.choose(method.reduction, "NO")
+    assert opened.session.case.reduction is None
     assert "data reduction is off" in more.selection.toolTip()
-    method.reduction.click()
+    opened.choose(method.reduction, "YES")
+    assert method.tolerance.isVisible()
     given = opened.session.case.reduction
     extent = opened.session.mesh.extent
     assert given.tolerance == pytest.approx(1e-5 * extent, rel=0.05)
@@ -467,9 +472,9 @@ def test_data_reduction_has_a_tolerance_and_keeps_its_settings(opened):
     opened.type(more.gamma, "30")
     wanted = Reduction(0.002, True, "tol", 0.25, selection="double", gamma=30.0)
     assert opened.session.case.reduction == wanted
-    method.reduction.click()
+    opened.choose(method.reduction, "NO")
     assert opened.session.case.reduction is None
-    method.reduction.click()
+    opened.choose(method.reduction, "YES")
     assert opened.session.case.reduction == wanted
 
 
@@ -487,19 +492,6 @@ def test_all_kernels_can_be_chosen(opened):
     kernel = opened.window.method.more.kernel
     assert kernel.count() == 14
     assert {kernel.itemData(row) for row in range(14)} >= {"wendland-c2", "gaussian"}
-
-
-def test_a_guessed_data_reduction_says_why_until_it_is_changed(opened, monkeypatch):
-    monkeypatch.setattr(opening, "MANY_NODES", 10)
-    opened.open(opened.session.path)
-    method = opened.window.method
-    opened.window.docks["method"].raise_()
-    assert method.reduction.isChecked()
-    assert "boundary nodes" in method.guess_text.text()
-    assert "Data reduction is a guess" in opened.window.statusBar().currentMessage()
-    opened.type(method.tolerance, "0.01")
-    assert not method.guess_text.text()
-    assert opened.session.case.reduction.tolerance == 0.01
 
 
 # Running ----------------------------------------------------------------------------------

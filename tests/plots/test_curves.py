@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from slideviz.case.model import Reduction
 from slideviz.errors import SlidevizError
 from slideviz.mesh.quality import quality
 from slideviz.plots import curves
@@ -21,7 +20,7 @@ def run_of(session, sizes, history=()):
     for index, size in enumerate(sizes):
         points = session.mesh.points + size * rng.uniform(-1, 1, session.mesh.points.shape)
         mesh = session.mesh.with_points(points)
-        step = SimpleNamespace(index=index + 1, history=history, seconds={})
+        step = SimpleNamespace(index=index + 1, history=history, seconds={}, tolerance=0.02)
         frames.append(Frame(mesh, quality(mesh, session.mesh), step))
     session = changes.add_frames(changes.start_run(session), frames)
     return changes.end_run(session, "done")
@@ -58,8 +57,7 @@ def test_convergence_is_that_of_the_step_that_is_shown(session):
     cycles = tuple(
         SimpleNamespace(control_nodes=2 * k, error=0.1 / k, level=1 + k // 3) for k in range(1, 5)
     )
-    case = session.case.change(reduction=Reduction(tolerance=0.02))
-    session = run_of(replace(session, case=case), (0.1, 0.2), cycles)
+    session = run_of(session, (0.1, 0.2), cycles)
     found = curves.greedy_run(changes.show_frame(session, 1))
     assert found.label == "run 1, step 1"
     assert found.control_nodes.tolist() == [2, 4, 6, 8]
@@ -67,13 +65,6 @@ def test_convergence_is_that_of_the_step_that_is_shown(session):
     assert found.level.tolist() == [1, 1, 2, 2]
     assert found.tolerance == 0.02
     assert curves.greedy_run(changes.show_frame(session, 0)) is None
-
-
-def test_a_relative_tolerance_is_told_as_a_length(session):
-    cycle = SimpleNamespace(control_nodes=2, error=0.1, level=1)
-    case = session.case.change(reduction=Reduction(relative=1e-3))
-    session = run_of(replace(session, case=case), (0.1,), (cycle,))
-    assert curves.greedy_run(session).tolerance == pytest.approx(4e-3)
 
 
 def test_without_data_reduction_there_is_no_convergence(two_runs):

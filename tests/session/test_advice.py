@@ -59,14 +59,15 @@ def test_a_large_exact_run_is_told_beforehand(monkeypatch):
     points = np.random.default_rng(1).random((30_000, 2))
     mesh = Mesh(points, Cells.from_blocks([(5, np.array([[0, 1, 2]]))]), (line,))
     monkeypatch.setattr(solver, "free_memory", lambda: 12e9)
-    text = exact_cost(Case(steps=3), mesh)
+    text = exact_cost(Case(steps=3, reduction=None), mesh)
     assert text.startswith("30,000 control nodes, without data reduction: about 19 GB of memory ")
     assert "(12 GB are free) and 45 minutes, more or less." in text
     monkeypatch.setattr(solver, "free_memory", lambda: float("inf"))
-    assert "free" not in exact_cost(Case(), mesh)
+    assert "free" not in exact_cost(Case(reduction=None), mesh)
     for small in (
+        Case(),
         Case(reduction=Reduction()),
         Case(method="idw"),
-        Case(roles={"wall": "internal"}),
+        Case(roles={"wall": "internal"}, reduction=None),
     ):
         assert exact_cost(small, mesh) == ""

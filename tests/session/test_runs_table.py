@@ -122,7 +122,8 @@ def test_words_of_methods_and_choices(runs):
     case = runs[0].case
     assert method_words(case.change(sliding="none")) == "no sliding"
     assert method_words(case.change(method="elastic")) == "linear elasticity"
-    assert reduction_words(case) == "all nodes"
+    assert reduction_words(case) == "automatic data reduction"
+    assert reduction_words(case.change(reduction=None)) == "all nodes"
     given = Reduction(relative=1e-5, multilevel=True, max_nodes=2000)
     words = reduction_words(case.change(reduction=given))
     assert words == "reduced to 1e-05 of the extent, in levels, at most 2,000 nodes"

@@ -4,11 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slideviz.case.model import Case, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import AUTO, Case, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
-from slideviz.session import changes, opening
+from slideviz.session import changes
 from slideviz.session.state import Frame, Session, essence
 from slideviz.session.store import Store
 
@@ -214,25 +214,13 @@ def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
     assert np.array_equal(new.mesh.points, session.mesh.points)
 
 
-def test_a_mesh_with_many_boundary_nodes_opens_with_data_reduction(square, monkeypatch):
+def test_a_mesh_opens_with_automatic_data_reduction_unless_its_case_says_otherwise(square):
     first = Frame(square, quality(square))
-    assert changes.open_mesh(first, None).case.reduction is None
-    monkeypatch.setattr(opening, "MANY_NODES", 15)
     session = changes.open_mesh(first, None)
-    assert session.case.reduction.tolerance == pytest.approx(4e-5)
-    assert "16 boundary nodes" in session.reduction_guess
+    assert session.case.reduction == AUTO
     assert not session.unsaved_case
-    assert not changes.set_case(session, reduction=None).reduction_guess
-    assert changes.set_case(session, steps=2).reduction_guess
-    monkeypatch.setattr(opening, "MANY_NODES", 16)
-    assert changes.open_mesh(first, None).case.reduction is None
-
-
-def test_a_case_is_not_given_data_reduction(square, monkeypatch):
-    monkeypatch.setattr(opening, "MANY_NODES", 1)
-    session = changes.open_mesh(Frame(square, quality(square)), None, case=Case())
-    assert session.case.reduction is None
-    assert not session.reduction_guess
+    exact = Case(reduction=None)
+    assert changes.open_mesh(first, None, case=exact).case.reduction is None
 
 
 def test_store_tells_nobody_when_nothing_changed(session):

@@ -12,8 +12,9 @@ from qtpy.QtWidgets import QFormLayout, QWidget
 from slideviz.case.key import Key
 from slideviz.case.keys import KEYS
 from slideviz.case.method_keys import nothing_slides
-from slideviz.case.model import Case, Reduction
+from slideviz.case.model import AUTO, Case, Reduction
 from slideviz.case.periodic_keys import no_pair
+from slideviz.case.reduction_keys import get_reduction, put_reduction
 from slideviz.gui.panels.key_form import KeyForm
 from slideviz.gui.widgets.build import (
     PanelScroll,
@@ -33,7 +34,7 @@ from slideviz.session.motions import found_text
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
-from slideviz.terms import LEVEL_CRITERIA, labels
+from slideviz.terms import LEVEL_CRITERIA, DataReduction, labels
 
 LEVEL_ENDS = {"size": KEYS["LVL_SIZE"], "tol": KEYS["LVL_TOL_CRIT"]}
 """The key that says where a level ends, by the criterion."""
@@ -110,8 +111,7 @@ class MethodPanel(Panel):
         for part in (self, self.more):
             for name, field in part.form.fields.items():
                 setattr(part, name, field)
-        self.found, self.guess_text = hint_label(), hint_label()
-        self.tolerance_hint, self.reason = hint_label(), hint_label()
+        self.found, self.tolerance_hint, self.reason = hint_label(), hint_label(), hint_label()
         self.tolerance_hint.setWordWrap(False)
         self._complete_form()
         parts = (self.form, self.reason, self.more, None)
@@ -123,14 +123,13 @@ class MethodPanel(Panel):
     def _complete_form(self) -> None:
         """Say in the form what belongs to its fields."""
         form, fields = self.form, self.form.fields
-        fields["reduction"].setText("Use fewer control nodes")
         row, _ = _position(form, fields["origin"])
         form.insertRow(row + 1, "", self.found)
         row, role = _position(form, fields["tolerance"])
         form.removeWidget(fields["tolerance"])
         wide = fields["tolerance"]
-        form.setWidget(row, role, boxed(in_row(wide, self.tolerance_hint, wide=[wide])))
-        form.addRow(self.guess_text)
+        self._tolerance_row = boxed(in_row(wide, self.tolerance_hint, wide=[wide]))
+        form.setWidget(row, role, self._tolerance_row)
 
     def _connect(self) -> None:
         self.form.changed.connect(self._set)
@@ -166,11 +165,13 @@ class MethodPanel(Panel):
         if changed:
             self.store.change(changes.set_case, **changed)
 
-    def _reduce(self, case: Case, on: bool) -> Case:
+    def _reduce(self, case: Case, wanted: DataReduction) -> Case:
         # What was set before it was switched off comes back with it.
         mesh = self.store.session.mesh
-        first = self._reduction or (changes.suggested_reduction(mesh) if mesh else Reduction())
-        return case.change(reduction=first if on else None)
+        first = self._reduction or AUTO
+        if wanted == "YES" and first == AUTO and mesh is not None:
+            first = changes.suggested_reduction(mesh)
+        return put_reduction(case.change(reduction=first), wanted)
 
     def _tolerate(self, case: Case, value: float) -> Case:
         given = case.reduction or Reduction()
@@ -210,17 +211,14 @@ class MethodPanel(Panel):
         tolerance = self.form.fields["tolerance"]
         assert isinstance(tolerance, NumberField)
         part = f"{tolerance.value / extent:.3g} of the extent" if extent else ""
-        self.tolerance_hint.setText(part if case.reduction is not None else "")
+        self.tolerance_hint.setText(part)
+        self.form.setRowVisible(self._tolerance_row, get_reduction(case) == "YES")
         reasons = (("Sliding", nothing_slides(case)), ("Periodicity", no_pair(case)))
         why = "\n".join(f"{title}: {why}." for title, why in reasons if why)
         self.reason.setText(why if session.mesh is not None else "Open a mesh first.")
         self.reason.setVisible(bool(self.reason.text()))
-        for label, text in (
-            (self.found, found_text(session)),
-            (self.guess_text, session.reduction_guess),
-        ):
-            label.setText(text)
-            self.form.setRowVisible(label, bool(text))
+        self.found.setText(found_text(session))
+        self.form.setRowVisible(self.found, bool(self.found.text()))
 
 
 def _position(form: QFormLayout, field: QWidget) -> tuple[int, QFormLayout.ItemRole]:
