@@ -17,7 +17,7 @@ Names = tuple[Callable[[str], str], Callable[[str], str]]
 KEYS: Names = (lambda method: f"method {method}", lambda mode: f"periodic {mode}")
 """As the options of the command call them."""
 
-TITLES: Names = (lambda method: COMPARED_METHODS[method][0], lambda mode: MODES[mode])  # type: ignore[index]
+TITLES: Names = (lambda method: COMPARED_METHODS[method][0], lambda mode: MODES[mode])
 """As figures call them."""
 
 
