@@ -1,4 +1,4 @@
-"""Colours of light and dark views, and of what is to be seen at once in both."""
+"""Color schemes of light and dark views and of paper, and colours that are alike in all."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ INVERTED_COLOUR = "#e8112d"
 SELECTED_COLOUR = "#ffb000"
 VALUE_EDGE = "#000000"
 """Lines between cells in the colours of values or roles: what all maps are seen best under."""
-CLASH_COLOUR = "#e8112d"
+INTERSECTION_COLOUR = "#e8112d"
 """The motion ghost where it runs into another boundary."""
 
 

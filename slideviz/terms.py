@@ -1,4 +1,4 @@
-"""Every enumeration once: its values, and what each is called, means and is drawn in.
+"""Every enumeration once: its values, with their labels, tips and colours.
 
 The values are those of a case file and of the command line. A type (``Sliding``) says which there
 are; the table beside it (``SLIDING``) has the words, and every list, check, option, legend and tip
@@ -35,7 +35,7 @@ class Term:
 
     @property
     def name(self) -> str:
-        """Return what it is called where no heading stands above it."""
+        """Return the label of the value where no heading stands above it."""
         return self.alone or self.label
 
 
@@ -156,7 +156,7 @@ Method = Literal["rbf", "idw", "elastic"]
 
 @dataclass(frozen=True)
 class MethodTerm(Term):
-    """A method; ``slides_by`` is the value of SLIDING_MODE that it is compared with others by."""
+    """A method; ``slides_by`` is the value of SLIDING_MODE for its comparison with others."""
 
     slides_by: Sliding = "ps"
 
@@ -291,13 +291,13 @@ ColourBy = Literal["role", "size-skew", "size", "skew", "displacement"]
 
 @dataclass(frozen=True)
 class ColourByTerm(Term):
-    """What colours can show; ``unit`` is empty where it is a number without one."""
+    """A quantity that colours can show; ``unit`` is empty for a number without one."""
 
     unit: str = ""
 
     @property
     def axis(self) -> str:
-        """Return what an axis of a plot is called."""
+        """Return the label of an axis of a plot."""
         return f"{self.label} {self.unit or '[-]'}"
 
 
@@ -315,7 +315,7 @@ QUANTITIES: dict[Quantity, ColourByTerm] = {value: COLOUR_BY[value] for value in
 
 
 def quantity_of(colour_by: ColourBy) -> Quantity:
-    """Return the number of a cell that colours show, or size-skew where they show roles."""
+    """Return the quantity of colours, or size-skew where they show roles."""
     return "size-skew" if colour_by == "role" else colour_by
 
 

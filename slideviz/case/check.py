@@ -22,7 +22,7 @@ _LISTED = 12
 
 
 def check_case(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return what stands in the way of deforming this mesh, a sentence each; empty if nothing.
+    """Return the reasons against deforming this mesh, a sentence each; empty if nothing.
 
     Displacement files are not read here.
     """
@@ -61,7 +61,7 @@ def raise_all(problems: tuple[str, ...]) -> None:
 
 
 def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
-    """Return what the case contradicts in itself: the keys involved, and a sentence.
+    """Return the contradictions in the case: the keys involved, and a sentence.
 
     What only matters when the case is run is not here, so that ``--set`` can put it right.
     """
@@ -89,7 +89,7 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
 
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
-    """Return which markers of the case the mesh lacks, and whether any marker moves."""
+    """Return the markers of the case that the mesh lacks, and whether any marker moves."""
     known = mesh.marker_names
     names = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
     has = f"it has {names}" if known else "it has none"

@@ -79,11 +79,11 @@ class Key:
 
     @property
     def title(self) -> str:
-        """Return its label with its unit."""
+        """Return the label with the unit."""
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
     def idle(self, case: Case) -> str:
-        """Return why it does nothing in a case; empty where it does something."""
+        """Return why the key does nothing in a case; empty where it does something."""
         return other_method(case, self.method) or self.unless(case)
 
 

@@ -42,7 +42,7 @@ def describe(motion: Motion, dim: int = 2, extent: float = 0.0) -> str:
 
 
 def target_words(target: Target) -> str:
-    """Return what a motion moves, in words."""
+    """Return the markers that a motion moves, in words."""
     return " + ".join(named(target)) or "all moving"
 
 
@@ -65,7 +65,7 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
 
 
 def deformation(case: Case) -> tuple[object, ...]:
-    """Return what a case asks of the boundaries: the same for cases that can be compared."""
+    """Return the part of a case that moves boundaries: the same for cases to compare."""
     return frozenset(case.markers_with("moving")), case.motions
 
 

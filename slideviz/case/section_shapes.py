@@ -11,7 +11,7 @@ from math import inf
 
 @dataclass(frozen=True)
 class Words:
-    """What people read of a shape in meshes of 3 or of 2 dimensions.
+    """The words for a shape in meshes of 3 or of 2 dimensions.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Size:
-    """The number that a shape has beside a point and a direction; it is above 0.
+    """The number of a shape beside a point and a direction; it is above 0.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Size:
     usual: float = 1.0
 
     def fault(self, value: float) -> str:
-        """Return why a number cannot be one, after its value; nothing where it can."""
+        """Return why a number is no size, after its value; nothing where it is one."""
         if not value > 0:
             return "is not positive"
         return "" if value < self.high else f"is not below {self.high:g}"
@@ -74,7 +74,7 @@ class Size:
 
 @dataclass(frozen=True)
 class ShapeTerms:
-    """How a shape is called and written.
+    """The names, numbers and words of a shape.
 
     Attributes
     ----------
@@ -122,16 +122,16 @@ class ShapeTerms:
 
     @property
     def count(self) -> int:
-        """Return how many numbers a case file has of it: size, direction and point."""
+        """Return how many numbers a shape has in a case file: size, direction and point."""
         return 6 if self.size is None else 7
 
     def point_tip(self, dim: int) -> str:
-        """Return what its point is."""
+        """Return the tip of the point."""
         name = self.words[dim].name.lower()
         return f"The middle of the {name}" if dim == 2 else self.about.capitalize()
 
     def tip(self, dim: int) -> str:
-        """Return what the number is that a slider moves."""
+        """Return the tip of the number that a slider moves."""
         if self.size is not None:
             return f"The {self.size.word}, in {self.size.unit}."
         name = self.words[dim].name.lower()
@@ -267,6 +267,6 @@ SECTION_SHAPES = {
 
 
 def names(dim: int = 3) -> str:
-    """Return what shapes are called in meshes of 3 or 2 dimensions, as a list in a sentence."""
+    """Return the names of shapes in meshes of 3 or 2 dimensions, as a list in a sentence."""
     every = [row.words[dim].name.lower() for row in SECTION_SHAPES.values() if dim in row.words]
     return f"{', '.join(every[:-1])} or {every[-1]}"

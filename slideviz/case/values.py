@@ -85,7 +85,7 @@ class Kind:
         return ""
 
     def called(self, text: str) -> str:
-        """Return what the window calls the value that a text of a case file stands for."""
+        """Return the window's word for the value of a text of a case file."""
         try:
             return self.words.get(self.read(text), text)
         except CaseError:

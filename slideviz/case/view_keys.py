@@ -119,7 +119,7 @@ SECTIONS = Kind(
 
 
 def hyphened(shown: str) -> str:
-    """Return what a case file calls something that is drawn or not."""
+    """Return the word of a case file for something that is drawn or not."""
     return shown.replace("_", "-")
 
 

@@ -29,12 +29,12 @@ class Word:
     quoted: bool = False
 
     def is_sign(self, sign: str) -> bool:
-        """Tell whether it is this bracket, comma or semicolon."""
+        """Tell whether the word is this bracket, comma or semicolon."""
         return not self.quoted and self.text == sign
 
     @property
     def is_number(self) -> bool:
-        """Whether it reads as a number."""
+        """Tell whether the word reads as a number."""
         return not self.quoted and is_number(self.text)
 
 
@@ -160,7 +160,7 @@ def shown(text: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean X?`` with the known name that is most like this, or nothing."""
+    """Return ``; did you mean X?`` with the known name most like a text, or nothing."""
     by_lower = {other.lower(): other for other in known}
     close = get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
     return f"; did you mean {by_lower[close[0]]}?" if close else ""

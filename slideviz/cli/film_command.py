@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from slideviz.session.state import Frame, Run
 
 SMOOTH = 4
-"""Films of fewer steps are told that images can be put in between."""
+"""Films of fewer steps get a hint at images in between."""
 
 
 def add_film(calls: argparse._SubParsersAction) -> None:
@@ -104,7 +104,7 @@ def film(arguments: argparse.Namespace) -> int:
     if not arguments.quiet:
         _print_film(arguments, reel, runs)
     for run in runs:
-        _tell_inverted(arguments, run)
+        _print_inverted(arguments, run)
     return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
 
 
@@ -183,7 +183,7 @@ def _print_film(arguments: argparse.Namespace, reel: Reel, runs: list[Run]) -> N
         print("few steps; --between 20 puts 20 images between two of them")
 
 
-def _tell_inverted(arguments: argparse.Namespace, run: Run) -> None:
+def _print_inverted(arguments: argparse.Namespace, run: Run) -> None:
     last = run.frames[-1].quality
     if last.inverted:
         name = f"{run.name}: " if run.name else ""

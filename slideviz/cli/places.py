@@ -105,10 +105,10 @@ def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
         else:
             require_writable(one.path, CaseError, one.replaces)
     if not getattr(arguments, "quiet", False):
-        _tell_replaced([one for one in there if not one.named])
+        _print_replaced([one for one in there if not one.named])
 
 
-def _tell_replaced(unnamed: list[Output]) -> None:
+def _print_replaced(unnamed: list[Output]) -> None:
     """Say before the work which older files it will replace, in one line."""
     old_files = []
     for one in unnamed:

@@ -35,11 +35,11 @@ def note_compilation(quiet: bool) -> Iterator[None]:
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
-        told = False
+        noted = False
 
         def on_start(self, _: object) -> None:
-            if not self.told:
-                self.told = True
+            if not self.noted:
+                self.noted = True
                 words = "compiling loops that are used for the first time: some seconds, once"
                 wipe = _WIPE if sys.stderr.isatty() else ""
                 control(f"{wipe}slideviz: {words}\n")

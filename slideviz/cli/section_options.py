@@ -1,4 +1,4 @@
-"""How sections, sizes and limits are written on the command line of ``slideviz section``."""
+"""The texts of sections, sizes and limits in the options of ``slideviz section``."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def glued(argv: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Asked:
-    """A section as it was asked for; ``axis`` is false where its axis was left out."""
+    """The section of an option; ``axis`` is false where its axis was left out."""
 
     section: Section
     axis: bool = True
 
 
 def reader(row: ShapeTerms) -> Callable[[str], Asked]:
-    """Return what reads the sections of a shape."""
+    """Return the function that reads the sections of a shape."""
     return partial(about_axis, row) if row.size is not None else plane
 
 

@@ -42,7 +42,7 @@ _NUMBER = re.compile(r"(%(?:0\d)?d)")
 
 @dataclass(frozen=True)
 class Take:
-    """What a writer has to know before the first image.
+    """The settings that a writer has to know before the first image.
 
     Attributes
     ----------

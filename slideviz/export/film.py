@@ -38,7 +38,7 @@ _NARROWEST = 160
 
 @dataclass(frozen=True)
 class Shot:
-    """A frame, and the words for where in the film it is.
+    """A frame, and the words for its place in the film.
 
     ``place`` is what stands beside the name of the run: of one step, nothing.
     """
@@ -60,7 +60,7 @@ def film(
     zoom: Zoom = "auto",
     overwrite: bool = False,
 ) -> Generator[Drawn, None, None]:
-    """Yield after each image of a film that shows what one run, or two, did to a mesh.
+    """Yield after each image of a film of one run, or of two beside each other.
 
     Of two runs beside each other the film has the steps of the run that has more of them. Of the
     other it shows the step that is as far deformed, or, with images in between, a mesh between
@@ -97,7 +97,7 @@ def film(
 
 
 def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
-    """Return what the images of a film have unless something else is asked for."""
+    """Return the usual options of the images of a film."""
     return PictureOptions(size, title=True, both=both, letters=LETTERS, film=True, lines=1 + both)
 
 
@@ -110,7 +110,7 @@ def filming(
     titles: Titles | None = None,
     overwrite: bool = False,
 ) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image of a film of what a renderer shows, and between its pieces.
+    """Yield `Drawn` after each image of a film of a renderer, and between the image's pieces.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def filming(
 
 
 def posing(renderer: OffscreenRenderer, figure: PictureOptions) -> Generator[object, Any, None]:
-    """Let a renderer look as for a film: the step that needs most room is seen whole."""
+    """Aim the camera of a renderer for a film: the step that needs most room is seen whole."""
     yield from renderer.arranging()
     frames = renderer.session.frames
     widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
@@ -175,7 +175,7 @@ def require_pair(size: tuple[int, int]) -> None:
 
 
 def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
-    """Raise SlidevizError when there is nothing to make a film of, or it cannot be made so."""
+    """Raise SlidevizError where there are no steps, or no such film can be made of them."""
     if len(frames) < 2:
         raise SlidevizError("there are no steps to make a film of; run the case first")
     check_film(file, reel, frames=len(frames), overwrite=overwrite)

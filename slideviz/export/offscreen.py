@@ -96,7 +96,7 @@ def resize(plotter: Any, size: tuple[int, int]) -> None:
 
 
 def image_of(plotter: Any, transparent: bool = False) -> NDArray[np.uint8]:
-    """Return what the plotter shows, (height, width, 3), or 4 when ``transparent``."""
+    """Return the image of the plotter, (height, width, 3), or 4 when ``transparent``."""
     plotter.render()
     image = plotter.screenshot(return_img=True, transparent_background=transparent)
     return np.ascontiguousarray(image, dtype=np.uint8)
@@ -149,7 +149,7 @@ def wayland_answers() -> bool:
 
 
 def missing_screen() -> str:
-    """Return why no window can be shown, in words, or nothing."""
+    """Return the reason, in words, why no window can be shown, or nothing."""
     if x_answers() or wayland_answers():
         return ""
     named = [

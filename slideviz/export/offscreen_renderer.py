@@ -1,4 +1,4 @@
-"""The offscreen renderer: pictures, and images of films, of what a session shows."""
+"""The offscreen renderer: pictures and images of films of a session."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 class OffscreenRenderer:
-    """Draws pictures of a session through a scene of its own, into memory or a file.
+    """An off-screen scene that draws pictures of a session, into memory or a file.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class OffscreenRenderer:
 
     @classmethod
     def of_runs(cls, session: Session, zoom: Zoom = "auto") -> OffscreenRenderer:
-        """Return one that shows what the runs of a session did to its mesh.
+        """Return a renderer that shows what the runs of a session did to its mesh.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class OffscreenRenderer:
         return cls(session, find_surfaces(base) if base.dim == 2 else (), overview=overview)
 
     def arranging(self) -> Iterator[None]:
-        """Yield between the pieces of what has to be done before the first picture.
+        """Yield between the pieces of the work before the first picture.
 
         Where nobody pulls all of it, the first picture does the rest at once.
         """
@@ -121,7 +121,7 @@ class OffscreenRenderer:
         self.close()
 
     def close(self) -> None:
-        """Give the graphics back."""
+        """Free the graphics."""
         self._stack.close()
 
     @property
@@ -131,12 +131,12 @@ class OffscreenRenderer:
 
     @property
     def shows_detail(self) -> bool:
-        """Tell whether what moved is shown larger, with the rest of the mesh out of sight."""
+        """Tell whether a moved part is shown large, with the rest of the mesh out of sight."""
         return self.overview is not None and self.overview.detail is not None
 
     @property
     def beside(self) -> Session | None:
-        """Return the session that the second view shows, if there is one."""
+        """Return the session of the second view, or None."""
         other = self.session.view.beside
         if other is None or (other and self.session.run(other) is None):
             return None
@@ -155,7 +155,7 @@ class OffscreenRenderer:
     def picturing(
         self, figure: PictureOptions, aim: bool = True, frame: int | None = None
     ) -> Generator[None, None, Pixels]:
-        """Return what `image` does, and yield between the pieces of that.
+        """Return the picture as `image` does, and yield between the pieces of the work.
 
         Nothing else may be drawn meanwhile.
 
@@ -176,7 +176,7 @@ class OffscreenRenderer:
         return (yield from self.drawing(sessions, figure, headings(sessions, figure)))
 
     def shown(self, session: Session, figure: PictureOptions) -> tuple[Session, ...]:
-        """Return what stands in a picture of a session, from left to right: it, or two runs."""
+        """Return the sessions in a picture, from left to right: one, or two runs."""
         other = self.beside if figure.both else None
         return (session,) if other is None else ordered(session, other)
 
@@ -210,7 +210,7 @@ class OffscreenRenderer:
         return scene
 
     def window(self, figure: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return from where to where a picture of a 2D mesh reaches in x and in y."""
+        """Return the ranges of x and of y in a picture of a 2D mesh."""
         self.pose(figure)
         camera, (width, height) = self._plotter.camera, figure.size
         unit = 2.0 * camera.parallel_scale / height
@@ -305,12 +305,12 @@ class OffscreenRenderer:
 
 
 def ordered(first: Session, second: Session) -> tuple[Session, Session]:
-    """Return what two views show as they stand, the left one first."""
+    """Return the sessions of two views, the left one first."""
     return (second, first) if first.view.swapped else (first, second)
 
 
 def _keep_width(scene: Scene, like: Scene) -> None:
-    """See as much of the width as another view does, in a picture that is less wide."""
+    """Show as much of the width as another view does, in a picture that is less wide."""
     free = []
     for one in (scene, like):
         width, height = one.plotter.window_size

@@ -28,7 +28,7 @@ _SMALL = 10
 def picture(
     session: Session, file: str | Path, size: tuple[int, int] = SIZE, zoom: Zoom = "auto"
 ) -> None:
-    """Write a PNG of a mesh in the colours of its quality, with that in words.
+    """Write a PNG of a mesh in the colours of its quality, with the quality in words.
 
     A 2D mesh is shown whole. Of a 3D mesh the half behind a plane is shown, cells uncut; the
     plane goes through what moved most and along the way it moved.

@@ -1,4 +1,4 @@
-"""Picture options: size, background, legend and title of a picture; and its words."""
+"""Picture options: size, background, legend and title of a picture; and the title's words."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ GAP = 12.0
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """What a picture of a view has.
+    """Size, background, legend, title and camera of a picture of a view.
 
     Attributes
     ----------
@@ -83,27 +83,27 @@ class PictureOptions:
 
     @property
     def headed(self) -> bool:
-        """Tell whether there are words above the picture."""
+        """Tell whether words stand above the picture."""
         return self.title or self.named
 
     @property
     def title_room(self) -> float:
-        """Return how many pixels at the top are the title's, at normal letter size."""
+        """Return the height of the title, in pixels at normal letter size."""
         return TITLE_ROOM + 20.0 * (self.lines - 1)
 
     @property
     def top(self) -> float:
-        """Return which part of the height is the title's."""
+        """Return the title's part of the height."""
         return min(self.title_room * self.scale / self.size[1], 0.3) if self.headed else 0.0
 
     @property
     def gap(self) -> int:
-        """Return how many pixels are between two pictures beside each other."""
+        """Return the pixels between two pictures beside each other."""
         return max(round(GAP * self.scale), 1)
 
     @property
     def scale(self) -> float:
-        """Return how much larger than 13 pixels the letters are."""
+        """Return the size of the letters over 13 pixels."""
         return font_scale(self.size) * self.letters
 
     def within(self, box: tuple[int, int]) -> PictureOptions:
@@ -115,7 +115,7 @@ class PictureOptions:
         return replace(self, size=(size[0], size[1]), letters=letters)
 
     def showing(self, session: Session) -> Session:
-        """Return the session as the picture shows it: nothing selected, no clutter."""
+        """Return the session of the picture: nothing selected, no clutter."""
         view = session.view
         drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
         if view.colour_by != "role":
@@ -126,7 +126,7 @@ class PictureOptions:
 
 
 def panes(figure: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:
-    """Return the two pictures beside each other that a picture of two runs is made of.
+    """Return the options of the two halves of a picture of two runs.
 
     The legend is at the right of the second; both have the same room for the mesh.
     """
@@ -172,13 +172,13 @@ def headings(shown: Sequence[Session], figure: PictureOptions) -> tuple[list[str
 
 
 def letters_across(figure: PictureOptions) -> float:
-    """Return how many letters a line of the title has room for."""
+    """Return the number of letters that a line of the title has room for."""
     letters = LETTER_WIDTH * figure.scale / (LETTERS if figure.film else 1.0)
     return (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / letters
 
 
 def words_of_size(figure: PictureOptions) -> str:
-    """Return how large a picture is on paper, or in pixels, in words."""
+    """Return the size of a picture on paper, or in pixels, in words."""
     width, height = figure.size
     if figure.dpi is None:
         return f"{width} × {height} pixels"

@@ -1,4 +1,4 @@
-"""How a film is made: size, speed, images in between; and whether it can be."""
+"""The settings of a film: size, speed, images in between; and checks of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FPS, SECONDS = 10.0, 3.0
 
 @dataclass(frozen=True)
 class Reel:
-    """How a film is made.
+    """Size, speed and images in between of a film.
 
     Attributes
     ----------
@@ -44,11 +44,11 @@ class Reel:
     between: int = 0
 
     def pixels(self, file: Path) -> tuple[int, int]:
-        """Return width and height for this file."""
+        """Return width and height of the film in this file."""
         return self.size or SIZES[kind_of(file)]
 
     def count(self, frames: int) -> int:
-        """Return how many images come of so many frames."""
+        """Return the number of images for so many frames."""
         return frames + (frames - 1) * self.between
 
     def pace(self, frames: int) -> float:
@@ -63,7 +63,7 @@ USUAL = Reel()
 def check_film(
     file: Path, reel: Reel, *, frames: int | None = None, overwrite: bool = False
 ) -> None:
-    """Raise SlidevizError when a film cannot be made like that; the message says what helps.
+    """Raise SlidevizError where a film cannot be made like that; the message says what helps.
 
     Parameters
     ----------
@@ -111,14 +111,14 @@ def check_film(
 
 @dataclass(frozen=True)
 class Drawn:
-    """How far a film is: images written, of so many in all."""
+    """Progress of a film: images written, of so many in all."""
 
     done: int
     total: int
 
 
 def images_drawn(pieces: Generator[object, Any, None]) -> Generator[Drawn, None, None]:
-    """Yield how far the pieces of a film are, all done here."""
+    """Yield the progress of a film, all of its pieces done here."""
     run = here(pieces)
     try:
         yield from (piece for piece in run if isinstance(piece, Drawn))
@@ -132,7 +132,7 @@ def exposing(
     reel: Reel,
     draw: Callable[[float], Generator[object, Any, Pixels]],
 ) -> Generator[object, Any, None]:
-    """Yield `Drawn` after each image that the encoder took, and between the pieces of it.
+    """Yield `Drawn` after each image that the encoder took, and between the image's pieces.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _add(add: Callable[[Pixels, float], None], image: Pixels, seconds: float, _:
 
 
 def _positions(steps: int, between: int) -> Iterator[float]:
-    """Yield the steps and what lies between them."""
+    """Yield the steps and the places between them."""
     for step in range(steps):
         yield from (step + k / (between + 1) for k in range(between + 1))
     yield float(steps)

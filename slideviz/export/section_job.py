@@ -20,7 +20,7 @@ from slideviz.plots.section_picture import (
 from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.changes import UNDEFORMED, seen_beside
 from slideviz.session.jobs import Doing, Report, Stopped, require_going
 from slideviz.session.passages import show_passages
@@ -45,7 +45,7 @@ class Paper:
 
     @classmethod
     def of_cm(cls, width: float, height: float, dpi: float = 300.0) -> Paper:
-        """Return that of a picture so large on paper."""
+        """Return the paper of a picture of so many centimetres."""
         return cls((round(width / 2.54 * dpi), round(height / 2.54 * dpi)), dpi)
 
 
@@ -91,7 +91,7 @@ def save_section(
 
 
 def shown_views(session: Session) -> tuple[Session, ...]:
-    """Return what the views show, the left one first: the session, or that and the one beside."""
+    """Return the sessions of the views, the left one first."""
     other = session.view.beside
     if other is None or (other != UNDEFORMED and session.run(other) is None):
         return (session,)
@@ -100,7 +100,7 @@ def shown_views(session: Session) -> tuple[Session, ...]:
 
 
 def _shown(session: Session, name: str, section: Section) -> Shown:
-    """Return what a section shows of a view that is called so."""
+    """Return the cuts of a section in a view with a name."""
     frame = session.frame
     assert frame is not None
     by = session.view.colour_by
@@ -123,17 +123,17 @@ def _shown(session: Session, name: str, section: Section) -> Shown:
     )
 
 
-def _choice(session: Session, section: Section) -> Choice | None:
+def _choice(session: Session, section: Section) -> CellsInRange | None:
     """Return the cells that the range of the view leaves; a curve goes through all of them."""
     frame, threshold = session.frame, session.view.threshold
     curve = session.mesh is not None and session.mesh.dim == 2 and not section.whole
     if frame is None or threshold is None or curve:
         return None
-    return Choice.of(frame.shown_values(session.view.colour_by, session.mesh), threshold)
+    return CellsInRange.of(frame.shown_values(session.view.colour_by, session.mesh), threshold)
 
 
 def state_words(session: Session) -> str:
-    """Return which run and step a session shows, and how it was computed."""
+    """Return run, step and method of a session in words."""
     run = session.run_shown
     if run is None or session.view.frame == 0:
         return "undeformed"

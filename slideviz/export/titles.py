@@ -1,4 +1,4 @@
-"""What stands above a picture or a film: which run and step, and how good it is."""
+"""Titles of pictures and films: run, step and quality; and the words of the selected cell."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LONGEST = "step {0}.00 of {0}, interpolated"
 
 
 def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str:
-    """Return what a picture shows, and the quality there, in a line."""
+    """Return the name of a picture's subject and its quality, in a line."""
     what = "" if colour_by == "size-skew" else "size-skew "
     text = f"{name}: {what}min {found.min:.4f}, mean {found.mean:.4f}"
     if found.inverted:
@@ -41,7 +41,7 @@ def caption(name: str, found: Quality, colour_by: ColourBy = "size-skew") -> str
 
 
 def place_words(position: float, steps: int) -> str:
-    """Return where in a run a mesh is: a step, or between two; nothing if there is but one."""
+    """Return the step of a mesh, or its place between two, in words; nothing for an only step."""
     if position == 0:
         return "undeformed"
     whole = position == int(position)
@@ -51,7 +51,7 @@ def place_words(position: float, steps: int) -> str:
 
 
 def names_of(session: Session) -> list[str]:
-    """Return what the run that is shown is called, each shorter than the one before.
+    """Return names of the run that is shown, each shorter than the one before.
 
     With what sets it apart from the other runs; with its name or method; its number only.
     """
@@ -67,7 +67,7 @@ def names_of(session: Session) -> list[str]:
 def title_words(
     session: Session, frame: Frame, place: str, letters: float, longest: str = ""
 ) -> str:
-    """Return a title that has room for so many letters.
+    """Return a title for a room of so many letters.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def title_words(
     """
     what = session.view.colour_by
 
-    def told(name: str, place: str) -> str:
+    def titled(name: str, place: str) -> str:
         return caption(f"{name}, {place}" if place else name, frame.quality, what)
 
     if place == "undeformed":
@@ -92,8 +92,8 @@ def title_words(
         full, *rest = names_of(session)
     shown = "" if place == "undeformed" else place
     for name in (full, *rest[:-1]):
-        if max(len(told(name, longest)), len(told(name, shown))) <= letters:
-            return told(name, shown)
+        if max(len(titled(name, longest)), len(titled(name, shown))) <= letters:
+            return titled(name, shown)
     least = f": min {frame.quality.min:.3f}"
     for name in (full, *rest):
         for where in (f", {shown}" if shown else "", ""):
@@ -104,7 +104,7 @@ def title_words(
 
 
 def pair_names(pair: Sequence[Session]) -> list[str]:
-    """Return what the runs of two views are called, in one form, with all that sets them apart."""
+    """Return the names of the runs of two views, in one form, with all that sets them apart."""
     runs = [one.run_shown for one in pair]
     # Beside the undeformed mesh both views have the same run.
     alone = runs[0] is runs[-1]
@@ -151,7 +151,7 @@ def pair_titles(pair: Sequence[Session], quality: bool) -> list[str]:
 
 
 def fitting(titles: Sequence[str], letters: float) -> tuple[list[str], float]:
-    """Return titles of a line or two that have room for so many letters, and how large they are.
+    """Return titles of a line or two cut to so many letters, and the size of the letters.
 
     All are as much smaller as the longest line asks for, 1 being as they were; where that would
     be too small to be read, lines end with an ellipsis.
@@ -172,7 +172,7 @@ _AWAY = 9.0
 
 
 def mark_words(session: Session) -> str:
-    """Return the number of the marked cell, and its value in what is shown; nothing if none is."""
+    """Return the number of the selected cell, and its value; nothing where none is selected."""
     cell, frame = session.view.marked, session.frame
     if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
         return ""
@@ -187,7 +187,7 @@ def mark_words(session: Session) -> str:
 
 
 def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
-    """Write the words beside the marked cell of a scene as its camera sees it, in place of others.
+    """Write the words beside the selected cell of a scene as its camera sees it.
 
     Not where the cell is out of the picture.
     """
@@ -228,7 +228,7 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
 
 
 def draw_mark(axes: Any, session: Session, point: float) -> None:
-    """Draw the marked cell of a 2D mesh and its words; ``point`` as for the cells of a figure."""
+    """Draw the selected cell of a 2D mesh and its words; ``point`` as for a figure's cells."""
     from matplotlib.patches import Polygon
 
     words = mark_words(session)
@@ -256,7 +256,7 @@ def draw_mark(axes: Any, session: Session, point: float) -> None:
 
 
 def _corners(session: Session) -> FloatArray:
-    """Return the nodes of the marked cell, (k, d)."""
+    """Return the nodes of the selected cell, (k, d)."""
     assert session.frame is not None
     assert session.view.marked is not None
     mesh = session.frame.mesh

@@ -24,7 +24,7 @@ from slideviz.scene.sections import BAND, NAME, RIM, WIDTHS, shown_sections
 from slideviz.sections.cut import Cutter
 from slideviz.sections.line import box_around, trace
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Session
 from slideviz.terms import COLOUR_BY, ROLES
 
@@ -62,7 +62,7 @@ def write_vector(renderer: OffscreenRenderer, figure: PictureOptions, file: Path
 
 
 def require_vector(session: Session, file: Path) -> None:
-    """Raise SlidevizError when no SVG or PDF of that name can be made of what is shown."""
+    """Raise SlidevizError where no SVG or PDF of that name can be made of a session."""
     if file.suffix.lower() not in SUFFIXES:
         raise SlidevizError(f"{file}: drawn as lines are {', '.join(SUFFIXES)}; end the name so")
     mesh = session.mesh
@@ -108,7 +108,7 @@ def draw_vector(renderer: OffscreenRenderer, figure: PictureOptions) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class _Paint:
-    """How the cells of a view are drawn: values (m,), or one colour; points of their edges."""
+    """The colours of cells: values (m,), or one colour; and the points of their edges."""
 
     values: FloatArray | None
     colors: Any
@@ -142,7 +142,7 @@ def _draw_mesh(axes: Any, session: Session, figure: PictureOptions, point: float
     if view.colour_by != "role":
         values = frame.shown_values(view.colour_by, session.mesh)
         paint = _Paint(values, color_scale(view.colour_map, session.colour_range), edge)
-        only = None if view.threshold is None else Choice.of(values, view.threshold)
+        only = None if view.threshold is None else CellsInRange.of(values, view.threshold)
     cells = cutter.all_cells(mesh.points)
     faint = FADED if is_faded(session) else None
     paint.draw(axes, cells if only is None else only.among(cells), alpha=faint)

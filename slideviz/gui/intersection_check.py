@@ -17,7 +17,7 @@ log = logging.getLogger("slideviz")
 
 
 class IntersectionCheck(QObject):
-    """The job that keeps ``Session.clash`` up to date; its last answer stays until the next."""
+    """The job that keeps ``Session.intersection`` up to date; an answer stays until the next."""
 
     def __init__(self, store: Store, parent: QObject | None = None) -> None:
         super().__init__(parent)

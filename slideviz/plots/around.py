@@ -1,4 +1,4 @@
-"""What is around the cells that a line or circle cuts: the other cells of a 2D mesh, faint."""
+"""The cells around those that a 2D section cuts, drawn faintly."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def surroundings(
 
 
 def window(cut: Box, around: Polygons, ratio: float) -> Box:
-    """Return what of a mesh is shown around what is cut, as wide and high as there is room.
+    """Return the box to show around a cut, as wide and high as there is room.
 
     Parameters
     ----------

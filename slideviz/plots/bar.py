@@ -1,4 +1,4 @@
-"""Colour bars of matplotlib: numbers at their ends, and what is drawn as inverted."""
+"""Colour bars of matplotlib, with numbers at their ends and the colour of inverted cells."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def below(axes: Any, length: float, gap: float = BELOW) -> Any:
 def color_bar(
     axes: Any, scale: Any, label: str, letters: float, *, inverted: bool, upright: bool
 ) -> Any:
-    """Draw a colour bar, which has as many numbers as there is room for, and return it.
+    """Draw a colour bar, with as many numbers as there is room for, and return it.
 
     Parameters
     ----------

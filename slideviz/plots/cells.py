@@ -23,7 +23,7 @@ _AMBIENT = 0.7
 
 
 def color_scale(colour_map: str, limits: tuple[float, float]) -> Any:
-    """Return what turns values into colours, a ScalarMappable; what is not a number is inverted."""
+    """Return the ScalarMappable of a colour map and its limits; not a number is inverted."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

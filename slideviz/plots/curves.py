@@ -1,4 +1,4 @@
-"""What the curves of a session are made of: its runs by step, by cycle, along the span."""
+"""The series of a session's curves: its runs by step, by cycle, along the span."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ UNDEFORMED = 4
 
 
 def look_of(run: Run) -> int:
-    """Return the number of a run's look, the same in all plots."""
+    """Return the number of a run's series, the same in all plots."""
     number = run.number - 1
     return number if number < UNDEFORMED else number + 1
 
 
 def step_runs(session: Session) -> list[StepRun]:
-    """Return minimum and mean of each run from the undeformed mesh on, by their numbers.
+    """Return minimum and mean quality of each run from the undeformed mesh on.
 
     The solid line of the first is below dashed ones, which let see it where both coincide.
     """
@@ -48,7 +48,7 @@ def step_runs(session: Session) -> list[StepRun]:
 
 
 def greedy_run(session: Session) -> GreedyRun | None:
-    """Return the convergence of the selection of the step that is shown, if there was one."""
+    """Return the convergence of the selection in the step that is shown, or None."""
     frame, run = session.frame, session.run_shown
     if frame is None or run is None or frame.step is None or not frame.step.history:
         return None
@@ -70,7 +70,7 @@ class Profiles:
         self._made: WeakKeyDictionary[Frame, dict[object, Profile]] = WeakKeyDictionary()
 
     def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
-        """Return those of the step that is shown, of other runs' last, of the undeformed mesh.
+        """Return the profiles of the step shown, of other runs' last, of the undeformed mesh.
 
         Raises
         ------
@@ -107,14 +107,14 @@ class Profiles:
 
 
 def coordinates(session: Session) -> dict[Coordinate, str]:
-    """Return what the span can be counted along: words by name."""
+    """Return the coordinates along the span, words by name."""
     if session.mesh is None or session.mesh.dim == 2:
         return {"y": "along y", "x": "along x", "r": "along the radius"}
     return {"r": "along the radius", "z": "along z", "y": "along y", "x": "along x"}
 
 
 def natural(session: Session) -> Coordinate:
-    """Return what the span is counted along at first: the radius where the mesh turns."""
+    """Return the usual coordinate along the span: the radius where the mesh turns."""
     if session.mesh is None or any(pair.kind == "rotational" for pair in session.pairs):
         return "r"
     extent = np.ptp(session.mesh.points, axis=0)

@@ -82,7 +82,7 @@ def convergence(
     """
     dress(axes, style, "control nodes [-]", f"largest error [{unit}]")
     axes.set_yscale("log")
-    told: set[float] = set()
+    tolerances: set[float] = set()
     for index, run in enumerate(runs):
         shown = run.error > 0
         first = np.r_[True, run.level[1:] != run.level[:-1]] if len(run.level) else run.level > 0
@@ -93,8 +93,8 @@ def convergence(
         if len(run.error) > _CROWDED:
             line["linewidth"] = 0.5 * style.width
         axes.plot(run.control_nodes[shown], run.error[shown], label=run.label, **line)
-        if run.tolerance and run.tolerance not in told:
-            told.add(run.tolerance)
+        if run.tolerance and run.tolerance not in tolerances:
+            tolerances.add(run.tolerance)
             axes.axhline(run.tolerance, color=style.look.text, linewidth=0.9, linestyle=(0, (4, 3)))
             axes.annotate(
                 f"tolerance {run.tolerance:g}",
@@ -108,8 +108,8 @@ def convergence(
                 color=style.look.text,
             )
     axes.set_xlim(left=0)
-    if told:  # room for the words below the lowest line
-        axes.set_ylim(bottom=min(axes.get_ylim()[0], 0.3 * min(told)))
+    if tolerances:  # room for the words below the lowest line
+        axes.set_ylim(bottom=min(axes.get_ylim()[0], 0.3 * min(tolerances)))
     add_legend(axes, style)
 
 
@@ -119,7 +119,7 @@ def against_steps(
     what: What = "minimum",
     style: Style = PRINT,
 ) -> None:
-    """Draw what runs came to against their number of steps, a line for each label.
+    """Draw results of runs against their number of steps, a line for each label.
 
     Parameters
     ----------

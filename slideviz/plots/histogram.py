@@ -55,8 +55,8 @@ def histogram(
         values = run.values if run.inverted is None else np.where(run.inverted, np.nan, run.values)
         found = Distribution.of(values, edges)
         # A legend elsewhere serves several axes, with other numbers of inverted cells.
-        told = found.inverted > 0 and style.legend
-        label = f"{run.label} ({found.inverted} inverted)" if told else run.label
+        counted = found.inverted > 0 and style.legend
+        label = f"{run.label} ({found.inverted} inverted)" if counted else run.label
         outlines.append(Outline(label, found, place(run.series, index)))
     draw_distribution(axes, None, outlines, f"{metric} quality [-]", log, style)
 

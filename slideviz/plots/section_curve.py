@@ -1,4 +1,4 @@
-"""What a line or circle through a 2D mesh cuts, laid flat: the quality along it, as a curve."""
+"""The curve of a 2D section: the quality along its line or circle."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FILLED, _FOLDED = 0.85, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The numbers of the cells along a section, from one end to the other.
+    """The values of the cells along a section, from one end to the other.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Curve:
 
 
 def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np.ndarray) -> Curve:
-    """Return the curve of what a section cuts of a 2D mesh.
+    """Return the curve of a section's cut through a 2D mesh.
 
     Parameters
     ----------
@@ -71,13 +71,13 @@ def curve_of(lines: Polygons, section: Section, values: FloatArray, inverted: np
 
 
 def position_label(section: Section) -> Label:
-    """Return what the positions along a section are."""
+    """Return the label of the positions along a section."""
     return section.in_plane.position_label(section)
 
 
 @dataclass(frozen=True, eq=False)
 class CurveRow:
-    """A curve of a plot: what it is called, and the number of its look (None: its place)."""
+    """A curve of a plot: its name, and the number of its series (None: its place)."""
 
     label: str
     curve: Curve
@@ -139,7 +139,7 @@ def draw_curves(
 
 
 def steps(curve: Curve) -> tuple[FloatArray, FloatArray]:
-    """Return a curve as positions and numbers of a polyline, not a number where it breaks."""
+    """Return a curve as positions and values of a polyline, not a number where it breaks."""
     whole = float(np.ptp(curve.ends)) if len(curve.ends) else 0.0
     breaks = np.flatnonzero(curve.ends[1:, 0] - curve.ends[:-1, 1] > GAP * whole) + 1
     x, y = curve.ends.ravel(), np.repeat(curve.values, 2)

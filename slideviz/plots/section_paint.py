@@ -1,4 +1,4 @@
-"""The numbers that a section is coloured by, and what the cut has of them."""
+"""The values that colour a section, and a summary of them in its cut."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from slideviz.terms import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """A number for every cell of a mesh.
+    """A value for every cell of a mesh, with limits and colour map.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Paint:
     colour_map: str = COLOUR_MAP
 
     def within(self, low: float, high: float) -> Paint:
-        """Return the same with other limits.
+        """Return the paint with other limits.
 
         Raises
         ------
@@ -51,11 +51,11 @@ class Paint:
         return replace(self, limits=(low, high))
 
     def up_to(self, cells: IntArray) -> Paint:
-        """Return the same with limits of 0 and the largest number of cells (c,)."""
+        """Return the paint with limits of 0 and the largest value of cells (c,)."""
         return replace(self, limits=(0.0, float(self.values[cells].max(initial=0.0)) or 1.0))
 
     def shown(self, cells: IntArray) -> FloatArray:
-        """Return the numbers of cells (c,), in the limits; not a number where inverted."""
+        """Return the values of cells (c,), in the limits; not a number where inverted."""
         return np.where(self.inverted[cells], np.nan, np.clip(self.values[cells], *self.limits))
 
     def summary(self, cells: IntArray) -> dict[str, float | int]:
@@ -88,7 +88,7 @@ class Paint:
 
 
 def paint(mesh: Mesh, quality: Quality, by: Quantity, reference: Mesh | None = None) -> Paint:
-    """Return the numbers of all cells to colour them by.
+    """Return the values of all cells to colour them by.
 
     Parameters
     ----------

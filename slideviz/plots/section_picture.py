@@ -49,7 +49,7 @@ of their length."""
 
 @dataclass(frozen=True)
 class SectionStyle:
-    """How a section is drawn.
+    """The size and the parts of a picture of a section.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class SectionStyle:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a section shows of one run.
+    """The cut of a section in one run.
 
     Attributes
     ----------
@@ -119,12 +119,12 @@ class Shown:
 
     @property
     def drawn(self) -> dict[int, Polygons]:
-        """Return the pieces in which something is cut."""
+        """Return the pieces that are not empty."""
         return {number: piece for number, piece in self.pieces.items() if len(piece)}
 
     @property
     def ids(self) -> IntArray:
-        """Return the cells that are cut: of the mesh itself, or, where it is not cut, of all."""
+        """Return the cells that are cut: of the mesh itself, or of all where it is not cut."""
         drawn = self.drawn
         return drawn[0].cell_ids if 0 in drawn else joined(list(drawn.values())).cell_ids
 
@@ -387,7 +387,7 @@ def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> Non
     ):
         ends = np.stack([centre, centre + 0.3 * towards]) / size
         figure.add_artist(Line2D(*ends.T, color=PAPER.text, linewidth=1.0))
-        # An axis that points at the eye has no length, but its letter needs room all the same.
+        # An axis that points at the camera has no length, but its letter needs room all the same.
         beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
         at = ends[1] + 0.12 * beside / size
         figure.text(*at, word, fontsize=LETTERS, ha="center", va="center")

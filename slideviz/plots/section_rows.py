@@ -1,4 +1,4 @@
-"""The curves along a line or circle of a session: the undeformed mesh, and the runs shown."""
+"""The curves along a 2D section of a session: the undeformed mesh, and the runs shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from slideviz.terms import QUANTITIES, Quantity, quantity_of
 
 
 class CurveRows:
-    """Makes the curves of sessions; what was cut is remembered.
+    """The curves of sessions, with a memory of the undeformed mesh's cut.
 
     The undeformed mesh has a cutter's memory of its own, and so has every view that cuts.
     """
@@ -26,7 +26,7 @@ class CurveRows:
         self._first = Cuts()
 
     def of(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> tuple[CurveRow, ...]:
-        """Return a curve of the undeformed mesh and one of each session; that looked at last.
+        """Return the curve of the undeformed mesh and one of each session.
 
         Those that a section misses have none.
 
@@ -58,12 +58,12 @@ class CurveRows:
 
 
 def what_of(session: Session) -> Quantity:
-    """Return what the curve has: what the colours say, or the quality where they show roles."""
+    """Return the quantity of the curve: that of the colours, or the quality for roles."""
     return quantity_of(session.view.colour_by)
 
 
 def labels_of(session: Session, section: Section) -> tuple[str, str]:
-    """Return what the axes of the curves are called."""
+    """Return the names of the axes of the curves."""
     return position_label(section).full, QUANTITIES[what_of(session)].axis
 
 
@@ -74,7 +74,7 @@ def colours_of(session: Session) -> Colours:
 
 
 def facts_of(session: Session, cuts: Cuts, section: Section) -> str:
-    """Return in words how many cells are cut, and their min, mean and inverted ones."""
+    """Return the number of cells that are cut, and their min, mean and inverted ones, in words."""
     frame = session.frame
     assert frame is not None
     lines = cuts.of(frame.mesh, _line(section))

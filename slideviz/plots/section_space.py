@@ -11,13 +11,13 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, joined
 
 _ASIDE, _ABOVE = 0.55, 0.4
-"""How far the eye is off the straight view, for every length that it is away."""
+"""How far the camera is off the straight view, for every length that it is away."""
 
 
 def camera(piece: Polygons, section: Section) -> FloatArray:
-    """Return unit vectors to the right, up, and towards the eye, (3, 3).
+    """Return unit vectors to the right, up, and towards the camera, (3, 3).
 
-    The eye is somewhat to the side of what it looks at straight: the plane's normal, or the
+    The camera is somewhat to the side of the straight view: the plane's normal, or the
     direction from the axis to the middle of the piece.
     """
     side, up, straight = section.shape.aslant(section, piece.points)
@@ -29,7 +29,7 @@ def camera(piece: Polygons, section: Section) -> FloatArray:
 
 
 def in_space(pieces: Sequence[Polygons], section: Section) -> Polygons:
-    """Return the pieces as one, projected: x to the right, y up, z towards the eye."""
+    """Return the pieces as one, projected: x to the right, y up, z towards the camera."""
     every = joined(pieces)
     seen = every.with_points(every.points @ camera(pieces[0], section).T)
     return seen.by_depth()

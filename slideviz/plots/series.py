@@ -1,4 +1,4 @@
-"""What plots of runs are drawn from: qualities, steps, greedy selections, outcomes."""
+"""The series of plots: qualities, steps, greedy selections, outcomes of runs."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A distribution to compare with: its words, and the number of its look.
+    """A distribution to compare with: its words, and the number of its series.
 
     ``series`` None is the undeformed mesh, in a thin line of its own.
     """
@@ -130,7 +130,7 @@ class GreedyRun:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one run came to.
+    """The outcome of one run.
 
     Attributes
     ----------

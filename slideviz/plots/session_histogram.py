@@ -1,4 +1,4 @@
-"""The histogram of what a session shows: the step, and other runs to compare it with."""
+"""The histogram of a session: the step that is shown, and other runs to compare."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Counts:
         self._spreads: WeakKeyDictionary[Frame, dict[ColourBy, Range | None]] = WeakKeyDictionary()
 
     def limits(self, session: Session, whole: bool) -> Range:
-        """Return round numbers around the values that cells have; or, whole, that they can have.
+        """Return round numbers around the values that cells have, or can have.
 
         They are the same for all steps of a run, so that bars can be compared as it is played.
         """
@@ -68,7 +68,7 @@ class Counts:
 def draw_histogram(
     counts: Counts, session: Session, how: tuple[bool, bool], figure: Figure, style: Style
 ) -> None:
-    """Draw the histogram of what a session shows; nothing without a mesh.
+    """Draw the histogram of a session; nothing without a mesh.
 
     ``how`` is whether counts are logarithmic, and whether all values there can be are shown.
     """
@@ -78,8 +78,8 @@ def draw_histogram(
     limits = counts.limits(session, whole)
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label
-    told = QUANTITIES[what]
-    metric = told.axis if told.unit else f"{told.label} quality [-]"
+    term = QUANTITIES[what]
+    metric = term.axis if term.unit else f"{term.label} quality [-]"
     runs, left_out = compared(session)
     outlines = [
         Outline(other.label, counts.of(session, other.last, limits), look_of(other))
@@ -100,7 +100,7 @@ def draw_histogram(
 
 
 def compared(session: Session) -> tuple[list[Run], int]:
-    """Return the runs to compare with the one that is shown, by number, and how many are not.
+    """Return the runs to compare with the one that is shown, and the number of those left out.
 
     First comes the run that is beside it, then those with the same motion, then newer ones. Of
     each, the last step is meant: that of the run that is shown is what is played to.
@@ -117,13 +117,13 @@ def compared(session: Session) -> tuple[list[Run], int]:
 
 
 def first_value(axes: Axes) -> float:
-    """Return where the values of a histogram begin; left of it is the strip of inverted cells."""
+    """Return the lowest value of a histogram, right of the strip of inverted cells."""
     bars = [patch for patch in axes.patches if patch.get_gid() == "shown"]
     return min(float(bar.get_x()) for bar in bars)  # type: ignore[attr-defined]
 
 
 def shown_measure(session: Session) -> Quantity:
-    """Return what the histogram counts: what the cells are coloured by, or size-skew."""
+    """Return the quantity that the histogram counts: that of the colours, or size-skew."""
     return quantity_of(session.view.colour_by)
 
 

@@ -1,4 +1,4 @@
-"""How plots look: colours, lines and markers that tell series apart, also in grey."""
+"""The style of plots: colours, lines and markers that tell series apart, also in grey."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 @dataclass(frozen=True)
 class Series:
-    """What tells one series from the others.
+    """Colour, marker and dash of a series.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Style:
-    """Look of a plot.
+    """Colours, letters and lines of a plot.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Style:
         return _brightness(self.look.text) > _brightness(self.look.background)
 
     def series(self, index: int) -> Series:
-        """Return how the series of that number, from 0, is drawn; 49 of them differ."""
+        """Return the series of that number, from 0; 49 of them differ."""
         palette = _ON_DARK if self.dark else _ON_LIGHT
         turn = index // len(palette)
         return Series(
@@ -93,7 +93,7 @@ class Style:
 
 
 def place(given: int | None, index: int) -> int:
-    """Return the number of a look: the given one, or else the place in the sequence."""
+    """Return the number of a series: the given one, or else the place in the sequence."""
     return index if given is None else given
 
 

@@ -1,4 +1,4 @@
-"""Round numbers along an axis, and as many digits as tell them apart."""
+"""Round numbers along an axis, with as many digits as tell them apart."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def tick_format(at: FloatArray) -> str:
 def bar_ticks(
     low: float, high: float, part: Callable[[str], float], most: int = 6
 ) -> tuple[FloatArray, str]:
-    """Return where a colour bar has numbers, (k,), and their printf format: ends, and round ones.
+    """Return the numbers of a colour bar, (k,), and their printf format: ends, and round ones.
 
     Parameters
     ----------

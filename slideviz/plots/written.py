@@ -56,7 +56,7 @@ def trim(figure: Any, rows: Sequence[Sequence[Any]]) -> None:
 
 
 def fitted(words: str, inches: float, size: float) -> tuple[str, float]:
-    """Return words as they fit into a width of so many inches, and the size of their letters.
+    """Return words broken to fit a width of so many inches, and the size of their letters.
 
     They are up to ``size`` points high, smaller where a line is too long, and where it is so even
     with the smallest ones, in more lines.

@@ -22,7 +22,7 @@ LIFT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A boundary in the scene: what it is, its geometry, its actors.
+    """A boundary in the scene: its surface, its geometry and its actors.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def surface_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> An
 
 
 def rim_shape(surface: Surface, points: FloatArray, lift: float = 0.0) -> Any:
-    """Return the lines that highlight a boundary: itself in 2D, its border in 3D."""
+    """Return the lines that highlight a boundary: the boundary in 2D, its border in 3D."""
     at = lifted(points[surface.nodes], lift)
     lines = surface.facets if surface.facets.shape[1] == 2 else surface.rim
     if not len(lines):
@@ -77,7 +77,7 @@ def cell_shape(mesh: Mesh) -> Any:
 
 
 def part_shape(mesh: Mesh, cells: IntArray) -> Any:
-    """Return some cells (k,) of a mesh as PolyData: themselves in 2D, their outside in 3D.
+    """Return some cells (k,) of a mesh as PolyData: the cells in 2D, their outside in 3D.
 
     Its cell data ``CELL`` are the owners of the polygons, numbers in the mesh; its point data
     ``POINT`` the nodes.
@@ -175,7 +175,7 @@ def draw_fine_edges(actor: Any) -> None:
 
 
 def see_through(actor: Any, opacity: float) -> None:
-    """Give an actor an opacity; below 1 it is behind all that is opaque, wherever it lies.
+    """Set the opacity of an actor; below 1 all that is opaque is drawn in front of the actor.
 
     Glass in front of a cut would tint it, and its colours would no longer be those of the bar.
     """

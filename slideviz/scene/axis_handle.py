@@ -1,4 +1,4 @@
-"""Where a section about an axis is held by the mouse, and to which size it is dragged."""
+"""The handle of a section about an axis: the patch where the mouse takes it, and the drag."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _LEAST = 1e-3
 
 
 def patch_in(section: Section, mesh: Mesh, cuts: Cuts) -> Patch:
-    """Return the part of a section that is in a mesh; beside it, that which is nearest."""
+    """Return the part of a section inside a mesh, or the part nearest to the mesh."""
     return patch_of(section, points_near(section, mesh, cuts))
 
 
 def points_near(section: Section, mesh: Mesh, cuts: Cuts) -> FloatArray:
-    """Return the points (n, 3) of what a section cuts; those of the mesh where it misses it."""
+    """Return the points (n, 3) of a section's cut, or the mesh's where nothing is cut."""
     cut = cuts.of(mesh, section)
     return cut.points if len(cut) else mesh.points[cuts.cutter(mesh).used]
 
@@ -51,10 +51,10 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
     return [shape.surface(section, line, section.size) for line in (*arcs, *sides)]
 
 
-def pull(
+def drag(
     seen: Seen, section: Section, place: Place, size: float
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Return where a place is seen, and how far the mouse goes for a unit of size.
+    """Return the pixel of a place on a section, and how far the mouse goes for a unit of size.
 
     Returns
     -------
@@ -75,10 +75,10 @@ def pull(
     return at[0], lever * (np.array([0.0, scale]) if steep else slopes[0]), steep
 
 
-def pulled_size(
+def dragged_size(
     seen: Seen, section: Section, place: Place, way: tuple[FloatArray, FloatArray]
 ) -> float:
-    """Return the size to which a place of a section is dragged.
+    """Return the size of a section after a drag of one of its places.
 
     Parameters
     ----------
@@ -92,13 +92,13 @@ def pulled_size(
     """
     start, now = way
     size, ends = section.size, (_LEAST * section.size, shape_of(section).size.high * (1.0 - _LEAST))
-    at, slope, steep = pull(seen, section, place, size)
+    at, slope, steep = drag(seen, section, place, size)
     target = at + now - start
     if steep:
         return float(np.clip(size + float((now - start)[1] / slope[1]), *ends))
     # In perspective, what is nearer moves further: a few steps to where the mouse is.
     for _ in range(4):
-        at, slope, steep = pull(seen, section, place, size)
+        at, slope, steep = drag(seen, section, place, size)
         if steep:
             break
         size = float(np.clip(size + float((target - at) @ slope / (slope @ slope)), *ends))

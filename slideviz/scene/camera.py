@@ -1,4 +1,4 @@
-"""Where the scene is looked at from: sides, fitting, zooming; in parallel or perspective."""
+"""The camera of a scene: sides to look from, fitting, zooming; parallel or in perspective."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
     "-z": ((0, 0, -1), (0, 1, 0)),
     "iso": ((1, -1, 0.8), (0, 0, 1)),
 }
-"""Direction from the mesh to the eye, and what is up."""
+"""Direction from the mesh to the camera, and what is up."""
 
 
 class Camera:
@@ -60,13 +60,13 @@ class Camera:
         return self.stage.plotter.camera
 
     def look_from(self, side: str, parallel: bool) -> None:
-        """Look at everything from a side: a key of `SIDES`."""
+        """Show all that is drawn from a side, a key of `SIDES`."""
         towards, up = SIDES[side]
         self.turn(np.asarray(towards, float), np.asarray(up, float), parallel)
         self.fit()
 
     def turn(self, towards: FloatArray, up: FloatArray, parallel: bool) -> None:
-        """Look at the middle from a direction (3,), from the mesh to the camera."""
+        """Show all that is drawn from a direction (3,), from the mesh to the camera."""
         bounds = np.array(self.stage.plotter.bounds).reshape(3, 2)
         centre = bounds.mean(axis=1)
         camera = self._camera
@@ -77,7 +77,7 @@ class Camera:
         camera.parallel_projection = parallel
 
     def fit(self, clouds: Iterable[FloatArray] = ()) -> None:
-        """Make everything fill the view, from the present side, beside the legend's strip.
+        """Make all that is drawn fill the view, from the present side, beside the legend's strip.
 
         ``clouds`` are more points (n, 3) to be seen: where the same things are at other steps.
         """
@@ -112,17 +112,17 @@ class Camera:
         return max(extent[1] / height, extent[0] / free, 1e-300) * height / 2.0 / FILL
 
     def sees_detail(self) -> bool:
-        """Tell whether much less than everything is in the view, for somebody wanted it so."""
+        """Tell whether somebody zoomed in: the view has much less than all that is drawn."""
         found = self._whole()
         return found is not None and self._camera.parallel_scale < DETAIL * found[1]
 
     @property
     def fitted(self) -> bool:
-        """Tell whether nobody has moved the camera since everything was made to fill the view."""
+        """Tell whether the camera is where `fit` put it."""
         return self._fitted == self.place
 
     def aim(self, centre: Any, half: float, depth: float = 0.0) -> None:
-        """Look at a point, seeing ``half`` the height above and below it.
+        """Aim at a point, with ``half`` the height of the view above and below the point.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Camera:
         return np.array([right / np.linalg.norm(right), up / np.linalg.norm(up), camera.direction])
 
     def shift(self) -> None:
-        """Keep the strip of the legend free: the picture shifts, the camera keeps its centre."""
+        """Shift the picture beside the strip of the legend; the camera keeps its centre."""
         width = self.stage.plotter.window_size[0]
         self._camera.SetWindowCenter(self.stage.strip() / max(width, 1), 0.0)
 
@@ -174,7 +174,7 @@ class Camera:
         renderer.ResetCameraClippingRange()
 
     def take(self, other: Camera) -> None:
-        """Look from where another eye looks; the strip of the legend stays as it is here."""
+        """Copy another camera's position and projection; the legend keeps its strip here."""
         camera, theirs = self._camera, other._camera
         camera.position, camera.focal_point = theirs.position, theirs.focal_point
         camera.up, camera.view_angle = theirs.up, theirs.view_angle
@@ -184,7 +184,7 @@ class Camera:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def sees_all(self, slack: float = SLACK) -> bool:
-        """Tell whether the boxes around all that should be seen are within the view.
+        """Tell whether the boxes around all data sets to be seen are within the view.
 
         They may be outside by ``slack``, a part of its size.
         """
@@ -197,7 +197,7 @@ class Camera:
         return bool((seen >= -slack * size).all() and (seen <= (1 + slack) * size).all())
 
     def loses_some(self) -> bool:
-        """Tell whether a node of what should be seen is outside the view, or below the legend."""
+        """Tell whether a node to be seen is outside the view, or below the legend."""
         width, height = self.stage.plotter.window_size
         free = np.array([width - self.stage.strip(), height])
         for shape in self._shapes():
@@ -207,7 +207,7 @@ class Camera:
         return False
 
     def looks_like(self, other: Camera) -> bool:
-        """Tell whether another eye looks from the same place in the same way."""
+        """Tell whether another camera has the same position and projection."""
         camera, theirs = self._camera, other._camera
         return (
             self.place == other.place
@@ -217,13 +217,13 @@ class Camera:
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Return position, focal point, up, and half the height seen: ten numbers."""
+        """Return position, focal point, up, and half the height of the view: ten numbers."""
         camera = self._camera
         numbers = (*camera.position, *camera.focal_point, *camera.up, camera.parallel_scale)
         return tuple(float(number) for number in numbers)
 
     def go(self, place: tuple[float, ...]) -> None:
-        """Look from a place that `place` returned."""
+        """Put the camera where `place` was read."""
         camera = self._camera
         camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
         camera.parallel_scale = place[9]

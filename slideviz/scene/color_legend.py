@@ -1,4 +1,4 @@
-"""What the colours mean: the roles, or the colour bar, in a strip at the right of the view."""
+"""The legend in a strip at the right of the view: the roles, or the colour bar."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Rect = tuple[float, float, float, float]
 
 
 class Plate:
-    """A rectangle in the colours of the background: seen only where something is behind it.
+    """A rectangle in the background's colours between the legend and the mesh behind.
 
     Parameters
     ----------
@@ -82,14 +82,14 @@ _LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
 
 @lru_cache(maxsize=1)
 def _font_file() -> str:
-    """Return a font with all signs we need; VTK's own has no Greek and looks coarse."""
+    """Return a font with Greek letters and signs, which VTK's own font lacks."""
     import matplotlib as mpl
 
     return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 
 def set_letters(text: Any, look: Look, size: float) -> None:
-    """Give a vtkTextProperty our font, the look's colour, and a size in pixels."""
+    """Give a vtkTextProperty the font, the color scheme's colour, and a size in pixels."""
     import pyvista as pv
 
     text.SetFontFamily(_VTK_FONT_FILE)

@@ -19,7 +19,7 @@ from slideviz.scene.stage import Stage
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Label
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.passages import keeps, moved
 from slideviz.session.section_cuts import Cuts
 from slideviz.session.state import Session
@@ -30,7 +30,7 @@ FILL = 0.94
 
 
 class FlatScene:
-    """One section of a session, flat, with its neighbours; both axes to the same scale.
+    """One section of a session laid flat, with its neighbours; both axes to the same scale.
 
     Parameters
     ----------
@@ -71,17 +71,17 @@ class FlatScene:
 
     @property
     def labels(self) -> tuple[Label, Label]:
-        """Return what both axes are called."""
+        """Return the names of both axes."""
         assert self.section is not None
         return self.section.shape.flat_labels(self.section)
 
     def update(self, session: Session, section: Section) -> None:
-        """Show another state, or another section."""
+        """Draw another state of the session, or another section."""
         assert session.frame is not None
         self.session, self.section = session, section
         self.stage.set_colours(session)
         by_value = session.view.colour_by != "role"
-        cut, only = self.cuts.of(session.frame.mesh, section), self.stage.chosen(session)
+        cut, only = self.cuts.of(session.frame.mesh, section), self.stage.in_threshold(session)
         key = (cut, only, section, session.frame if by_value else None)
         if key != self._made_of:
             self._made_of = key
@@ -92,9 +92,9 @@ class FlatScene:
         self._draw_mark()
 
     def _place(
-        self, cut: Polygons, only: Choice | None, section: Section, session: Session
+        self, cut: Polygons, only: CellsInRange | None, section: Section, session: Session
     ) -> None:
-        """Lay the polygons flat and draw them, but for cells that are not chosen."""
+        """Lay the polygons flat and draw those within the threshold."""
         assert session.frame is not None
         shape, ahead = section.shape, self._ahead(section, session)
         flat = shape.flatten(section, cut, ahead, ahead) if len(cut) else cut
@@ -115,7 +115,7 @@ class FlatScene:
         self._shown.show(flat)
 
     def _ahead(self, section: Section, session: Session) -> float | None:
-        """Return the angle that lies level, that of the undeformed mesh: so it does in all views.
+        """Return the angle that lies level: that of the undeformed mesh, alike in all views.
 
         Looked for only where it may be another.
         """
@@ -156,7 +156,7 @@ class FlatScene:
         mine = np.flatnonzero(self.polygons.cells == self.session.view.marked)
         self._mark.show(self.polygons.take(mine))
 
-    # What is told ----------------------------------------------------------------------
+    # Facts --------------------------------------------------------------------------------
 
     @property
     def summary(self) -> str:
@@ -166,7 +166,7 @@ class FlatScene:
         """
         if self.polygons is None or self._all is None or not len(self._all):
             return "it cuts no cell"
-        only = self.stage.chosen(self.session)
+        only = self.stage.in_threshold(self.session)
         cells, every = self.polygons.cell_ids, len(self._all.cell_ids)
         if only is not None and not len(cells):
             return f"none of {every:,} cells cut is shown: {only.words}"
@@ -192,7 +192,7 @@ class FlatScene:
     # Camera ----------------------------------------------------------------------------
 
     def set_look(self, look: Look) -> None:
-        """Take other colours for background and edges."""
+        """Take the colours of another color scheme for background and edges."""
         self.stage.look = look
         self.stage.set_background()
         if self.section is not None and self.session.frame is not None:
@@ -213,7 +213,7 @@ class FlatScene:
         return low[:2], high[:2]
 
     def fit(self) -> None:
-        """Make everything fill the view."""
+        """Make the section fill the view."""
         scenes = [self] if self.beside is None else [self, self.beside]
         found = [box for box in (scene.bounds() for scene in scenes) if box is not None]
         if not found:
@@ -234,7 +234,7 @@ class FlatScene:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def take_camera(self, other: FlatScene) -> None:
-        """Look at what another scene looks at."""
+        """Show the same part of the plane as another flat scene."""
         camera, theirs = self.stage.plotter.camera, other.stage.plotter.camera
         camera.parallel_projection = True
         camera.focal_point, camera.position = theirs.focal_point, theirs.position
@@ -242,7 +242,7 @@ class FlatScene:
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
     def looks_like(self, other: FlatScene) -> bool:
-        """Tell whether another scene looks at the same."""
+        """Tell whether another flat scene shows the same part of the plane."""
         cameras = (self.stage.plotter.camera, other.stage.plotter.camera)
         one, two = ((*c.focal_point, *c.position, *c.up, c.parallel_scale) for c in cameras)
         return one == two
@@ -260,7 +260,7 @@ class FlatScene:
         camera.parallel_scale = camera.parallel_scale / factor
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return what the view reaches from left to right, and from bottom to top."""
+        """Return the ranges of the view from left to right, and from bottom to top."""
         camera = self.stage.plotter.camera
         width, height = self.stage.plotter.window_size
         x, y, _ = camera.focal_point
@@ -270,7 +270,7 @@ class FlatScene:
 
 
 def flat_matrix(section: Section, pair: Pair, number: int, matrix: FloatArray) -> FloatArray:
-    """Return the transformation (4, 4) of the flat section that a period's power is.
+    """Return the matrix (4, 4) that moves the flat section as a power of the period does.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ghosts in the scene: where boundaries were, and where motions will take them."""
+"""Ghosts in the scene: the undeformed boundaries, and those where motions will take them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.case.model import Case
-from slideviz.color_scheme import CLASH_COLOUR
+from slideviz.color_scheme import INTERSECTION_COLOUR
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
@@ -69,7 +69,7 @@ class GhostLayer:
         self._draw_moved(self._session)
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         self._session = new
         self._draw_undeformed(new)
         self._draw_moved(new)
@@ -90,11 +90,11 @@ class GhostLayer:
                     if part in self._actors:
                         self._actors[part].visibility = False
                 continue
-            colour = CLASH_COLOUR if session.clash else ROLES["moving"].colour
+            colour = INTERSECTION_COLOUR if session.intersection else ROLES["moving"].colour
             for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
-                actor.prop.line_width = 4.5 if session.clash else 2.5
+                actor.prop.line_width = 4.5 if session.intersection else 2.5
                 actor.visibility = True
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
@@ -134,7 +134,7 @@ class GhostLayer:
         return [faces, rim]
 
     def _part(self, key: str, make: Callable[[FloatArray, float], Any]) -> tuple[Any, Any]:
-        """Return the actor of that name and its shape, made where they are not there yet."""
+        """Return the actor and the shape of a name, made at the first call."""
         if key not in self._actors:
             mesh = self._session.mesh
             assert mesh is not None
@@ -147,7 +147,7 @@ class GhostLayer:
 
 
 def _shift_depth(actor: Any, units: float) -> None:
-    """Draw an actor so much deeper than where it is; less than 0 is nearer."""
+    """Draw an actor deeper than its place by so much; a negative number is nearer."""
     mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, units)
@@ -155,7 +155,7 @@ def _shift_depth(actor: Any, units: float) -> None:
 
 
 def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
-    """Tell whether the ghost of a boundary, at points (u, d), is elsewhere than what is shown.
+    """Tell whether the ghost of a boundary, at points (u, d), is apart from the boundary shown.
 
     A run takes its boundary there but for the tolerance of the data reduction; the two would
     flicker in the same place.
@@ -172,7 +172,7 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
 
 
 def is_planned(session: Session) -> bool:
-    """Tell whether a view should say where motions will take boundaries.
+    """Tell whether a view shows where motions will take boundaries.
 
     Of the undeformed mesh it should; of the steps of a run, where settings have changed since.
     Two views beside each other say the same, or a ghost would look like a difference between

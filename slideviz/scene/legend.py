@@ -27,7 +27,7 @@ PLATE = "plate:legend"
 
 
 class LegendLayer:
-    """What the colours mean, in a strip at the right."""
+    """The legend of roles or the colour bar, in a strip at the right."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -53,7 +53,7 @@ class LegendLayer:
         return []
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Show another state; made anew only where it differs, which takes longer than the rest."""
+        """Draw another state of the session; a legend of other words is made anew."""
         key = self._key(new)
         if key != self._drawn:
             self._drawn = key
@@ -77,10 +77,10 @@ class LegendLayer:
             top = 24.0 * len(roles) + 16
             self._end = add_point_legend(stage.plotter, stage.point_words, top, style)
             return
-        told = COLOUR_BY[what]
-        add_colour_bar(stage.plotter, self._mapper, told, has_inverted(session), style)
+        term = COLOUR_BY[what]
+        add_colour_bar(stage.plotter, self._mapper, term, has_inverted(session), style)
         end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
-        self._bar, self._end = (told.label, end + (34 if stage.point_words else 0)), end
+        self._bar, self._end = (term.label, end + (34 if stage.point_words else 0)), end
 
     def _place(self) -> None:
         """Put colour bar and plate where they belong in a view of this size."""
@@ -98,7 +98,7 @@ class LegendLayer:
             self._plate.place(rect)
 
     def _key(self, session: Session) -> tuple[object, ...]:
-        """Return all that the legend says, and how."""
+        """Return all words and colours of the legend."""
         mesh, view = session.mesh, session.view
         names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
@@ -132,17 +132,17 @@ class TriadLayer:
         """Draw another mesh."""
 
     def clear(self) -> None:
-        """Forget the mesh; the arrows are no actor of the scene and only hidden."""
+        """Hide the arrows, which are no actors of the scene."""
         if self._axes is not None:
             self.stage.plotter.hide_axes()
         self._drawn = ()
 
     def shapes(self) -> list[Any]:
-        """Return nothing: the corner is the same wherever one looks from."""
+        """Return nothing: the arrows have a corner of the view."""
         return []
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         plotter = self.stage.plotter
         shown = "triad" in new.view.drawn and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
@@ -153,7 +153,7 @@ class TriadLayer:
         self._drawn = key
         if self._axes is None:
             self._axes = self._make()
-        # Of a 2D mesh, z points at the eye: its letter would lie on the others' origin.
+        # Of a 2D mesh, z points at the camera: its letter would lie on the others' origin.
         self._axes.SetZAxisLabelText("" if flat else "z")
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()

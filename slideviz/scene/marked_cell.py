@@ -1,4 +1,4 @@
-"""Layer of the scene that outlines the marked cell, in front of everything else."""
+"""The layer that outlines the selected cell, in front of everything else."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ IN_FRONT = -66_000.0
 
 
 class MarkLayer:
-    """The cell that the view marks: edges, sides in the colour of its value, and a dot.
+    """The selected cell: its edges, its sides in the colour of its value, and a dot.
 
     The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
     3D mesh, the boundaries let it be seen (`slideviz.scene.mesh.BoundaryLayer`).
@@ -54,7 +54,7 @@ class MarkLayer:
         return []
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         cell, frame = new.view.marked, new.frame
         if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
             for name in self._drawn:

@@ -37,7 +37,7 @@ def recoloured(old: Session | None, new: Session) -> bool:
 
 
 class CellLayer:
-    """All cells of a 2D mesh; of a 3D mesh the outside of a part, or of all without markers.
+    """The cells of a 2D mesh; of a 3D mesh the outside of a part, or of all without markers.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class CellLayer:
         return np.asarray(mesh.points[self.shape.point_data[POINT]])
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         if self.actor is None or new.mesh is None or new.frame is None:
             return
         by_value = new.view.colour_by != "role"
@@ -107,7 +107,7 @@ class CellLayer:
 
 
 class BoundaryLayer:
-    """The boundaries, each an actor, with a band around those that are selected.
+    """The boundaries, an actor each, with a band around selected ones.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class BoundaryLayer:
         return Drawn(surface, shape, actor)
 
     def _add_band(self, surface: Surface, points: FloatArray) -> Band:
-        """Return what highlights a boundary; made when first wanted, for most never are."""
+        """Return the band of a boundary, made at the first call: most are never selected."""
         rim = actors.rim_shape(surface, points, self._lift)
         band = self.stage.add(rim, f"selected:{surface.name}", lighting=False)
         band.prop.color = SELECTED_COLOUR
@@ -165,7 +165,7 @@ class BoundaryLayer:
         return Band(rim, band)
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         if new.mesh is None or new.frame is None or not self.drawn:
             return
         if old is None or old.frame is not new.frame:
@@ -184,7 +184,7 @@ class BoundaryLayer:
             one.actor.prop.culling = "back" if culled else "none"
 
     def _glass(self, session: Session) -> frozenset[str]:
-        """Return what would hide boundaries that move, where colours tell of roles."""
+        """Return the boundaries that would hide moving ones, where colours show roles."""
         view = session.view
         within = (name for name in self._enclosed if name not in view.hidden)
         if view.colour_by != "role" or all(session.role(name) != "moving" for name in within):
@@ -229,7 +229,7 @@ class BoundaryLayer:
 
 
 def looks_inside(session: Session) -> bool:
-    """Tell whether cells inside a 3D mesh are shown, so that its boundaries must let see them."""
+    """Tell whether boundaries of a 3D mesh are transparent, as cells inside are shown."""
     view = session.view
     if session.mesh is None or session.mesh.dim == 2:
         return False
@@ -237,14 +237,14 @@ def looks_inside(session: Session) -> bool:
 
 
 def is_faded(session: Session) -> bool:
-    """Tell whether sections show cells of a 2D mesh, so that the others must step back."""
+    """Tell whether cells of a 2D mesh are faint, as sections show some of them."""
     if session.mesh is None or session.mesh.dim == 3:
         return False
     return any(section.shown and section.can_cut(2) for section in session.view.sections)
 
 
 def seen_from_outside(session: Session) -> bool:
-    """Tell whether boundaries that enclose a 3D mesh show nothing but their outside."""
+    """Tell whether boundaries around a 3D mesh are drawn with their outside only."""
     view = session.view
     glass = view.hidden or "perspective" in view.drawn or looks_inside(session)
     # The outside of a folded cell is inside.
@@ -252,7 +252,7 @@ def seen_from_outside(session: Session) -> bool:
 
 
 def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
-    """Return the names of boundaries of a 3D mesh that are inside of all others: a wing in air.
+    """Return the names of boundaries of a 3D mesh inside all others, as a wing in air.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
 
 
 def is_closed(surfaces: Sequence[Surface]) -> bool:
-    """Tell whether surfaces together enclose something: every edge has two faces."""
+    """Tell whether surfaces together enclose a volume: every edge has two faces."""
     faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
     if len(faces) != len(surfaces) or not faces:
         return False

@@ -1,4 +1,4 @@
-"""What moved in a mesh, and from where to look at it."""
+"""The moved part of a mesh, and the direction from which it is shown."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def require_detail(zoom: Zoom, mesh: Mesh) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Overview:
-    """Which cells of a mesh are seen, and from where, as long as nobody chooses that.
+    """The cells of a mesh that are shown, and from where, as long as nobody chooses otherwise.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Overview:
 
     @classmethod
     def of(cls, mesh: Mesh, base: Mesh, zoom: Zoom = "auto") -> Overview:
-        """Return that of a deformed mesh, whose nodes were where they are in ``base``.
+        """Return the overview of a deformed mesh whose undeformed one is ``base``.
 
         A 2D mesh is seen from above. Of a 3D mesh the half behind a plane is seen, cells uncut;
         the plane goes through what moved most and along the way it moved.
@@ -92,7 +92,7 @@ class Overview:
 
 
 def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
-    """Return the surroundings of what moved, when it would be a dot in a view of the whole.
+    """Return the surroundings of moved nodes that would be a dot in a view of the whole mesh.
 
     That are the boundaries inside the mesh that moved: an airfoil in a wide far field. None
     when they are large enough, or when it is an outer boundary that moved.
@@ -110,7 +110,7 @@ def tiny_motion(mesh: Mesh, base: Mesh) -> Detail | None:
 
 
 def lengths(mesh: Mesh, base: Mesh) -> FloatArray:
-    """Return how far each node is from where it was, (n,)."""
+    """Return the length of the displacement of each node, (n,)."""
     return np.asarray(np.linalg.norm(mesh.points - base.points, axis=1))
 
 
@@ -129,7 +129,7 @@ def _is_inside(base: Mesh, nodes: IntArray) -> bool:
 
 
 def half_of(mesh: Mesh, base: Mesh) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the cells to show, the direction to the eye, and what is up.
+    """Return the cells to show, the direction to the camera, and the direction that is up.
 
     All cells of a 2D mesh, seen from above; of a 3D mesh those behind a plane through what moved.
     """

@@ -33,13 +33,13 @@ CELLS, CHOSEN = "", "\n"
 
 
 class Period:
-    """The period of the mesh of a session, looked for once for each choice of boundaries."""
+    """The period of a session's mesh, found once for each choice of boundaries."""
 
     def __init__(self) -> None:
         self._found: tuple[object, Pair | None] | None = None
 
     def of(self, session: Session) -> Pair | None:
-        """Return the pair of boundaries that repeats the mesh, or None when nothing does."""
+        """Return the pair of boundaries whose period repeats the mesh, or None."""
         case, mesh = session.case, session.mesh
         if mesh is None:
             return None
@@ -55,7 +55,7 @@ class Period:
 
 
 def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
-    """Return the transformation (4, 4) of each neighbour that the view shows, by its number."""
+    """Return the transformation (4, 4) of each neighbouring passage shown, by its number."""
     count = session.view.copies
     if pair is None or count == 0:
         return {}
@@ -80,8 +80,8 @@ def outermost(points: FloatArray) -> FloatArray:
     return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
 
 
-class CopyLayer:
-    """Boundaries, cells of a 2D mesh, and chosen cells, drawn again where the neighbours are.
+class PassageLayer:
+    """The neighbouring passages: boundaries, cells of a 2D mesh, and cells of the threshold.
 
     The actors of all neighbours share the data of the scene's own shapes, one mapper and one
     property for each shape: a wheel takes the memory of one passage.
@@ -119,7 +119,7 @@ class CopyLayer:
         self._mappers, self._props, self._actors = {}, {}, {}
 
     def shapes(self) -> list[Any]:
-        """Return the outermost points of every neighbour."""
+        """Return the outermost points of every passage."""
         if not self._matrices:
             return []
         # Chosen cells are within the others.
@@ -129,7 +129,7 @@ class CopyLayer:
         return [pv.PolyData(moved(ends, matrix)) for matrix in self._matrices.values()]
 
     def update(self, _old: Session | None, new: Session) -> None:
-        """Show another state; points and values are those of the mesh itself."""
+        """Draw another state of the session; points and values are those of the mesh itself."""
         pair = self._period.of(new) if new.view.copies else None
         # Chosen cells have no actor before some are chosen for the first time.
         key = (pair, new.view.copies, self._chosen.actor)
@@ -140,7 +140,7 @@ class CopyLayer:
             self._style()
 
     def _sources(self) -> dict[str, tuple[Any, Any]]:
-        """Return shape and actor of all that is drawn again, by name."""
+        """Return shape and actor of all that every passage repeats, by name."""
         found = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
         if self._cells.shape is not None:
             found[CELLS] = self._cells.shape, self._cells.actor
@@ -182,7 +182,7 @@ class CopyLayer:
         return mapper
 
     def _style(self) -> None:
-        """Take the colours of the mesh itself, paler."""
+        """Give the passages the colours of the mesh itself, paler."""
         self._pale_table()
         plain = np.array(pv.Color(self.stage.look.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
@@ -199,7 +199,7 @@ class CopyLayer:
                 copy.SetForceOpaque(actor.GetForceOpaque())
 
     def _pale_table(self) -> None:
-        """Give the neighbours the colours of the values, paler, over the same range."""
+        """Give the passages the colours of the values, paler, over the same range."""
         own = self.stage.table
         key = (own.cmap.name, tuple(own.scalar_range), self.stage.look)
         if key == self._table_key:

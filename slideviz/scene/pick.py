@@ -1,4 +1,4 @@
-"""Which boundary and which cell are under the mouse."""
+"""The boundary and the cell under the mouse."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REACH = 9.0
 
 
 def to_display(plotter: Any, points: FloatArray) -> FloatArray:
-    """Return where world points (n, 3) are seen, (n, 2) in pixels from the lower left."""
+    """Return the pixels (n, 2) of world points (n, 3), counted from the lower left."""
     renderer = plotter.renderer
     aspect = renderer.GetTiledAspectRatio()
     matrix = renderer.camera.GetCompositeProjectionTransformMatrix(aspect, -1, 1)
@@ -75,7 +75,7 @@ def _cell_picker() -> Any:
 
 
 def on_plane(plotter: Any, x: float, y: float) -> tuple[float, float]:
-    """Return where the line of sight through a pixel meets the plane z = 0."""
+    """Return the point where the line of sight through a pixel meets the plane z = 0."""
     renderer = plotter.renderer
     ends = []
     for depth in (0.0, 1.0):

@@ -1,4 +1,4 @@
-"""Nodes in the scene as points: what they may do, or the control nodes of a step."""
+"""Nodes in the scene as points: by their type, or the control nodes of a step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _RGB = np.array([pv.Color(term.colour).int_rgb for term in NODE_TYPES.values()],
 
 
 class PointLayer:
-    """Small balls at nodes."""
+    """Nodes drawn as small balls."""
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -46,11 +46,11 @@ class PointLayer:
         self.stage.point_words = ()
 
     def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries are seen whole already."""
+        """Return nothing: the boundaries with these nodes are seen whole already."""
         return []
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         if new.mesh is None or new.frame is None:
             return
         typed = self._types.of(new)

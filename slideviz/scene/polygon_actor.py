@@ -45,28 +45,28 @@ class PolygonActor:
         self.actor.visibility = False
 
     def show(self, polygons: Polygons, lift: float = 0.0) -> None:
-        """Draw these, raised by ``lift`` in z; their numbers are 0."""
+        """Draw polygons, raised by ``lift`` in z, with 0 for their values."""
         self.polygons = polygons
         self.shape = polygon_shape(polygons, lift)
         self.mapper.dataset = self.shape
         self.actor.visibility = len(polygons) > 0
 
     def colour(self, values: FloatArray | None) -> None:
-        """Give the polygons the numbers of their cells, (m,) for all of the mesh; None: none."""
+        """Give the polygons the values of their cells, (m,) for all of the mesh; None: none."""
         if values is not None:
             self.shape.cell_data[VALUES] = values[self.polygons.cells]
         self.mapper.scalar_visibility = values is not None
 
 
 def plain_colour(look: Look) -> tuple[float, float, float]:
-    """Return the colour of polygons without numbers: it stands off from any background."""
+    """Return the colour of polygons without values, seen on any background."""
     cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (look.cell, look.ghost))
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue
 
 
 def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
-    """Return polygons, or lines, as PolyData with room for the numbers of their cells."""
+    """Return polygons, or lines, as PolyData with room for the values of their cells."""
     shape = pv.PolyData()
     shape.points = polygons.points + np.array([0.0, 0.0, lift])
     table = pv.CellArray.from_arrays(polygons.offsets, polygons.connectivity)  # type: ignore[arg-type]
@@ -79,7 +79,7 @@ def polygon_shape(polygons: Polygons, lift: float = 0.0) -> Any:
 
 
 class Instances:
-    """Images of one actor under matrices, with its data, mapper and property.
+    """Instances of one actor under matrices, with its data, mapper and property.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Instances:
         self.drawn: dict[int, Any] = {}
 
     def show(self, matrices: Mapping[int, FloatArray]) -> None:
-        """Draw one under each matrix (4, 4), by its number; those of other numbers go."""
+        """Draw an instance for each matrix (4, 4), by its number; those of other numbers go."""
         for number in [number for number in self.drawn if number not in matrices]:
             self.stage.remove(self.drawn.pop(number).name)
         base = self.base.actor

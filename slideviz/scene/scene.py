@@ -1,4 +1,4 @@
-"""What is drawn: boundaries, cells, ghosts and legend in a plotter that it is given.
+"""The scene: boundaries, cells, sections, ghosts and legend in a given plotter.
 
 The plotter may be the window's or an off-screen one. A scene is made of layers, one for each
 kind of thing; only they, and `slideviz.scene.actors`, make VTK objects, all of it in the
@@ -23,7 +23,7 @@ from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cell import MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
 from slideviz.scene.moved import Overview
-from slideviz.scene.passages import CopyLayer
+from slideviz.scene.passages import PassageLayer
 from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
@@ -63,7 +63,7 @@ class Scene:
             self.sections,
             MarkLayer(self.stage),
             self._ghosts,
-            CopyLayer(self.stage, self._cells, self._boundaries, self._chosen),
+            PassageLayer(self.stage, self._cells, self._boundaries, self._chosen),
             PointLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
@@ -74,12 +74,12 @@ class Scene:
 
     @property
     def plotter(self) -> Any:
-        """Return where it is drawn."""
+        """Return the plotter that the scene draws into."""
         return self.stage.plotter
 
     @property
     def look(self) -> Look:
-        """Return the colours of background, text and edges."""
+        """Return the color scheme."""
         return self.stage.look
 
     @property
@@ -102,7 +102,7 @@ class Scene:
     def opening(
         self, session: Session, surfaces: Sequence[Surface], part: IntArray | None = None
     ) -> Iterator[None]:
-        """Draw another mesh, and yield between the pieces of that.
+        """Draw another mesh, and yield between the pieces of this work.
 
         Of a 3D mesh ``part`` are the cells (k,) to draw where no boundaries are.
         """
@@ -126,7 +126,7 @@ class Scene:
         self.session = Session()
 
     def update(self, session: Session) -> None:
-        """Show another state of the same mesh; only what differs is touched."""
+        """Draw another state of the same mesh; only differences are touched."""
         old, self.session = self.session, session
         if session.mesh is None or old.mesh is None:
             return
@@ -136,18 +136,18 @@ class Scene:
             self.plotter.camera.parallel_projection = self._parallel()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours for background, letters and edges."""
+        """Take another color scheme for background, letters and edges."""
         self.stage.look = look
         self.stage.set_background()
         self._again()
 
     def set_legend(self, drawn: bool) -> None:
-        """Draw the legend where it is wanted, or leave it to a view beside this one."""
+        """Draw the legend here, or leave it to a view beside this one."""
         self.stage.has_legend = drawn
         self.resized()
 
     def resized(self) -> None:
-        """Put the legend where it belongs in a view of another size."""
+        """Put the legend at its place in a view of another size."""
         self.camera.shift()
         self._again()
 
@@ -158,22 +158,22 @@ class Scene:
     # Ghosts -----------------------------------------------------------------------------
 
     def set_motion_ghosts(self, ghosts: Mapping[str, FloatArray]) -> None:
-        """Draw where boundaries will go: points (u, d) of the nodes of each."""
+        """Draw ghosts of moved boundaries: points (u, d) of the nodes of each."""
         self._ghosts.set_moved(ghosts)
 
     @property
     def motion_ghosts(self) -> dict[str, FloatArray]:
-        """Return where boundaries will go, as it was set."""
+        """Return the points of the ghosts of moved boundaries."""
         return dict(self._ghosts.moved)
 
     # Camera and mouse -------------------------------------------------------------------
 
     def look_from(self, side: str) -> None:
-        """Look at all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
+        """Show all of the mesh from a side: a key of `slideviz.scene.camera.SIDES`."""
         self.camera.look_from(side, self._parallel())
 
     def look_along(self, view: Overview, meshes: Iterable[Mesh]) -> None:
-        """Look at all that is drawn of some states of the mesh, or at the detail of a view."""
+        """Show all that is drawn of some states of the mesh, or the detail of an overview."""
         mesh = self.session.mesh
         assert mesh is not None
         self.camera.turn(view.towards, view.up, True)
@@ -194,15 +194,15 @@ class Scene:
         return [shape for layer in self.layers for shape in layer.shapes()]
 
     def take_camera(self, other: Scene) -> None:
-        """Look from where another scene looks."""
+        """Copy the camera of another scene."""
         self.camera.take(other.camera)
 
     def fit(self) -> None:
-        """Make everything fill the view, from the present side, beside the legend's strip."""
+        """Make all that is drawn fill the view, from the present side, beside the legend."""
         self.camera.fit()
 
     def sees_all(self, slack: float = SLACK) -> bool:
-        """Tell whether nothing of the mesh is outside the view, or by a part of it only."""
+        """Tell whether the mesh is in the view, but for a small part of the view's size."""
         return self.camera.sees_all(slack)
 
     def zoom_at(self, x: float, y: float, factor: float) -> None:
@@ -238,9 +238,9 @@ class Scene:
             return None
         if session.mesh.dim == 2:
             values = self.stage.values(session)
-            # Where cells overlap, an inverted one is told of before the others.
+            # Where cells overlap, an inverted one comes before the others.
             rank = np.where(np.isnan(values), -np.inf, values)
-            only = self.stage.chosen(session)
+            only = self.stage.in_threshold(session)
             if only is not None:
                 rank = np.where(only.mask, rank, np.nan)
             at = pick.on_plane(self.plotter, x, y)
@@ -263,7 +263,7 @@ class Scene:
         return shown
 
     def fly_to(self, cell: int) -> None:
-        """Look at a cell of the frame that is shown, from the present side and near."""
+        """Aim at a cell of the frame that is shown, from the present side and near."""
         mesh = self.session.frame.mesh if self.session.frame is not None else None
         if mesh is None or not 0 <= cell < len(mesh.cells):
             return

@@ -1,4 +1,4 @@
-"""Sections in the scene: the cells that planes and cylinders cut, in the colours of the view."""
+"""Sections in the scene: the polygons of their cuts, in the colours of the view."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ LIFTS = {NAME: 0.7, BAND: 0.6, RIM: 0.5}
 
 @dataclass(eq=False)
 class SectionDrawn:
-    """A section in the scene: what shows its polygons, and of what they were made."""
+    """A section in the scene: the actor of its polygons, and what the polygons depend on."""
 
     shown: PolygonActor
     made_of: tuple[object, ...] = ()
 
     @property
     def polygons(self) -> Polygons:
-        """Return the polygons."""
+        """Return the polygons of the section."""
         return self.shown.polygons
 
     @property
     def actor(self) -> Any:
-        """Return their actor."""
+        """Return the actor of the polygons."""
         return self.shown.actor
 
 
 class SectionLayer:
-    """What the sections of the view show of the mesh, and of its neighbouring passages.
+    """The cuts of the view's sections through the mesh and its neighbouring passages.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class SectionLayer:
         self.clear()
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; its sections come with its state."""
+        """Draw another mesh; its sections come with the state of the session."""
 
     def clear(self) -> None:
         """Forget the mesh."""
@@ -80,7 +80,7 @@ class SectionLayer:
         self._box: tuple[tuple[object, ...], Box] | None = None
 
     def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries are around it anyway."""
+        """Return nothing: the boundaries around the sections are seen whole already."""
         return []
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
@@ -92,14 +92,14 @@ class SectionLayer:
         ]
 
     def actors(self) -> list[Any]:
-        """Return all that sections show, of neighbours too."""
+        """Return the actors of all sections, of neighbouring passages too."""
         instances = (
             instance for one in self._instances.values() for instance in one.drawn.values()
         )
         return [*(one.actor for one in self.drawn.values() if len(one.polygons)), *instances]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state; only what differs is cut or coloured again."""
+        """Draw another state of the session; only differences are cut or coloured again."""
         if new.frame is None or not (new.view.sections or self.drawn):
             return
         wanted = self._wanted(new)
@@ -122,7 +122,7 @@ class SectionLayer:
             self._draw_lines(new, neighbours)
 
     def _draw_lines(self, session: Session, neighbours: dict[int, FloatArray]) -> None:
-        """Draw the cutting lines of a 2D mesh across all that is drawn of it."""
+        """Draw the section lines of a 2D mesh across all that is drawn of the mesh."""
         assert session.frame is not None
         mesh, sections = session.frame.mesh, dict(shown_sections(session))
         key = (mesh, sections, tuple(neighbours), self.stage.look)
@@ -135,7 +135,7 @@ class SectionLayer:
         self._lines.show(sections, self._box[1], self.stage.lift(mesh))
 
     def _find_box(self, mesh: Mesh, neighbours: dict[int, FloatArray]) -> Box:
-        """Return the box around a mesh and its neighbours."""
+        """Return the box around a mesh and its neighbouring passages."""
         own = mesh.points[self.cuts.cutter(mesh).used]
         every = [own, *(moved(own, matrix) for matrix in neighbours.values())]
         boxes = [box_around(points) for points in every]
@@ -146,7 +146,7 @@ class SectionLayer:
         return matrices(session, self._period.of(session) if session.view.copies else None)
 
     def _wanted(self, session: Session) -> dict[str, tuple[Section, int, FloatArray | None]]:
-        """Return what is cut: section and passage, with the matrix of a neighbour, by name."""
+        """Return section and passage of each cut, with the passage's matrix, by name."""
         found: dict[str, tuple[Section, int, FloatArray | None]] = {}
         neighbours = self._neighbours(session)
         for index, section in shown_sections(session):
@@ -169,7 +169,7 @@ class SectionLayer:
         frame, by_value = session.frame, session.view.colour_by != "role" and kind != RIM
         assert frame is not None
         # The view's way to find the period may change with the case, and so the matrix.
-        only = self.stage.chosen(session)
+        only = self.stage.in_threshold(session)
         key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes(), only)
         one = self.drawn.get(name)
         if one is None:
@@ -188,7 +188,7 @@ class SectionLayer:
         prop, look = shown.actor.prop, self.stage.look
         prop.color = look.text if kind == RIM else plain_colour(look)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
-        # A cut has the very colours of the bar; whole cells need shades to be told apart.
+        # A cut has the very colours of the bar; whole cells need shades that set them apart.
         prop.lighting = solid
         prop.ambient, prop.diffuse = (0.6, 0.4) if solid else (1.0, 0.0)
         self.stage.edges(prop, "edges" in session.view.drawn, session.view.colour_by == "role")
@@ -225,7 +225,7 @@ shown whole, and below a band in the colours of the cells."""
 
 
 class CutLines:
-    """Draws where sections are, also where they cut no cell: in holes, and beside the mesh.
+    """The lines of sections of a 2D mesh, also in holes and beside the mesh.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ class CutLines:
         self._shapes: dict[str, Any] = {}
 
     def show(self, sections: Mapping[int, Section], box: Box, lift: float) -> None:
-        """Draw these, by their places in the list, across a box; ``lift`` is that of the stage."""
+        """Draw the lines of sections, by their places in the list; ``lift`` is the stage's."""
         wanted = {f"{LINE}{index}": section for index, section in sections.items()}
         for name in [name for name in self._actors if name not in wanted]:
             self.stage.remove(name)

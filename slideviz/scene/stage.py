@@ -1,4 +1,4 @@
-"""What all parts of a scene share: the plotter, the look, the colours of values."""
+"""The stage: plotter, color scheme and colours of values, shared by the layers of a scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Session
 
 
@@ -24,13 +24,13 @@ class Layer(Protocol):
         """Draw another mesh; nothing of the one before is left in the plotter."""
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state of the same mesh, touching only what differs; None: set all."""
+        """Draw another state of the same mesh, touching only differences; None: set all."""
 
     def clear(self) -> None:
-        """Forget the mesh; the actors are gone already."""
+        """Forget the mesh, whose actors are gone already."""
 
     def shapes(self) -> list[Any]:
-        """Return the data sets that should be seen when everything is made to fit the view."""
+        """Return the data sets that `Camera.fit` shows."""
 
 
 class Stage:
@@ -62,10 +62,10 @@ class Stage:
         self.has_legend = True
         self.has_plate = True
         self._values: tuple[object, FloatArray] | None = None
-        self._chosen: tuple[FloatArray, object, Choice] | None = None
+        self._in_threshold: tuple[FloatArray, object, CellsInRange] | None = None
 
     def add(self, shape: Any, name: str, **options: Any) -> Any:
-        """Return the actor of a new data set; cells have no colour of their values yet."""
+        """Return the actor of a new data set, whose cells have no colour of their values yet."""
         valued = VALUES in shape.cell_data
         actor = self.plotter.add_mesh(
             shape,
@@ -87,11 +87,11 @@ class Stage:
         return actor
 
     def remove(self, name: str) -> None:
-        """Remove an actor, if it is there."""
+        """Remove an actor, if the plotter has it."""
         self.plotter.remove_actor(name, reset_camera=False, render=False)
 
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
-        """Draw the edges of an actor's cells, or do not; plain cells have the look's own colour."""
+        """Draw the edges of an actor's cells, or not; plain ones in the color scheme's colour."""
         prop.show_edges = shown
         prop.edge_color = self.look.edge if plain else VALUE_EDGE
         prop.edge_opacity = 0.45
@@ -101,13 +101,13 @@ class Stage:
         return LIFT * mesh.extent if mesh.dim == 2 else 0.0
 
     def strip(self) -> float:
-        """Return how many pixels at the right are the legend's."""
+        """Return the width of the legend's strip, in pixels."""
         if not self.has_legend:
             return 0.0
         return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:
-        """Return the number of every cell of the frame that is shown, (m,), for the colours.
+        """Return the value of every cell of the frame that is shown, (m,), for the colours.
 
         Not a number for inverted cells. Made once for a frame, whatever layers ask for it.
         """
@@ -118,25 +118,26 @@ class Stage:
             self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
 
-    def chosen(self, session: Session) -> Choice | None:
-        """Return which cells the range of the view leaves, None where there is no range."""
+    def in_threshold(self, session: Session) -> CellsInRange | None:
+        """Return the cells within the threshold of the view, None where there is no threshold."""
         threshold = session.view.threshold
         if threshold is None:
             return None
         values = self.values(session)
-        if self._chosen is None or self._chosen[0] is not values or self._chosen[1] != threshold:
-            self._chosen = values, threshold, Choice.of(values, threshold)
-        return self._chosen[2]
+        known = self._in_threshold
+        if known is None or known[0] is not values or known[1] != threshold:
+            known = self._in_threshold = values, threshold, CellsInRange.of(values, threshold)
+        return known[2]
 
     def set_colours(self, session: Session) -> None:
-        """Give the table the map and the range of the session."""
+        """Give the table of colours the map and the range of the session."""
         low, high = session.colour_range
         self.table.scalar_range = (low, high)
         if session.view.colour_map != self.table.cmap.name:
             self.table.apply_cmap(session.view.colour_map, 256)
 
     def set_background(self) -> None:
-        """Give the plotter the background of the look."""
+        """Give the plotter the background of the color scheme."""
         look = self.look
         top = None if look.background == look.background_top else look.background_top
         self.plotter.set_background(look.background, top=top)

@@ -1,4 +1,4 @@
-"""Only the cells whose value is in a range: whole, with the others out of the way."""
+"""The threshold: only the cells whose value is in a range, whole; the others faint or gone."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, part_shape, see_through
 from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
 from slideviz.scene.stage import Stage
-from slideviz.sections.threshold import chosen_cells
+from slideviz.sections.threshold import cells_in_range
 from slideviz.session.state import Session
 
 NAME = "chosen"
 
 
 class ThresholdLayer:
-    """The cells that the threshold of the view leaves.
+    """The cells within the threshold of the view.
 
     In 2D the other cells keep a faint area without lines; in 3D the sides between chosen cells
     are left out, so that what is drawn grows with the surface of what is chosen.
@@ -55,7 +55,7 @@ class ThresholdLayer:
         self._faded = False
 
     def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries are around it anyway."""
+        """Return nothing: the boundaries around the cells are seen whole already."""
         return []
 
     @property
@@ -64,13 +64,13 @@ class ThresholdLayer:
         return np.asarray(self.shape.cell_data[CELL])
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
-        """Return the actor of the chosen cells, if there are some, with their polygons' cells."""
+        """Return the actor of the cells, if there are some, with the cell of each polygon."""
         if self.cells is None or not len(self.cells):
             return []
         return [(self.actor, self.owner)]
 
     def update(self, old: Session | None, new: Session) -> None:
-        """Show another state."""
+        """Draw another state of the session."""
         chosen = new.view.threshold is not None and new.frame is not None
         self._fade(new, chosen)
         if not chosen:
@@ -87,7 +87,7 @@ class ThresholdLayer:
             self.stage.edges(self.actor.prop, "edges" in new.view.drawn)
 
     def _fade(self, session: Session, chosen: bool) -> None:
-        """Make the cells that are not chosen faint, or let them be as they were."""
+        """Make the cells beyond the threshold faint, or let them be as they were."""
         actor = self.others.actor
         if actor is None or session.mesh is None or not (chosen or self._faded):
             return
@@ -99,12 +99,12 @@ class ThresholdLayer:
             actor.prop.show_edges = False
 
     def _draw(self, session: Session) -> None:
-        """Draw the cells that are chosen now, in place where they are the same as before."""
+        """Draw the cells within the threshold, in place where they are the same as before."""
         frame, threshold = session.frame, session.view.threshold
         assert frame is not None
         assert threshold is not None
         mesh, values = frame.mesh, self.stage.values(session)
-        cells = chosen_cells(values, threshold)
+        cells = cells_in_range(values, threshold)
         if self.cells is None or self.shape is None or not np.array_equal(cells, self.cells):
             self.shape = part_shape(mesh, cells)
             self.cells = cells

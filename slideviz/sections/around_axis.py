@@ -1,4 +1,4 @@
-"""What shapes about an axis have in common: straight lines turned about it, so they lie flat.
+"""What shapes about an axis share: straight lines turned about it, so they lie flat.
 
 Such a shape is known by one of its lines: how far it is from the axis, and how it leans. The angle
 around the axis is unrolled, and torn where there is most room.
@@ -31,7 +31,7 @@ _MOST = 400
 
 
 class Unrolled(NamedTuple):
-    """Polygons around an axis, opened: what their points are, one on each side of the seam.
+    """Polygons around an axis, opened at the seam: the points on each side of it.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """The part of a section about an axis that lies in a mesh, or beside it where it cuts nothing.
+    """The part of a section about an axis in a mesh, or beside the mesh where nothing is cut.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Patch:
 
 
 class AboutAxis(Shape):
-    """A shape about an axis, whose size a ball pulls; see `slideviz.sections.shape.Shape`."""
+    """A shape about an axis with a size that its handle drags; see `Shape`."""
 
     handle = "pull"
 
@@ -225,7 +225,7 @@ class AboutAxis(Shape):
         return np.asarray(np.stack([outwards, [-sin, cos, 0.0], along]) @ section.basis)
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return how the middle of points (n, 3) on it is looked at from outside.
+        """Return the camera's axes for a look from outside at the middle of points (n, 3).
 
         Its lines are to the right, as where it lies flat.
         """

@@ -13,7 +13,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, offsets_of
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,9 @@ class Cutter:
         """Return the surface of all cells; in 2D the cells."""
         return self.surface(points, np.concatenate([block.ids for block in self._blocks]))
 
-    def show(self, points: FloatArray, section: Section, only: Choice | None = None) -> Polygons:
+    def show(
+        self, points: FloatArray, section: Section, only: CellsInRange | None = None
+    ) -> Polygons:
         """Return the cut cells, whole or cut as the section says; some of them if not all."""
         if not section.whole:
             found = self.cut(points, section)

@@ -1,4 +1,4 @@
-"""Where sections of a 2D mesh are held by the mouse, and what becomes of them when dragged."""
+"""Handles of sections in 2D meshes: their points, and the section after a drag."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DIGITS = 4
 
 @dataclass(frozen=True, eq=False)
 class HandleParts:
-    """Points where a section is held, and all of it that can be seen.
+    """The handle points of a section, and its lines that can be seen.
 
     Attributes
     ----------
@@ -40,13 +40,13 @@ class HandleParts:
 
 
 def handle_parts(section: Section, box: Box) -> HandleParts | None:
-    """Return where a section can be held within a box that is seen; None where none of it is."""
+    """Return the handle of a section within a box that is seen; None where none of it is."""
     parts = section.in_plane.trace(section, box)
     return section.in_plane.handle_parts(section, parts, box) if parts else None
 
 
 def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) -> Part | None:
-    """Return which part is at a pixel: the first whose points or lines are within reach.
+    """Return the part of a handle at a pixel: the first whose points or lines are in reach.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def nearest(shown: list[tuple[Part, FloatArray]], at: FloatArray, reach: float) 
 
 
 def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], box: Box) -> Section:
-    """Return a section after its part was dragged.
+    """Return a section after a part of its handle was dragged.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def dragged(section: Section, part: Part, way: tuple[FloatArray, FloatArray], bo
 
 
 def within(points: FloatArray, box: Box) -> FloatArray:
-    """Return those of points (n, 2) that are in a box."""
+    """Return the points of (n, 2) that are in a box."""
     return points[((points >= box[0]) & (points <= box[1])).all(axis=1)]
 
 

@@ -1,4 +1,4 @@
-"""The line that a plane is in a 2D mesh: where to draw and to hold it, and positions along it."""
+"""The line of a plane in a 2D mesh: its trace, its handle, and positions along it."""
 
 # ruff: noqa: ARG002  (every shape takes what any of them needs)
 
@@ -140,7 +140,7 @@ class Line(InPlane):
         return direction_label(np.append(way, 0.0))
 
     def _pivot(self, section: Section, box: Box) -> FloatArray:
-        """Return the point (2,) that it turns about: its own, or the middle of what is seen."""
+        """Return the point (2,) about which the line turns: its own, or the middle of the trace."""
         own = within(self.middle(section)[None], box)
         if len(own):
             return np.asarray(own[0])

@@ -1,4 +1,4 @@
-"""A section through a mesh as a value, and the table of the shapes that it can have."""
+"""A section through a mesh as a value, and the table of the shapes of sections."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Section:
 
     @property
     def shape(self) -> Shape:
-        """Return the shape: what the section can do."""
+        """Return the shape of the section."""
         return SHAPES[self.kind]
 
     @property
@@ -105,7 +105,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """Return the number that its shape has beside a point and a direction; 0 where none."""
+        """Return the number beside a point and a direction; 0 for shapes without one."""
         size = self.shape.terms.size
         return 0.0 if size is None else float(getattr(self, size.field))
 
@@ -154,7 +154,7 @@ class Section:
         return gap
 
     def can_cut(self, dim: int) -> bool:
-        """Tell whether it can cut meshes of 2 or 3 dimensions at all.
+        """Tell whether the section can cut meshes of 2 or 3 dimensions at all.
 
         A cylinder meets the plane of a 2D mesh in a circle where its axis is z.
         """

@@ -39,7 +39,7 @@ class Axes:
     Attributes
     ----------
     rows : (3, 3) float64
-        Unit vectors to the right, up, and towards the eye.
+        Unit vectors to the right, up, and towards the camera.
     labels : (Label, Label)
         Of the first two.
     """
@@ -49,7 +49,7 @@ class Axes:
 
 
 def plane_axes(section: Section) -> Axes:
-    """Return the camera's axes: z up, or y where z points to the eye; x to the right."""
+    """Return the camera's axes: z up, or y where z points to the camera; x to the right."""
     normal = section.basis[2]
     up = np.eye(3)[1 if abs(normal[2]) > _STEEP else 2]
     up = up - (up @ normal) * normal

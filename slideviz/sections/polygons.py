@@ -54,13 +54,13 @@ class Polygons:
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
     def by_depth(self) -> Polygons:
-        """Return the polygons in the order of their middle's z, which may be towards an eye."""
+        """Return the polygons in the order of the z of their middles, the nearest last."""
         depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
         return self.take(np.argsort(depth, kind="stable"))
 
 
 def joined(pieces: Sequence[Polygons]) -> Polygons:
-    """Return several as one; their points stay apart."""
+    """Return several sets of polygons as one; their points stay apart."""
     starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     corners = [piece.connectivity + start for piece, start in zip(pieces, starts, strict=False)]
     return Polygons(

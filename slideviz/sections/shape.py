@@ -1,4 +1,4 @@
-"""What every shape of a section can do: the protocol, and words that the shapes share."""
+"""The protocol of the shapes of sections, and words that shapes share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DIGITS, FEW = 4, 2
 
 
 class Label(NamedTuple):
-    """What an axis is called: in full, and where there is no room."""
+    """The label of an axis: in full, and for where there is no room."""
 
     full: str
     short: str
@@ -55,7 +55,7 @@ class Shape(Protocol):
     def crossings(
         self, section: Section, edges: tuple[FloatArray, FloatArray], level: tuple[FloatArray, ...]
     ) -> FloatArray:
-        """Return where edges cross it, (k,) as parts of the edge, exactly.
+        """Return the places on edges, (k,) as parts of the edge, where they cross, exactly.
 
         They start at points (k, 3) and go ways (k, 3); ``level`` has the signed distances (k,) of
         both ends.
@@ -101,7 +101,7 @@ class Shape(Protocol):
     def flatten(
         self, section: Section, polygons: Polygons, near: float | None, ahead: float | None
     ) -> Polygons:
-        """Return polygons laid flat: x to the right, y up, z towards the eye; lengths are kept.
+        """Return polygons laid flat: x right, y up, z towards the camera; lengths are kept.
 
         What goes around an axis lies about the angle ``near``, and that at the angle ``ahead``
         has its axis to the right, in radians (see `ahead`).
@@ -126,7 +126,7 @@ class Shape(Protocol):
         """
 
     def facing(self, section: Section, points: FloatArray) -> FloatArray:
-        """Return the camera's axes for a straight look, (3, 3): right, up, to the eye.
+        """Return the camera's axes for a straight look, (3, 3): right, up, to the camera.
 
         ``points`` (n, 3) are those of the cut.
         """
@@ -139,7 +139,7 @@ class Shape(Protocol):
 
 
 class InPlane(Protocol):
-    """What a shape is in the plane of a 2D mesh: a line or a circle."""
+    """A shape in the plane of a 2D mesh: a line or a circle."""
 
     def can_cut(self, section: Section) -> bool:
         """Tell whether a section can cut 2D meshes."""

@@ -1,4 +1,4 @@
-"""The cells that the range of the view leaves, of a section too."""
+"""The cells within the threshold of the view, of a section too."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ ONLY_INVERTED = (-1.0, -0.5)
 
 
 @dataclass(frozen=True)
-class Choice:
-    """Some cells of a mesh; two that choose the same are equal.
+class CellsInRange:
+    """The cells of a mesh within a threshold; two of the same cells are equal.
 
     Attributes
     ----------
@@ -32,19 +32,19 @@ class Choice:
     words: str = field(compare=False)
 
     @classmethod
-    def of(cls, values: FloatArray, threshold: tuple[float, float]) -> Choice:
-        """Return the cells whose value is in a range (see `chosen_cells`)."""
+    def of(cls, values: FloatArray, threshold: tuple[float, float]) -> CellsInRange:
+        """Return the cells whose value is in a range (see `cells_in_range`)."""
         mask = np.zeros(len(values), bool)
-        mask[chosen_cells(values, threshold)] = True
+        mask[cells_in_range(values, threshold)] = True
         mask.flags.writeable = False
         return cls(np.packbits(mask).tobytes(), mask, range_words(threshold))
 
     def among(self, polygons: Polygons) -> Polygons:
-        """Return those polygons whose cells are chosen; their points stay."""
+        """Return the polygons whose cells are in the range; their points stay."""
         return polygons.take(np.flatnonzero(self.mask[polygons.cells]))
 
 
-def chosen_cells(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
+def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArray:
     """Return the cells whose value is in a closed range, in rising order.
 
     Parameters

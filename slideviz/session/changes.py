@@ -1,4 +1,4 @@
-"""Pure functions from one session to the next: everything the user can ask for, by one name."""
+"""Everything the user can ask for, by one name: functions from one session to the next."""
 
 from __future__ import annotations
 

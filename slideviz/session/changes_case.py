@@ -1,4 +1,4 @@
-"""Pure functions from one session to the next: roles, motions, settings."""
+"""Changes of the case, as functions from one session to the next: roles, motions, settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pure functions from one session to the next: its runs, and which of them are shown."""
+"""Changes of the runs, as functions from one session to the next."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_REMOVED = 2
 
 
 def start_run(session: Session) -> Session:
-    """Return the session with one more run, of the settings there are, and it shown.
+    """Return the session with a new run of the present settings, which is shown.
 
     Runs that were cancelled or failed before their first step go.
     """
@@ -39,7 +39,7 @@ def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
 
 
 def end_run(session: Session, end: Literal["done", "cancelled", "failed"]) -> Session:
-    """Return the session with the newest run ended that way, if one was going on."""
+    """Return the session with an end for the newest run, if it was going on."""
     if not session.runs or session.runs[-1].end:
         return session
     ended = replace(session.runs[-1], end=end)
@@ -57,7 +57,7 @@ def show_run(session: Session, number: int) -> Session:
 
 
 def show_beside(session: Session, number: int | None) -> Session:
-    """Return the session with another run in a second view beside the first; None: no such.
+    """Return the session with another run in a second view; None for no second view.
 
     ``UNDEFORMED`` stands for the undeformed mesh.
     """
@@ -69,7 +69,7 @@ def show_beside(session: Session, number: int | None) -> Session:
 
 @undoable("removing a run")
 def remove_run(session: Session, number: int) -> Session:
-    """Return the session without a run, which is kept for undo; one that goes on stays."""
+    """Return the session without a run, which undo can bring back; one that goes on stays."""
     run = session.run(number)
     if run is None or not run.end:
         return session
@@ -98,7 +98,7 @@ def bring_back(session: Session, number: int) -> Session:
 
 
 def rename_run(session: Session, number: int, name: str) -> Session:
-    """Return the session with a run called by another name; by none if that is empty."""
+    """Return the session with another name for a run; an empty one takes the name away."""
     name = " ".join(name.split())
     run = session.run(number)
     if run is None or run.name == name:
@@ -109,7 +109,7 @@ def rename_run(session: Session, number: int, name: str) -> Session:
 
 @undoable("settings of a run")
 def take_settings(session: Session, number: int) -> Session:
-    """Return the session with the settings of a run put back: roles, motions, method."""
+    """Return the session with the roles, motions and method of a run."""
     run = session.run(number)
     if run is None:
         return session

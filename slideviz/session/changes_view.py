@@ -1,4 +1,4 @@
-"""Pure functions from one session to the next: how it is looked at."""
+"""Changes of the view, as functions from one session to the next."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _undo_words(values: Mapping[str, Any]) -> str:
 
 @undoable(_undo_words)
 def set_view(session: Session, **values: Any) -> Session:
-    """Return the session looked at in another way: fields of `ViewState`, and names of `SHOWN`.
+    """Return the session with other values of `ViewState`, and of names in `SHOWN`.
 
     What the colours say has a range of its own, which is there again when it is coloured by again.
     """
@@ -78,7 +78,7 @@ def isolate(session: Session, names: Iterable[str]) -> Session:
 
 
 def show_frame(session: Session, index: int) -> Session:
-    """Return the session at another step, the nearest there is."""
+    """Return the session at another step, or the nearest there is."""
     return set_view(session, frame=min(max(index, 0), max(len(session.frames) - 1, 0)))
 
 
@@ -120,12 +120,12 @@ def show_handle(session: Session, shown: bool) -> Session:
 
 
 def flat_one(sections: Sequence[Section]) -> int | None:
-    """Return the place of the section that is laid flat and shown, if one is."""
+    """Return the place of the section that is laid flat and shown, or None."""
     return next((index for index, one in enumerate(sections) if one.flat and one.shown), None)
 
 
 def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
-    """Return where the chosen section is after one was added, taken away or changed.
+    """Return the place of the chosen section after one was added, taken away or changed.
 
     One that was added is chosen; after the chosen one is gone, its neighbour is.
     """
@@ -143,10 +143,10 @@ def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) 
 
 
 def mark(session: Session, cell: int | None) -> Session:
-    """Return the session with a cell marked, or none."""
+    """Return the session with a cell selected, or none."""
     return set_view(session, marked=cell)
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened with what suits any mesh from before: what is drawn, colours."""
+    """Return a session just opened with things drawn and colour map of the view before."""
     return set_view(session, drawn=old.drawn, colour_map=old.colour_map)

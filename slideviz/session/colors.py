@@ -1,4 +1,4 @@
-"""The range of the colours that fits the values of all that is shown."""
+"""Colour ranges that fit the values of all that is shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PARTS = 100.0
 
 @undoable("colour range")
 def fit_colours(session: Session, every: bool = True) -> Session:
-    """Return the session with colours from the lowest to the highest value.
+    """Return the session with a colour range from the lowest to the highest value.
 
     Of all steps, so that played a colour says the same, or of the one that is shown, which has
     more colours then; of both runs where two are compared. Inverted cells have a colour of their
@@ -28,7 +28,7 @@ def fit_colours(session: Session, every: bool = True) -> Session:
 
 
 def usual_range(session: Session) -> str:
-    """Return in words from where to where the colours range that nobody has chosen."""
+    """Return in words the colour range that holds where nobody has chosen one."""
     far = session.view.colour_by == "displacement"
     return "0 to the largest of all runs" if far else "0 to 1"
 
@@ -63,7 +63,7 @@ def _frames(session: Session, every: bool) -> set[Frame]:
 
 
 def _outwards(low: float, high: float) -> tuple[float, float]:
-    """Return numbers of few digits around two."""
+    """Return numbers of few digits around two numbers."""
     unit = float(10.0 ** np.floor(np.log10((high - low) / _PARTS)))
     first, last = np.floor(low / unit + 1e-6) * unit, np.ceil(high / unit - 1e-6) * unit
     digits = max(0, round(-np.log10(unit))) + 1

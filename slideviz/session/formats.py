@@ -1,4 +1,4 @@
-"""The formats that a mesh is offered to be saved in, and what each of them leaves out."""
+"""The formats that a mesh can be saved in, and the parts of a mesh that each leaves out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from slideviz.mesh.model import Mesh
 
 @dataclass(frozen=True)
 class MeshFormat:
-    """What a format is called, and what it holds.
+    """A format: its name, and the parts of a mesh that files of it hold.
 
     ``quality`` tells whether cells can have numbers; ``boundaries`` whether these keep their
     names, or become numbers; ``dims`` the dimensions of meshes that it can hold.
@@ -51,13 +51,13 @@ def usual_ending(mesh: Mesh) -> str:
 
 
 def holds_quality(path: Path) -> bool:
-    """Tell whether a file of that name can hold numbers of the cells."""
+    """Tell whether a file of that name can hold values of the cells."""
     row = MESH_FORMATS.get(path.suffix.lower())
     return row is not None and row.quality
 
 
 def left_out(path: Path, mesh: Mesh) -> str:
-    """Return in a sentence what a file of that name does not hold of a mesh; empty: nothing."""
+    """Return a sentence on the parts of a mesh that a file of that name leaves out, or nothing."""
     end = path.suffix.lower()
     if end == ".su2":
         return ""

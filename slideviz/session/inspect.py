@@ -1,4 +1,4 @@
-"""What can be told of cells: which are chosen, which are worst and since when, what one is.
+"""Facts about cells: those within a threshold, the worst ones, and a single one.
 
 The *measure* of a cell is the quality that the view is coloured by; size-skew where the colours
 say something else. An inverted cell is below every value, so that a choice from 0, where
@@ -28,7 +28,7 @@ WORST = 100
 
 @dataclass(frozen=True, eq=False)
 class CellInfo:
-    """What is told of one cell.
+    """The facts about one cell.
 
     Attributes
     ----------
@@ -89,12 +89,12 @@ class WorstCells:
 
 
 def measure(colour_by: ColourBy) -> ColourBy:
-    """Return the quality that the view is coloured by, or size-skew."""
+    """Return the quality that colours the view, or size-skew."""
     return colour_by if colour_by in ("size", "skew") else "size-skew"
 
 
 def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:
-    """Return the worst cells of the frame ``at``, and since when they are.
+    """Return the worst cells of the frame ``at``, and the frame in which each was worst.
 
     Only the listed cells are followed through the frames, so that neither time nor memory grows
     with the number of cells of all frames together. Ties are in the order of the numbers.
@@ -138,7 +138,7 @@ def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
 
 
 def cell_info(frame: Frame, cell: int) -> CellInfo:
-    """Return what is told of a cell.
+    """Return the facts about a cell.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def cell_info(frame: Frame, cell: int) -> CellInfo:
 
 
 def cell_at(mesh: Mesh, x: float, y: float, values: FloatArray) -> int | None:
-    """Return the cell of a 2D mesh that a point is in; the one of lowest value of several.
+    """Return the cell of a 2D mesh around a point; of several, the one of lowest value.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def _inside(mesh: Mesh, cell: int, x: float, y: float) -> bool:
 
 
 def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
-    """Return the list as rows of texts, without loss of digits."""
+    """Return the worst cells as rows of texts, without loss of digits."""
     names = "xyz"[: worst.positions.shape[1]]
     measured = worst.measure.replace("-", "_")
     rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []
@@ -205,7 +205,7 @@ def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
 
 
 def write_table(worst: WorstCells, path: Path) -> None:
-    """Write the list as comma-separated values, whole or not at all.
+    """Write the worst cells as comma-separated values, whole or not at all.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Whether motions, as they are typed, put a boundary through another, or have bad files."""
+"""The intersection check: motions that put a boundary through another, or have bad files."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from slideviz.session.state import Session
 
 
 def intersection_key(session: Session) -> tuple[object, ...]:
-    """Return what a clash depends on: it need not be looked for again while this is the same."""
+    """Return what an intersection depends on: the check holds while this is the same."""
     case = session.case
     return (session.mesh, case.motions, tuple(sorted(case.roles.items())), case.periodic)
 
 
 def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
-    """Return the sentence about a clash, or about a displacement file with mistakes.
+    """Return the sentence about an intersection, or about mistakes in a displacement file.
 
     It is empty when there is none, or when the case has other problems: they are told elsewhere.
     """
@@ -47,7 +47,7 @@ def _first_line(error: SlidevizError, files: list[Path]) -> str:
 
 
 def set_intersection(session: Session, text: str, key: tuple[object, ...]) -> Session:
-    """Return the session with what was found for ``key``, unless that is no longer asked for."""
-    if intersection_key(session) != key or session.clash == text:
+    """Return the session with the result of the check for ``key``, unless it is out of date."""
+    if intersection_key(session) != key or session.intersection == text:
         return session
-    return replace(session, clash=text)
+    return replace(session, intersection=text)

@@ -1,4 +1,4 @@
-"""Tiny deformations that make Numba compile, or load, its loops before the user needs them."""
+"""JIT warm-up: tiny deformations that make Numba compile, or load, its loops in advance."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         def on_end(self, _: object) -> None:
             pass
 
-    # What fails here fails again in the user's run, and is told there.
+    # What fails here fails again in the user's run, with a message there.
     with (
         contextlib.suppress(Cancelled, SlidevizError),
         event.install_listener("numba:compile", Listener()),

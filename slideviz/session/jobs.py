@@ -40,7 +40,7 @@ PHASES = {
 
 @dataclass(frozen=True)
 class Doing:
-    """What is being done, in words, and how far it is: 0 to 1, or None when nobody knows."""
+    """Progress of a job: words, and a fraction from 0 to 1, or None where nobody knows."""
 
     text: str
     fraction: float | None = None
@@ -48,7 +48,7 @@ class Doing:
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """The outcome of `open_file`: the session, and the boundaries ready to be drawn.
+    """The result of `open_file`: the session, and the boundaries ready to be drawn.
 
     ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
     ``ghosts`` has read the displacement files.
@@ -116,7 +116,7 @@ def prepare(
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
-    """Deform the mesh; every step is reported as a `Frame`, what goes on as `Doing`."""
+    """Deform the mesh; report every step as a `Frame`, and the progress as `Doing`."""
     from slideviz.deformation.solver import Progress, deform
 
     furthest = 0.0
@@ -155,7 +155,7 @@ _STARTS = {"classify": 0.0, "solve": 0.1, "evaluate": 0.5, "project": 0.7}
 
 
 def overall(now: object) -> float:
-    """Return how much of the whole run is done, 0 to 1, roughly: phases differ in length."""
+    """Return the fraction of the whole run that is done, roughly: phases differ in length."""
     step, total = getattr(now, "step", 1), getattr(now, "total", 1)
     phase, fraction = getattr(now, "phase", ""), getattr(now, "fraction", 0.0)
     start = _STARTS.get(phase, 0.9)
@@ -193,7 +193,7 @@ def save_mesh(
 
 
 def require_going(stopped: Stopped) -> None:
-    """Raise if the job was asked to stop.
+    """Raise Cancelled if the job was asked to stop.
 
     Raises
     ------

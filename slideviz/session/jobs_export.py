@@ -1,4 +1,4 @@
-"""Long jobs that write what is taken away: quality as a table, the meshes of all steps."""
+"""Long jobs that write exports: quality as a table, the meshes of all steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a mesh is looked at, put into a case and taken out again: a session is a case file."""
+"""The view in a case file, written from a session and read back: a session is a case file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Camera = tuple[float, ...]
 
 
 def keep_view(session: Session, camera: Camera | None = None) -> Case:
-    """Return the case of a session with its view in it; what is as at first is left out."""
+    """Return the case of a session with its view inside; usual values are left out."""
     view, first = session.view, ViewState()
     before = _plain(first)
     kept = {key: value for key, value in _plain(view).items() if before[key] != value}
@@ -34,7 +34,7 @@ def keep_view(session: Session, camera: Camera | None = None) -> Case:
 
 
 def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
-    """Return a view as a case kept it; what the case does not say is taken from ``view``.
+    """Return the view that a case holds; what the case leaves out is taken from ``view``.
 
     Parameters
     ----------
@@ -62,12 +62,12 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
 
 
 def restored(session: Session, source: Path | None) -> Session:
-    """Return a session just opened from what was kept of it: it is of ``source``, and unsaved."""
+    """Return a session just opened from its recovery file: of ``source``, and unsaved."""
     return replace(session, case=session.case.change(source=source), saved=Case())
 
 
 def kept_camera(case: Case) -> Camera | None:
-    """Return the camera that a case kept, if it did."""
+    """Return the camera that a case holds, or None."""
     camera: Camera | None = case.view.get("VIEW_CAMERA")
     return camera
 

@@ -1,4 +1,4 @@
-"""Where cells are: coordinates as one thinks of the mesh, and the boundary that is nearest."""
+"""Places of cells: coordinates about the mesh's axis, and the nearest boundary."""
 
 from __future__ import annotations
 
@@ -62,20 +62,20 @@ def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str
 
 
 def decimals(values: FloatArray) -> int:
-    """Return after the point how many digits numbers need so that the largest has four."""
+    """Return the digits after the point with which the largest of some numbers has four."""
     largest = float(np.abs(values).max(initial=0.0))
     return 0 if not largest > 0 else int(np.clip(3 - np.floor(np.log10(largest)), 0, 12))
 
 
 def nearest_boundary(mesh: Mesh, point: FloatArray) -> tuple[str, float] | None:
-    """Return the name of the boundary nearest to a point (d,), and how far it is; None: none."""
+    """Return the name of the boundary nearest to a point (d,) and its distance, or None."""
     found = [(_distance(mesh, marker, point), marker.name) for marker in mesh.markers]
     far, name = min(found, default=(np.inf, ""))
     return (name, far) if np.isfinite(far) else None
 
 
 def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
-    """Return how far a point is from the elements of a boundary around its nearest nodes."""
+    """Return the distance from a point to the elements around a boundary's nearest nodes."""
     nodes, cells = marker.nodes, marker.cells
     if not len(nodes):
         return float("inf")

@@ -21,7 +21,7 @@ LARGEST = 5_000_000
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What a table may list.
+    """The rows that a table of displacements may have.
 
     Attributes
     ----------
@@ -39,18 +39,18 @@ class Rows:
 
     @classmethod
     def on(cls, mesh: Mesh, case: Case, marker: Target) -> Rows:
-        """Return those of a boundary or several, or of all that move where ``marker`` is empty."""
+        """Return the rows of some boundaries, or of all that move where ``marker`` is empty."""
         names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))
         return cls(", ".join(names), nodes, mesh.points.shape)
 
     @property
     def heading(self) -> str:
-        """Return the columns."""
+        """Return the names of the columns."""
         return " ".join(["node", "dx", "dy", "dz"][: 1 + self.shape[1]])
 
     def check(self, text: str) -> str:
-        """Return in a sentence what a table does.
+        """Return a sentence that says what a table moves.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Rows:
         )
 
     def fill(self, text: str) -> str:
-        """Return a table with a row of zeros for each node that it does not list yet."""
+        """Return a table with a row of zeros for each node that is not listed yet."""
         listed = set()
         for line in text.splitlines():
             word = line.replace(",", " ").replace(";", " ").split()[:1]

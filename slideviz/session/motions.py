@@ -46,7 +46,7 @@ def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] |
 
 
 def new_target(session: Session) -> Target:
-    """Return what a new motion moves: what is selected, else what has none yet, else all."""
+    """Return the boundaries of a new motion: selected ones, else those without motion, else all."""
     case = session.case
     moving = case.markers_with("moving")
     without = [n for n in moving if not any(moves(motion, n) for motion in case.motions)]
@@ -57,7 +57,7 @@ def new_target(session: Session) -> Target:
 
 
 def targets(session: Session) -> tuple[Target, ...]:
-    """Return what a motion may move: each, what is selected where that are several, and all."""
+    """Return the choices for what a motion moves: each boundary, selected ones, all."""
     moving = session.case.markers_with("moving")
     selected = tuple(name for name in moving if name in session.view.selected)
     several = (selected,) if 1 < len(selected) < len(moving) else ()
@@ -74,7 +74,7 @@ def machine_axis(session: Session) -> Axis | None:
 
 
 class Ghosts:
-    """Moved boundaries of one mesh; displacement files are read once and again when changed."""
+    """The moved boundaries of one mesh; displacement files are read once and when changed."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -82,7 +82,7 @@ class Ghosts:
         self._files: dict[tuple[Path, tuple[str, ...], float], Displacements | None] = {}
 
     def moved(self, case: Case) -> dict[str, FloatArray]:
-        """Return for each boundary that moves where its nodes, (u, d), go.
+        """Return the points (u, d) of the nodes of each boundary that moves.
 
         A displacement file that cannot be read moves nothing here; the run will say why.
         """
@@ -126,7 +126,7 @@ def period_text(pair: Pair) -> str:
 
 
 def _axis(direction: Sequence[float]) -> str:
-    """Return an axis in words: which of its two ways it is told does not matter."""
+    """Return an axis in words, the same for both of its directions."""
     return direction_words(direction).removeprefix("-")
 
 

@@ -1,4 +1,4 @@
-"""What the nodes of the boundaries may do, for the view: moving, sliding, periodic and so on."""
+"""The types of boundary nodes for the view: moving, sliding, periodic and so on."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class TypedNodes:
         return tuple(kind for place, kind in enumerate(NODE_TYPES) if place in there)
 
     def only(self, nodes: IntArray) -> TypedNodes:
-        """Return those that are among ``nodes``."""
+        """Return the typed nodes that are among ``nodes``."""
         keep = np.isin(self.nodes, nodes)
         return TypedNodes(self.nodes[keep], self.kinds[keep])
 
@@ -46,7 +46,7 @@ NOTHING = TypedNodes(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class NodeTypes:
-    """The types of the boundary nodes of a mesh, worked out once for each case."""
+    """The types of the boundary nodes of a mesh, found once for each case."""
 
     def __init__(self) -> None:
         self._fans: tuple[Mesh, float, Fans] | None = None

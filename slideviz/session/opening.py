@@ -1,4 +1,4 @@
-"""A session with a mesh just read: what is guessed of it, and what its case kept."""
+"""A session with a mesh just read: its roles guessed, or its case's view put back."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def open_mesh(
 
 
 def suggested_reduction(mesh: Mesh) -> Reduction:
-    """Return data reduction with a tolerance that suits the size of the mesh: 1e-5 of it."""
+    """Return data reduction with a tolerance of 1e-5 of the mesh's extent."""
     return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
 
 
 def of_runs(first: Frame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew") -> Session:
-    """Return a session that shows the last step of a run, with that of a second one beside it.
+    """Return a session that shows the last step of a run, and of a second one beside it.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
 
 
 def with_periodicity(case: Case, pair: Pair | None) -> Case:
-    """Return the case with what repeats deformed alike, about the axis of a pair if there is one.
+    """Return the case with periodic deformation, about the axis of a pair if there is one.
 
     The corners of the domain slide along where anything slides.
     """

@@ -1,4 +1,4 @@
-"""Two views side by side: what each of them shows, and what it can be made to show."""
+"""Two views side by side: the run that each shows, and those that it could show."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from slideviz.session.state import Run, Session
 
 
 def run_title(run: Run, among: Sequence[Run] = ()) -> str:
-    """Return what a run is called: its number and what sets it apart from those of a list."""
+    """Return the number of a run and the words that set it apart from those of a list."""
     return f"Run {run.number}: {run_words(run)} · {brief(run, among)}"
 
 
 def choices(session: Session) -> dict[int, str]:
-    """Return what a view can show, by the number of the run, and what it is called."""
+    """Return the names of the runs that a view can show, by number."""
     runs = {run.number: run_title(run, session.runs) for run in session.runs if run.frames}
     return {UNDEFORMED: "Undeformed mesh"} | runs
 
 
 def panes(session: Session) -> tuple[int | None, int | None]:
-    """Return the numbers of what is shown to the left and to the right; None: nothing."""
+    """Return the numbers of the runs to the left and to the right; None: no view."""
     first, second = session.shown, session.view.beside
     return (second, first) if session.view.swapped and second is not None else (first, second)
 

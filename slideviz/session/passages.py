@@ -15,7 +15,7 @@ from slideviz.mesh.surfaces import padded
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.opening import guess_by_name
 
 WHOLE_NUMBER = 1e-3
@@ -51,7 +51,7 @@ def find_period(
 
 
 def passages_around(pair: Pair) -> int | None:
-    """Return how many passages the whole wheel has; None if a translation or no whole number."""
+    """Return the number of passages of the whole wheel; None if there is no whole number."""
     if pair.kind != "rotational":
         return None
     number = 2.0 * np.pi / pair.period
@@ -126,9 +126,9 @@ def show_passages(
     points: FloatArray,
     section: Section,
     matrices: Mapping[int, FloatArray],
-    only: Choice | None = None,
+    only: CellsInRange | None = None,
 ) -> dict[int, Polygons]:
-    """Return what one section shows of every passage (see `Cutter.show`), by its number.
+    """Return the cut of a section through every passage (see `Cutter.show`), by number.
 
     Where the period takes the section onto itself, the mesh is cut once.
     """

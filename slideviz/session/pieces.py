@@ -21,13 +21,13 @@ PART_CELLS = 10_000
 
 @dataclass(frozen=True)
 class Beside:
-    """A piece that draws nothing: a call that returns something and may be slow."""
+    """A piece of work that draws nothing: a call that may be slow and returns something."""
 
     call: Callable[[GoingOn], Any]
 
 
 def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Result]:
-    """Yield what pieces yield but those that may be done beside, which are done at once."""
+    """Yield the pieces of some work; those that draw nothing are done at once."""
     try:
         piece = next(pieces)
         while True:
@@ -49,7 +49,7 @@ def here(pieces: Generator[object, Any, Result]) -> Generator[object, None, Resu
 
 
 def whole(pieces: Generator[object, Any, Result]) -> Result:
-    """Return what comes of all pieces, done here and now."""
+    """Return the result of some work, all of its pieces done here and now."""
     run = here(pieces)
     while True:
         try:
@@ -76,7 +76,7 @@ def portions(actors: Iterable[Any], cells: int = PART_CELLS) -> list[list[Any]]:
 
 
 def appearing(plotter: Any) -> Iterator[None]:
-    """Draw what is new in an off-screen plotter part by part, and yield after each.
+    """Draw the new actors of an off-screen plotter part by part, and yield after each.
 
     To hand a large mesh to the graphics takes longer than to draw it.
     """
@@ -104,4 +104,4 @@ def _faces(actor: Any) -> int:
 
 
 def never() -> None:
-    """Go on, whatever happens."""
+    """Return without a check, for work that nobody can stop."""

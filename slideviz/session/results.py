@@ -1,4 +1,4 @@
-"""What was computed, as frozen values: the steps of a run, each with its quality."""
+"""The results of runs, as frozen values: steps, each with its quality."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Frame:
     step: Step | None = None
 
     def values(self, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
-        """Return the number of every cell, (m,), that ``what`` stands for.
+        """Return the value of every cell, (m,), in a quantity.
 
         Quality is in 0 to 1. The displacement of a cell is the mean distance of its nodes from
         where they are in ``undeformed``, in the mesh's length unit.
@@ -41,13 +41,13 @@ class Frame:
         return self.quality.skew if what == "skew" else self.quality.values
 
     def shown_values(self, what: ColourBy, undeformed: Mesh | None = None) -> FloatArray:
-        """Return `values` as cells are coloured by them: not a number where one is inverted."""
+        """Return `values` for colours: not a number where a cell is inverted."""
         return np.where(self.quality.status == INVERTED, np.nan, self.values(what, undeformed))
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One deformation that was computed, and what it was computed with.
+    """A deformation that was computed: its case and its steps.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Run:
 
     @property
     def label(self) -> str:
-        """Return what it is called in a plot: its number, and the begin of its name."""
+        """Return the name of the run in plots: its number, and the begin of its own name."""
         if not self.name:
             return f"run {self.number}"
         short = self.name if len(self.name) <= LABEL else f"{self.name[: LABEL - 1].rstrip()}…"
@@ -85,12 +85,12 @@ class Run:
 
     @property
     def last(self) -> Frame | None:
-        """Return the frame of its last step."""
+        """Return the frame of the last step."""
         return self.frames[-1] if self.frames else None
 
     @property
     def seconds(self) -> float:
-        """Return the seconds that its steps took, without reading and drawing."""
+        """Return the seconds that the steps took, without reading and drawing."""
         return sum(sum(f.step.seconds.values()) for f in self.frames if f.step is not None)
 
 

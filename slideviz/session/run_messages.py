@@ -1,4 +1,4 @@
-"""What is said of a run in the window: what is missing before it, how it ended, what would help."""
+"""Messages about runs in the window: requirements, ends, warnings, remedies."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from slideviz.mesh.model import Mesh
 from slideviz.session.state import Place, Run, Session
 
 LARGE = 1e9
-"""Bytes from which on it is told beforehand what a run takes."""
+"""Bytes from which on a message says beforehand what a run takes."""
 RATE = 2e10
 """Operations a second of a machine with few cores, when it factors a large matrix."""
 
 
 def exact_cost(case: Case, mesh: Mesh) -> str:
-    """Return in a sentence what a large run without data reduction takes; else an empty text.
+    """Return a sentence on the cost of a large run without data reduction, or nothing.
 
     All boundary nodes are control nodes then: memory grows with the square of their number, and
     time with the cube.
@@ -45,7 +45,7 @@ def exact_cost(case: Case, mesh: Mesh) -> str:
 
 
 def ended(run: Run) -> str:
-    """Return how a run ended, in a few words."""
+    """Return the end of a run in a few words."""
     step = run.last.step if run.last is not None else None
     if run.last is None or step is None:
         return "Ready."
@@ -56,13 +56,13 @@ def ended(run: Run) -> str:
 
 
 def inverted_words(run: Run) -> str:
-    """Return how many cells are inverted after the last step; empty when none is."""
+    """Return the number of inverted cells after the last step in words, or nothing."""
     count = run.last.quality.inverted if run.last is not None else 0
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
 
 
 def help_for(case: Case) -> str:
-    """Return what would help against inverted cells, most promising first, in a sentence."""
+    """Return the remedies against inverted cells, most promising first, in a sentence."""
     helps = []
     if case.method != "rbf":
         helps.append("radial basis functions as the method")
@@ -75,14 +75,14 @@ def help_for(case: Case) -> str:
 
 
 def warnings_of(run: Run) -> tuple[str, ...]:
-    """Return what a run warns of, without what is harmless."""
+    """Return the warnings of a run that are not harmless."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
     return tuple(in_window_words(text) for text in found if not isinstance(text, Note))
 
 
 def notes_of(run: Run) -> tuple[str, ...]:
-    """Return what a run remarks that is harmless."""
+    """Return the remarks of a run that are harmless."""
     step = run.last.step if run.last is not None else None
     found = () if step is None else step.warnings
     return tuple(in_window_words(text) for text in found if isinstance(text, Note))
@@ -90,7 +90,7 @@ def notes_of(run: Run) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Requirement:
-    """What must be put right before a run, in words, and which panel does it.
+    """A requirement of a run that is not met: a sentence, and the panel that mends it.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Requirement:
 
 
 def run_requirements(session: Session) -> tuple[Requirement, ...]:
-    """Return what must be put right before a run, most urgent first; empty when ready."""
+    """Return the requirements of a run that are not met, most urgent first."""
     if session.mesh is None:
         return (Requirement("Open a mesh first.", "open"),)
     case = session.case
@@ -132,13 +132,13 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
         found.append(Requirement(text, "method"))
     if not found:
         found = [Requirement(text, "boundaries") for text in _problems(session)]
-    if not found and session.clash:
-        found = [Requirement(session.clash, "motion")]
+    if not found and session.intersection:
+        found = [Requirement(session.intersection, "motion")]
     return tuple(found)
 
 
 def moves_nothing(motion: Motion) -> bool:
-    """Tell whether a motion leaves its boundary where it is; of a file nobody knows."""
+    """Tell whether a motion leaves its boundary in place; of a file nobody knows."""
     if isinstance(motion, Translate):
         return not any(motion.vector)
     if isinstance(motion, Rotate):
@@ -149,7 +149,7 @@ def moves_nothing(motion: Motion) -> bool:
 
 
 def _problems(session: Session) -> list[str]:
-    """Return what the case itself finds wrong with the mesh."""
+    """Return the faults that the case itself finds with the mesh."""
     from slideviz.case.motion import check_case
 
     assert session.mesh is not None

@@ -1,4 +1,4 @@
-"""The runs of a session as a table for people and for a file, and which of them is best."""
+"""The table of runs, for people and for a file, and the best of the runs."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def _misfit(run: Run) -> float | None:
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its title, what it says of a run, and how that is written for people."""
+    """A column of the table: its title, its value of a run, and that value for people."""
 
     title: str
     value: Callable[[Run], str | float | None]
     form: str = ""
 
     def text(self, run: Run) -> str:
-        """Return what it says of a run, for people; a dash where nothing is known."""
+        """Return the value of a run, for people; a dash where nothing is known."""
         value = self.value(run)
         return "–" if value is None else format(value, self.form)
 
@@ -99,9 +99,9 @@ def best(runs: Sequence[Run]) -> frozenset[int]:
 
 
 def described(run: Run) -> str:
-    """Return all that the table says of a run, a line for each column, and what it remarks."""
-    told = [column for column in COLUMNS if column.title != "name" or run.name]
-    lines = [f"{column.title}: {column.text(run)}" for column in told]
+    """Return a line for each column with its value of a run, and the remarks of the run."""
+    shown = [column for column in COLUMNS if column.title != "name" or run.name]
+    lines = [f"{column.title}: {column.text(run)}" for column in shown]
     step = run.last.step if run.last is not None else None
     if step is not None and step.warnings:
         lines += ["", *(f"{text[:1].upper()}{text[1:]}." for text in step.warnings)]

@@ -1,4 +1,4 @@
-"""The runs of a session in words: what each is, and what sets it apart from the others."""
+"""Runs in words: the name of each, and the settings that set it apart from others."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from slideviz.case.motion_words import motion_labels
 from slideviz.session.state import Run
 from slideviz.terms import METHODS, PERIODIC_MODES, SLIDING
 
-TOLD = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
+WORDED = {METHOD: 0, REDUCTION: 0, QUALITY: 0, PERIODICITY: 1}
 """Groups of keys whose values are said of a run, the more telling ones first."""
 
 
 def method_words(case: Case) -> str:
-    """Return which method a case asks for, in words."""
+    """Return the method of a case in words."""
     return (SLIDING[case.sliding] if case.method == "rbf" else METHODS[case.method]).name
 
 
 def run_words(run: Run) -> str:
-    """Return what a run is called: its name, or else its method."""
+    """Return the name of a run, or else its method."""
     return run.name or method_words(run.case)
 
 
@@ -31,7 +31,7 @@ def _number_words(value: float) -> str:
 
 
 def reduction_words(case: Case) -> str:
-    """Return how control nodes are chosen, in words."""
+    """Return the data reduction of a case in words."""
     given = case.reduction
     if given is None or case.method != "rbf":
         return "all nodes"
@@ -45,7 +45,7 @@ def reduction_words(case: Case) -> str:
 
 
 def steps_words(run: Run) -> str:
-    """Return how many steps a run made, or has made of how many."""
+    """Return the number of steps that a run made, or has made of how many."""
     made = len(run.frames)
     step = run.last.step if run.last is not None else None
     total = step.total if step is not None else run.case.steps
@@ -56,27 +56,27 @@ def steps_words(run: Run) -> str:
 
 
 def seconds_words(seconds: float) -> str:
-    """Return a time, as exactly as it matters."""
+    """Return a time in words, as exact as it matters."""
     if seconds < 100:
         return f"{seconds:.3g} s" if seconds >= 0.1 else f"{seconds:.2f} s"
     return f"{int(seconds // 60)} min {seconds % 60:.0f} s"
 
 
 def end_words(run: Run) -> str:
-    """Return how a run ended, or that it goes on."""
+    """Return the end of a run in a word, or that it goes on."""
     return run.end or "running"
 
 
 def control_nodes(run: Run) -> int | None:
-    """Return the control nodes of its last step, if it has one."""
+    """Return the number of control nodes in a run's last step, or None."""
     step = run.last.step if run.last is not None else None
     return step.control_nodes if step is not None else None
 
 
 SETTINGS: tuple[Key, ...] = tuple(
     sorted(
-        (key for key in BY_WEIGHT if key.group in TOLD and key.said != ""),
-        key=lambda key: TOLD[key.group],
+        (key for key in BY_WEIGHT if key.group in WORDED and key.said != ""),
+        key=lambda key: WORDED[key.group],
     )
 )
 """Settings that tell runs apart; the motions, roles and others have their own words."""
@@ -105,8 +105,8 @@ def _roles_words(case: Case, others: Sequence[Case]) -> str:
     return ", ".join(f"{name} {case.roles.get(name, 'fixed')}" for name in differ)
 
 
-def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
-    """Yield what is told of the settings of a run, and whether that differs among cases."""
+def _settings_words(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
+    """Yield the words for each setting of a run, and whether it differs among cases."""
     case = run.case
 
     def differs(name: str) -> bool:
@@ -128,7 +128,7 @@ def _told(run: Run, cases: Sequence[Case]) -> Iterator[tuple[str, bool]]:
 
 
 def apart(run: Run, among: Sequence[Run]) -> str:
-    """Return what sets a run apart from those of a list, beside its name, in few words.
+    """Return the words that set a run apart from those of a list, beside its name.
 
     Nothing where no other is called as it is: its name or method says enough.
     """
@@ -139,15 +139,15 @@ def apart(run: Run, among: Sequence[Run]) -> str:
 
 
 def differing(run: Run, among: Sequence[Run]) -> str:
-    """Return which settings of a run differ among those of a list, which has it; not its method."""
+    """Return the settings of a run that differ among a list with it, but for its method."""
     cases = [other.case for other in among]
     words = [motion_labels(cases)[among.index(run)], _roles_words(run.case, cases)]
-    words += [text for text, differs in _told(run, cases) if differs]
+    words += [text for text, differs in _settings_words(run, cases) if differs]
     return ", ".join(filter(None, words))
 
 
 def brief(run: Run, among: Sequence[Run] = ()) -> str:
-    """Return what sets a run apart, beside its method, in one short line.
+    """Return a short line that sets a run apart, beside its method.
 
     What differs among the runs of a list, which has it, comes first: the rest may be cut off.
     """
@@ -158,9 +158,9 @@ def brief(run: Run, among: Sequence[Run] = ()) -> str:
     if run in among:
         words.append(motion_labels(cases)[among.index(run)])
         words.append(_roles_words(run.case, cases))
-    told = list(_told(run, cases))
-    words += [text for text, differs in told if differs]
-    words += [text for text, differs in told if not differs]
+    settings = list(_settings_words(run, cases))
+    words += [text for text, differs in settings if differs]
+    words += [text for text, differs in settings if not differs]
     if run.frames:
         words.append(seconds_words(run.seconds))
     return " · ".join(filter(None, words))

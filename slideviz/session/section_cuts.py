@@ -1,4 +1,4 @@
-"""What sections show of the frame that is looked at, cut once for all who draw it."""
+"""Cuts of the frame that is shown, made once for all views of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from slideviz.mesh.model import Cells, FloatArray, Mesh
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
-from slideviz.sections.threshold import Choice
+from slideviz.sections.threshold import CellsInRange
 from slideviz.session.passages import moved
 
 KEPT = 24
@@ -16,7 +16,7 @@ KEPT = 24
 
 
 class Cuts:
-    """Cuts of a mesh that is deformed, the last ones remembered.
+    """The cuts of a mesh that is deformed, with a memory of the last ones.
 
     The 3D view and a flat one show the same section, so that the second need not cut again.
     """
@@ -25,10 +25,10 @@ class Cuts:
         self._cells: Cells | None = None
         self._cutter: Cutter | None = None
         self._points: FloatArray | None = None
-        self._found: dict[tuple[Section, bytes, Choice | None], Polygons] = {}
+        self._found: dict[tuple[Section, bytes, CellsInRange | None], Polygons] = {}
 
     def cutter(self, mesh: Mesh) -> Cutter:
-        """Return what cuts the cells of a mesh; the steps of a deformation share it."""
+        """Return the cutter of a mesh; the steps of a deformation share it."""
         if self._cutter is None or self._cells is not mesh.cells:
             self._cells, self._cutter = mesh.cells, Cutter.of(mesh)
             self._points = None
@@ -39,9 +39,9 @@ class Cuts:
         mesh: Mesh,
         section: Section,
         matrix: FloatArray | None = None,
-        only: Choice | None = None,
+        only: CellsInRange | None = None,
     ) -> Polygons:
-        """Return what a section shows of a mesh, or of its image under a matrix (4, 4).
+        """Return the cut of a section through a mesh, or its image under a matrix (4, 4).
 
         ``only`` says which cells are shown at all; left out, every one.
         """

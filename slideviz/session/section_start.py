@@ -1,4 +1,4 @@
-"""Sections to start from, and the one number of each that a slider moves."""
+"""Sections to start from, and the number of each that a slider moves."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from slideviz.session.state import Session
 
 
 def cell_points(mesh: Mesh) -> FloatArray:
-    """Return the nodes of the cells, (u, 3): what a section can reach."""
+    """Return the nodes (u, 3) of the cells, which a section can reach."""
     return padded(mesh.points[mesh.cells.nodes])
 
 
 def first_section(kind: str, session: Session, pair: Pair | None = None) -> Section:
-    """Return a section of a shape to start from, about through the middle of what is shown.
+    """Return a section of a shape to start from, about through the middle of the mesh shown.
 
     What has an axis is about that of the machine: that of the period, where it is a rotation, and
     otherwise that of the case. In 2D it is about the middle of what moves where no rotation has
@@ -59,7 +59,7 @@ def _middle_of_moving(session: Session) -> FloatArray:
 
 
 def span(section: Section, points: FloatArray) -> tuple[float, float]:
-    """Return between which positions a section can cut cells with these nodes (n, 3)."""
+    """Return the range of positions at which a section cuts cells with these nodes (n, 3)."""
     found = section.shape.positions(section, points)
     return float(found.min()), float(found.max())
 

@@ -1,4 +1,4 @@
-"""What the window shows, as frozen values: mesh, case, guesses, computed frames, view settings."""
+"""The session as frozen values: mesh, case, guesses, frames of the runs, view."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ViewState:
-    """How it is looked at.
+    """The view of a session: colours, threshold, sections, step, things drawn.
 
     Attributes
     ----------
@@ -84,17 +84,17 @@ class ViewState:
 
     @property
     def style(self) -> ViewState:
-        """Return it without what passes: the step, what is selected or marked, the second view."""
+        """Return the view without what passes: step, selections, second view."""
         return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
-        """Return it with that drawn, or not."""
+        """Return the view with some things drawn, or not."""
         on = frozenset(name for name, wanted in drawn.items() if wanted)
         return replace(self, drawn=self.drawn - drawn.keys() | on)
 
     @property
     def section(self) -> Section | None:
-        """Return the section that is chosen."""
+        """Return the chosen section, or None."""
         if self.chosen is None or self.chosen >= len(self.sections):
             return None
         return self.sections[self.chosen]
@@ -119,7 +119,7 @@ Place = Literal["open", "boundaries", "motion", "method"]
 
 @dataclass(frozen=True)
 class Guess:
-    """A role that was not chosen but read from the name or from a match, and why."""
+    """A guessed role, and the reason: the boundary's name, or a match."""
 
     role: Role
     reason: str
@@ -127,7 +127,7 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """All that is open: what was read, what is asked, what came out, how it is looked at.
+    """The open mesh, its case, its runs, and the view of them.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class Session:
         The highest number that a run was given, removed ones too.
     saved : Case or None
         What is on disk, or what was there at the start.
-    clash : str
+    intersection : str
         What the motions put through what, in a sentence; empty as far as is known.
     invalid : tuple of (Place, str)
         The fields that show something else than the case has, because it is not valid: the panel,
@@ -170,18 +170,18 @@ class Session:
     shown: int | None = None
     saved: Case | None = None
     view: ViewState = field(default_factory=ViewState)
-    clash: str = ""
+    intersection: str = ""
     invalid: tuple[tuple[Place, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0
 
     def inputs(self) -> dict[Path, str]:
-        """Return the files that it was read from, and what they are in words."""
+        """Return the files that the session was read from, and what they are in words."""
         found = self.case.inputs()
         return found if self.path is None else found | {self.path: "the mesh that is open"}
 
     def run(self, number: int | None) -> Run | None:
-        """Return the run of that number, if it is still there."""
+        """Return the run of that number, or None."""
         return next((run for run in self.runs if run.number == number), None)
 
     @property
@@ -198,7 +198,7 @@ class Session:
 
     @property
     def ran(self) -> Case | None:
-        """Return what the steps shown were computed with."""
+        """Return the case of the run that is shown."""
         run = self.run_shown
         return run.case if run is not None else None
 
@@ -227,14 +227,14 @@ class Session:
 
     @property
     def repeatable(self) -> bool:
-        """Tell whether the case, as it is on disk, gives the run that is shown once more."""
+        """Tell whether the case file on disk gives the run that is shown once more."""
         run = self.run_shown
         kept = self.case.source is not None and not self.unsaved_case
         return kept and run is not None and run.end == "done" and not self.outdated
 
     @property
     def outdated(self) -> bool:
-        """Tell whether the steps shown were computed with other settings than now."""
+        """Tell whether the case differs from that of the run shown, for its result."""
         run = self.run_shown
         return run is not None and bool(run.frames) and essence(run.case) != essence(self.case)
 

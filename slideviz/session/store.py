@@ -1,4 +1,4 @@
-"""The one place where the session changes: holds it, tells those who listen, undoes."""
+"""The store: the one place that holds and changes the session, tells listeners, and undoes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def tell_all(
 
 @dataclass(frozen=True)
 class Memento:
-    """What undo brings back: roles, motions, settings, style of the view, removed runs.
+    """The part of a session that undo brings back: case, style of the view, removed runs.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Memento:
 
     @classmethod
     def of(cls, session: Session) -> Memento:
-        """Return that of a session."""
+        """Return the memento of a session."""
         return cls(
             session.case,
             session.guesses,
@@ -72,7 +72,7 @@ class Memento:
         )
 
     def put_into(self, session: Session) -> Session:
-        """Return the session with it; the step that is shown and the like stay."""
+        """Return the session with the memento's values; the step that is shown stays."""
         session = self._put_runs(session)
         view, style = session.view, self.style
         # Where the case was saved to does not come back: it is on disk, undone or not.
@@ -113,12 +113,12 @@ class _Done:
 
 
 class Store:
-    """The session of a window.
+    """The session of a window, with its listeners and its undo.
 
     Listeners are called with the old and the new session, in the order in which they came.
-    A change made by a listener is told after the present one has been told to everybody, so
+    A change made by a listener is passed on after the present one has reached everybody, so
     that nobody hears of the newer one first. One that raises keeps nobody from hearing: its
-    error goes to ``failed`` or, where that is None, is raised when everybody was told.
+    error goes to ``failed`` or, where that is None, is raised when everybody was called.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Store:
         self.put(new)
 
     def hold(self, held: bool) -> None:
-        """Take note that the mouse begins to drag something, or ends it.
+        """Note that the mouse begins to drag something, or ends it.
 
         What changes meanwhile is undone as one, however long it takes, and apart from the rest.
         """
@@ -167,7 +167,7 @@ class Store:
                 self._undo[-1] = replace(last, at_s=float("-inf"))
 
     def put(self, session: Session) -> None:
-        """Replace the session and tell the listeners; the same one again is no news.
+        """Replace the session and tell the listeners, unless it is the same one.
 
         Another mesh cannot be undone: what was done before is forgotten.
         """
@@ -197,20 +197,20 @@ class Store:
 
     @property
     def can_undo(self) -> str:
-        """Return what would be undone, in words; empty when there is nothing."""
+        """Return the words for the change that `undo` takes back; empty where there is none."""
         return self._undo[-1].words if self._undo else ""
 
     @property
     def can_redo(self) -> str:
-        """Return what would be done again, in words; empty when there is nothing."""
+        """Return the words for the change that `redo` makes; empty where there is none."""
         return self._redo[-1].words if self._redo else ""
 
     def undo(self) -> None:
-        """Bring back what was before the last change, if there was one."""
+        """Take back the last change, if there was one."""
         self._step(self._undo, self._redo)
 
     def redo(self) -> None:
-        """Make the change again that was undone last, if no other was made since."""
+        """Make the change again that was taken back last, if no other was made since."""
         self._step(self._redo, self._undo)
 
     def _step(self, source: list[_Done], target: list[_Done]) -> None:

@@ -1,4 +1,4 @@
-"""Marks changes of the session that can be undone, with what the menu calls them."""
+"""The decorator of changes that can be undone, with their words in the menu."""
 
 from __future__ import annotations
 
@@ -28,6 +28,6 @@ def undoable(words: Words) -> Callable[[Change], Change]:
 
 
 def undo_words(change: Callable[..., Any], named: Mapping[str, Any]) -> str | None:
-    """Return what the menu calls a change made with these named values; None: is not undone."""
+    """Return the words in the menu for a change with these named values; None: no undo."""
     words = _WORDS.get(change)
     return words if words is None or isinstance(words, str) else words(named)

@@ -1,4 +1,4 @@
-"""Comparing methods: one case by several methods, periodic modes and numbers of steps.
+"""The comparison of methods: one case by several methods, periodic modes, numbers of steps.
 
 The mesh is read once, and what only the method and the periodic mode decide (topology, classes of
 nodes, tracks) is found once for all numbers of steps. A combination that cannot be is a row that
@@ -141,7 +141,7 @@ def bounded(rows: Iterable[Row], bytes_kept: int) -> Iterator[Row]:
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """What runs with the same method and mode have in common, and the time it took."""
+    """The setup that runs with the same method and mode share, and the time it took."""
 
     first: Combination
     setup: Setup
@@ -154,7 +154,7 @@ class _Shared:
 
 
 def warm(methods: Iterable[str]) -> None:
-    """Load what the methods load once, so that it does not count as time of a run."""
+    """Load in advance what the methods load once, so that it takes no time of a run."""
     warm_up(lambda: None, lambda: False)
     made = sample("square", 4, "motion")
     (block,) = made.case.markers_with("moving")

@@ -1,4 +1,4 @@
-"""Facets of a comparison's plots: which rows are drawn together, and with which line.
+"""Facets of a comparison's plots: the rows that are drawn together, and their lines.
 
 Where both methods and periodic modes vary, each method has a facet and each mode a line, as in
 the thesis (Figures 5.5, 5.7, 5.8), or the other way round where there are fewer modes; otherwise
@@ -57,7 +57,7 @@ def facets(rows: Sequence[Row]) -> tuple[Facet, ...]:
 
 
 def _titles(row: Row) -> tuple[str, str]:
-    """Return what method and mode of a row are called."""
+    """Return the names of method and mode of a row."""
     return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
@@ -72,7 +72,7 @@ def result_of(line: Line) -> Result:
 
 
 def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | None:
-    """Return what makes profiles along the span; None where nothing says what the span is.
+    """Return the function that makes profiles along the span; None without a span.
 
     Parameters
     ----------

@@ -107,20 +107,20 @@ def _words(
     """Return what stands in places without a picture, and the notes at the foot."""
     problems = {row.combination: row.problem for row in rows if row.result is None}
     every = [row.combination for row in rows]
-    told = list(reasons(problems).items())
+    given = list(reasons(problems).items())
     notes = [
         f"[{number}] {words_for(some, every, TITLES)}: not possible: {reason}"
-        for number, (reason, some) in enumerate(told, start=1)
+        for number, (reason, some) in enumerate(given, start=1)
     ]
     words = {}
     for at, row in places.items():
         if row.result is None:
-            number = next(k for k, (_, some) in enumerate(told, 1) if row.combination in some)
+            number = next(k for k, (_, some) in enumerate(given, 1) if row.combination in some)
             words[at] = f"not possible [{number}]"
         elif at not in shown:
-            words[at] = f"not drawn [{len(told) + 1}]"
+            words[at] = f"not drawn [{len(given) + 1}]"
     if any(text.startswith("not drawn") for text in words.values()):
-        notes.append(f"[{len(told) + 1}] {NOT_KEPT}")
+        notes.append(f"[{len(given) + 1}] {NOT_KEPT}")
     return words, notes
 
 

@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.panels.display import MOST_COPIES, NOT_PERIODIC, ROLES_ONLY, SHOWN, Copies
 from slideviz.samples.table import write_sample
-from slideviz.scene.passages import CopyLayer
+from slideviz.scene.passages import PassageLayer
 from slideviz.scene.pick import to_display
 from slideviz.session import changes
 
@@ -116,7 +116,7 @@ def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     assert view(shown).copies == 1
     assert box.copies.text() == "1 on each side"
     scene = shown.window.scene
-    copies = next(layer for layer in scene.layers if isinstance(layer, CopyLayer))
+    copies = next(layer for layer in scene.layers if isinstance(layer, PassageLayer))
     seen = to_display(scene.plotter, np.concatenate([one.points for one in copies.shapes()]))
     assert seen.min() >= 0, "the view fits them"
     assert (seen.max(axis=0) <= scene.plotter.window_size).all()

@@ -299,8 +299,8 @@ def test_a_scaling(opened):
     assert opened.session.case.motions == (Scale("airfoil", (1.5, 1.0)),)
 
 
-def test_a_clash_is_told_while_the_motion_is_typed(opened):
-    from slideviz.color_scheme import CLASH_COLOUR
+def test_an_intersection_is_told_while_the_motion_is_typed(opened):
+    from slideviz.color_scheme import INTERSECTION_COLOUR
     from slideviz.terms import ROLES
 
     window, panel = opened.window, opened.window.run_panel
@@ -317,7 +317,7 @@ def test_a_clash_is_told_while_the_motion_is_typed(opened):
     opened.qtbot.waitUntil(lambda: not panel.run.isEnabled())
     assert "puts airfoil through periodic_1" in panel.text.text()
     assert "move airfoil less" in panel.text.toolTip()
-    assert ghost.prop.color == CLASH_COLOUR
+    assert ghost.prop.color == INTERSECTION_COLOUR
     assert "href='motion'" in panel.text.text()
     opened.type(field, "0.02")
     opened.qtbot.waitUntil(panel.run.isEnabled)

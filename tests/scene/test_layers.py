@@ -12,7 +12,7 @@ from slideviz.scene.legend import COLOURS, SIZE
 from slideviz.scene.passages import (
     CHOSEN,
     PALER,
-    CopyLayer,
+    PassageLayer,
     Period,
     matrices,
     outermost,
@@ -174,7 +174,7 @@ def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
     assert len(names) == 40
     scene.fit()
     assert scene.plotter.camera.parallel_scale > 3 * near_scale
-    copies = next(layer for layer in scene.layers if isinstance(layer, CopyLayer))
+    copies = next(layer for layer in scene.layers if isinstance(layer, PassageLayer))
     points = np.concatenate([shape.points for shape in copies.shapes()])
     seen = to_display(scene.plotter, points)
     assert seen.min() > 0

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from slideviz.scene.axis_handle import (
+    drag,
+    dragged_size,
     frame_of,
     patch_in,
-    pull,
-    pulled_size,
 )
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.model import Section
@@ -91,16 +91,16 @@ def test_the_ball_follows_the_mouse(seen):
         start, end = (seen(point)[0] for point in ends)
         # Wherever in the ball the mouse has it.
         held = np.array([3.0, -2.0])
-        assert pulled_size(seen, section, place, (start + held, end + held)) == pytest.approx(1.1)
-        assert pulled_size(seen, section, place, (start, start - 1e6 * (end - start))) > 0.0
+        assert dragged_size(seen, section, place, (start + held, end + held)) == pytest.approx(1.1)
+        assert dragged_size(seen, section, place, (start, start - 1e6 * (end - start))) > 0.0
 
 
 def test_along_the_radius_upwards_is_outwards():
     section = Section("cylinder", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.7)
     points = np.array([[0.0, 0.0, 0.7], [1.0, 0.0, 0.7]])
     place = patch_of(section, points).middle
-    at, way, steep = pull(parallel, section, place, 0.7)
+    at, way, steep = drag(parallel, section, place, 0.7)
     assert steep
     assert way == pytest.approx((0.0, 100.0))
     way = at, at + np.array([5.0, 20.0])
-    assert pulled_size(parallel, section, place, way) == pytest.approx(0.9)
+    assert dragged_size(parallel, section, place, way) == pytest.approx(0.9)

@@ -14,7 +14,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import quality
 from slideviz.plots.section_paint import paint
 from slideviz.plots.section_picture import SectionStyle, Shown, laid_flat, section_picture
-from slideviz.scene.axis_handle import frame_of, pulled_size
+from slideviz.scene.axis_handle import dragged_size, frame_of
 from slideviz.scene.flat_scene import flat_matrix
 from slideviz.sections.around_axis import patch_of
 from slideviz.sections.cut import Cutter
@@ -294,10 +294,10 @@ def test_the_ball_follows_the_mouse_around_the_apex():
     ends = (CUT.shape.surface(CUT, np.array([place]), angle) for angle in (ANGLE, 41.0))
     start, end = (parallel(point)[0] for point in ends)
     held = np.array([3.0, -2.0])
-    assert pulled_size(parallel, CUT, place, (start + held, end + held)) == pytest.approx(41.0)
+    assert dragged_size(parallel, CUT, place, (start + held, end + held)) == pytest.approx(41.0)
     far = 1e6 * (end - start)
-    assert 0.0 < pulled_size(parallel, CUT, place, (start, start - far)) < 1.0
-    assert 80.0 < pulled_size(parallel, CUT, place, (start, start + far)) < 90.0
+    assert 0.0 < dragged_size(parallel, CUT, place, (start, start - far)) < 1.0
+    assert 80.0 < dragged_size(parallel, CUT, place, (start, start + far)) < 90.0
 
 
 def test_in_2d_it_says_what_it_needs():

@@ -8,7 +8,7 @@ import pytest
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
-from slideviz.sections.threshold import ONLY_INVERTED, chosen_cells
+from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range
 from slideviz.session import inspect
 from slideviz.session.state import Frame
 
@@ -30,7 +30,7 @@ def frames(square):
 
 def test_a_range_chooses_its_ends_and_what_is_between():
     values = np.array([0.2, 0.5, 0.8, 0.1])
-    assert chosen_cells(values, (0.2, 0.5)).tolist() == [0, 1]
+    assert cells_in_range(values, (0.2, 0.5)).tolist() == [0, 1]
 
 
 def test_inverted_cells_are_chosen_from_0_alone(frames):
@@ -38,9 +38,9 @@ def test_inverted_cells_are_chosen_from_0_alone(frames):
     values = frame.shown_values("size-skew")
     inverted = np.flatnonzero(np.isnan(values))
     assert len(inverted) == frame.quality.inverted > 0
-    assert set(inverted) <= set(chosen_cells(values, (0.0, 0.3)))
-    assert not set(inverted) & set(chosen_cells(values, (1e-9, 1.0)))
-    assert chosen_cells(values, ONLY_INVERTED).tolist() == inverted.tolist()
+    assert set(inverted) <= set(cells_in_range(values, (0.0, 0.3)))
+    assert not set(inverted) & set(cells_in_range(values, (1e-9, 1.0)))
+    assert cells_in_range(values, ONLY_INVERTED).tolist() == inverted.tolist()
 
 
 @pytest.mark.parametrize("what", ["size-skew", "size", "skew"])

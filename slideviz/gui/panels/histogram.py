@@ -26,7 +26,7 @@ from slideviz.plots.session_histogram import (
     first_value,
     shown_measure,
 )
-from slideviz.sections.threshold import ONLY_INVERTED, chosen_cells, range_words
+from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
 from slideviz.session.state import Frame, Session
 from slideviz.session.store import Store
@@ -215,7 +215,7 @@ class HistogramPanel(Panel):
         self.range_text.setVisible(threshold is not None)
         if threshold is not None:
             values = session.frame.shown_values(what, session.mesh)[counted]
-            count = len(chosen_cells(values, threshold))
+            count = len(cells_in_range(values, threshold))
             self.range_text.setText(
                 f"Shown: {range_words(threshold)}, {count:,} of {len(values):,} cells"
             )

@@ -76,7 +76,7 @@ class RunPanel(Panel):
     def sync(self, session: Session) -> None:
         """Show whether a run can start, and if not what it needs."""
         # Some checks look at the mesh: not again while only the view changes.
-        key = (session.mesh, session.case, session.clash, session.invalid)
+        key = (session.mesh, session.case, session.intersection, session.invalid)
         if key != self._key:
             self._key = key
             self._missing = run_requirements(session)

@@ -22,7 +22,7 @@ from slideviz.gui.viewport.mouse_handle import (
     MouseHandle,
 )
 from slideviz.mesh.model import FloatArray
-from slideviz.scene.axis_handle import frame_of, pull, pulled_size
+from slideviz.scene.axis_handle import drag, dragged_size, frame_of
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.pick import to_display
 from slideviz.sections.around_axis import Patch, Place, shape_of
@@ -73,7 +73,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         if self.section is None or self._patch is None:
             return
         self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
-        at, way, _ = pull(self.seen, self.section, self.place, self.section.size)
+        at, way, _ = drag(self.seen, self.section, self.place, self.section.size)
         self._mark.draw_ball(at, way / np.linalg.norm(way))
         self._mark.highlight(self._part is not None)
         if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
@@ -104,7 +104,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         """Return whether the mouse would take the ball at a position of the widget."""
         if self.section is None or self.place is None:
             return None
-        at, *_ = pull(self.seen, self.section, self.place, self.section.size)
+        at, *_ = drag(self.seen, self.section, self.place, self.section.size)
         reach = REACH_PX * self.view.devicePixelRatioF()
         return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
@@ -117,7 +117,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
     def pulled(self, grasp: tuple[Section, Place], start: FloatArray, end: FloatArray) -> Section:
         """Return the section with another size."""
         section, place = grasp
-        size = pulled_size(self.seen, section, place, (start, end))
+        size = dragged_size(self.seen, section, place, (start, end))
         return section.sized(rounded(size, section.size))
 
 

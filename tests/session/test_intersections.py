@@ -22,7 +22,7 @@ def shifted(passage):
     return make
 
 
-def test_a_clash_is_a_sentence_with_a_place_and_a_remedy(shifted, passage):
+def test_an_intersection_is_a_sentence_with_a_place_and_a_remedy(shifted, passage):
     text = look(shifted(-0.4), passage.mesh)
     assert text.startswith("The motion puts airfoil through periodic_1 near (")
     assert text.endswith(").")
@@ -63,7 +63,7 @@ def test_boundaries_that_disagree_about_a_node_are_told(square):
     assert look(case.change(motions=(motions[0], Translate("left", (0.1, 0.0)))), square) == ""
 
 
-def test_a_clash_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
+def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(session):
     session = changes.set_role(session, ["bottom"], "moving")
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
     assert not changes.run_requirements(session)
