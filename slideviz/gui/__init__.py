@@ -1,1 +1,1 @@
-"""What is touched: the only room that speaks Qt."""
+"""The window: the only room that speaks Qt."""

@@ -65,7 +65,7 @@ class Actions:
                     group.addAction(act)
 
     def sync(self, now: Now) -> None:
-        """Show what is checked and what can be done."""
+        """Show which actions are checked and which can be done."""
         for name, command in COMMANDS.items():
             command.show(self.by_name[name], now)
         for name, table in self._tables.items():
@@ -74,7 +74,7 @@ class Actions:
 
 
 class ToolBar(QToolBar):
-    """The commands used most, what the cells are coloured by, and the zone.
+    """The tool bar: the commands used most, the quantity to colour by, and the zone.
 
     Attributes
     ----------
@@ -108,11 +108,8 @@ class ToolBar(QToolBar):
 
     def _add_colour(self, store: Store) -> None:
         self.addWidget(QLabel(" Colour by "))
-        self.colour = Choice(labels(COLOUR_BY))
-        self.colour.setObjectName("colour_by")
-        self.colour.setToolTip(
-            "What the colours of the view say; the panel Display has their range."
-        )
+        tip = "What the colours of the view say; the panel Display has their range."
+        self.colour = Choice(labels(COLOUR_BY), tip, "colour_by")
         self.colour.chosen.connect(lambda value: store.change(changes.set_view, colour_by=value))
         self.addWidget(self.colour)
 
@@ -125,9 +122,7 @@ class ToolBar(QToolBar):
         self.addSeparator()
 
     def _add_zone(self, open_zone: Callable[[int], object]) -> None:
-        self.zone = Choice({})
-        self.zone.setObjectName("zone")
-        self.zone.setToolTip("Which zone of the file is open.")
+        self.zone = Choice({}, "Which zone of the file is open.", "zone")
         self.zone.chosen.connect(open_zone)
         self.zone_label = self.addWidget(QLabel(" Zone "))
         self.zone_shown = self.addWidget(self.zone)

@@ -1,4 +1,4 @@
-"""The application: starts Qt and the window, and keeps going when something unexpected happens."""
+"""The application: Qt, the window, and what happens to errors that nobody expected."""
 
 from __future__ import annotations
 

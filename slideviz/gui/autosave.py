@@ -1,4 +1,4 @@
-"""The session is written as a case file now and then, so that a crash costs some seconds of work.
+"""Autosave: the session is written as a case file, so that a crash costs some seconds of work.
 
 Each window has a file of its own, ``session-PID-N.cfg``, and a lock beside it that the system
 frees when the program ends, however it does. A file that nobody holds is of a session that did
@@ -39,7 +39,7 @@ log = logging.getLogger("slideviz")
 
 
 class Autosave(QObject):
-    """Writes the session of a window after each change, and removes it at a clean end.
+    """The file with the session of a window: written after changes, removed at a clean end.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Autosave(QObject):
         store.listen(self._changed)
 
     def save(self) -> None:
-        """Write the session in the background, if it is not written as it is."""
+        """Write the session in the background, if it has changed since it was written."""
         session = self.store.session
         if self._runner.busy:
             self._timer.start()
@@ -88,7 +88,7 @@ class Autosave(QObject):
         self.save()
 
     def close(self) -> None:
-        """End; the file is not needed any more."""
+        """Stop writing the session, and remove its file."""
         self._timer.stop()
         self._runner.close()
         with contextlib.suppress(OSError):
@@ -150,19 +150,19 @@ class Found:
 
     @property
     def when(self) -> datetime:
-        """Return when it was written."""
+        """Return when the session was written."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
     def remove(self) -> None:
-        """Throw it away."""
+        """Remove the file of the session."""
         self.path.unlink(missing_ok=True)
         self.lock.unlock()
 
 
 def find_sessions(folder: Path) -> tuple[list[Found], list[str]]:
-    """Return the sessions that nobody holds, newest first, and what is wrong with others.
+    """Return the sessions that no window holds, newest first, and sentences about unreadable ones.
 
-    Those that cannot be read are renamed to ``….broken`` and told of, in a sentence each.
+    Those that cannot be read are renamed to ``….broken``, with a sentence each.
     """
     found, problems = [], []
     for path in sorted(folder.glob("session-*.cfg"), key=_modified, reverse=True):

@@ -18,7 +18,7 @@ _DOWN = 24
 
 
 class DockTabs(QObject):
-    """Watches the tab bars that Qt makes for docks: a double click takes one out.
+    """The tab bars that Qt makes for docks, on which a double click takes a dock out.
 
     A right click asks what to do with it. A panel that a tab names has no title bar.
 
@@ -47,12 +47,12 @@ class DockTabs(QObject):
         self._timer.start()
 
     def bars(self) -> list[QTabBar]:
-        """Return the tab bars of docks that there are now."""
+        """Return the present tab bars of docks."""
         direct = Qt.FindChildOption.FindDirectChildrenOnly
         return [bar for bar in self.window.findChildren(QTabBar, options=direct) if bar.count()]
 
     def watch(self) -> None:
-        """Watch every tab bar, also those made since the last time, and give the others titles."""
+        """Watch every tab bar, and give the docks without one their titles."""
         for dock in self._docks.values():
             tabbed = bool(self.window.tabifiedDockWidgets(dock))
             self._set_title(dock, dock.isFloating() or not (tabbed or dock in self._bare))
@@ -86,7 +86,7 @@ class DockTabs(QObject):
         return self._docks.get(bar.tabText(bar.tabAt(where)))
 
     def menu_of(self, dock: QDockWidget) -> QMenu:
-        """Return what can be done with a panel."""
+        """Return the menu of a dock: take it out, close it."""
         menu = QMenu(self.window)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction("Own window", lambda: self.take_out(dock))
@@ -94,7 +94,7 @@ class DockTabs(QObject):
         return menu
 
     def take_out(self, dock: QDockWidget) -> None:
-        """Make a panel a window of its own, near where it was, as large as it was."""
+        """Make a dock a window of its own, near its old place, of the same size."""
         size, at = dock.size(), dock.mapToGlobal(QPoint(-_DOWN, _DOWN))
         for other in self.window.tabifiedDockWidgets(dock):
             # Behind another tab it may be as small as it was long ago.

@@ -1,4 +1,4 @@
-"""The docks around the view: which there are, where they stand, and how they share the room."""
+"""The docks around the view: the table of them, their places, and how they share the room."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SIDE = 0.22
 
 @dataclass(frozen=True)
 class DockRow:
-    """One dock: its name and title, where it stands, and how its panel is made.
+    """A dock: name, title, place, and the function that makes its panel.
 
     ``after`` names the dock that it shares a place with, as a tab. One that is ``named`` by what is
     in it has no title bar, as those have none that a tab names: the height is needed.
@@ -69,12 +69,7 @@ DOCKS: tuple[DockRow, ...] = (
         "histogram",
     ),
     DockRow("curves", "Curves", RIGHT, lambda w: CurvesPanel(w.store), "histogram"),
-    DockRow(
-        "runs",
-        "Runs",
-        RIGHT,
-        lambda w: RunsPanel(w.store, w.files.save_mesh, w.banner.tell_error, w.say),
-    ),
+    DockRow("runs", "Runs", RIGHT, lambda w: RunsPanel(w.store)),
     DockRow("sections", "Sections", RIGHT, sections_panel, "runs"),
     DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs"),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
@@ -235,7 +230,7 @@ class Docks(QObject):
         return all(dock is None or abs(dock.width() - widths[s]) < 4 for s, dock in seen.items())
 
     def toggle_all(self) -> None:
-        """Hide every panel, or show those again that were hidden so."""
+        """Hide every dock, or show again those that were hidden together."""
         if any(dock.isVisible() for dock in self.by_name.values()):
             self._hidden = self.window.saveState()
             for dock in self.by_name.values():
@@ -244,7 +239,7 @@ class Docks(QObject):
             self.show_hidden()
 
     def show_hidden(self) -> None:
-        """Show the panels that were hidden all at once, as they were."""
+        """Show again the docks that were hidden together."""
         state, self._hidden = self._hidden, None
         if state is not None and not any(dock.isVisible() for dock in self.by_name.values()):
             self.window.restoreState(state)

@@ -1,4 +1,4 @@
-"""Opening and saving: which file, in what order, with what question before."""
+"""Opening and saving of files, with the questions before."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ RECENT = 10
 
 
 class Files(QObject):
-    """The files of a window."""
+    """The files of a window: recent ones, opening, saving."""
 
     def __init__(self, window: MainWindow, settings: QSettings) -> None:
         super().__init__(window)
@@ -61,7 +61,7 @@ class Files(QObject):
         self.settings.setValue("folder", str(path.parent))
 
     def folder(self) -> Path:
-        """Return where file dialogs start: beside the last file, or where the program did.
+        """Return the folder in which file dialogs start: that of the last file, or of the program.
 
         From a desktop that is no place of the user's.
         """
@@ -78,7 +78,7 @@ class Files(QObject):
             self.open_path(path)
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
-        """Open a mesh or case in the background, unless the user would rather keep what is."""
+        """Open a mesh or case in the background, once unsaved work is saved or may be lost."""
         if self.may_go_on(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
             self.window.start_job(f"Opening {path.name}", self._opened, jobs.open_file, path, zone)
@@ -134,7 +134,7 @@ class Files(QObject):
         )  # fmt: skip
 
     def may_go_on(self, again: Callable[[], object], before: str = "opening another mesh") -> bool:
-        """Ask about unsaved changes; return whether they may be dropped or were saved.
+        """Ask about unsaved work; return whether it may be dropped or was saved.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class Files(QObject):
     # Save ------------------------------------------------------------------------------
 
     def stem(self) -> str:
-        """Return what the files that are offered begin with."""
+        """Return the stem of the names that file dialogs offer."""
         session = self.window.store.session
         path = session.case.source or session.path
         return path.stem if path is not None else "mesh"
@@ -287,7 +287,7 @@ def _same(path: Path, other: Path | None) -> bool:
 
 
 def sample_folder() -> Path:
-    """Return where the sample cases are written to be opened."""
+    """Return the folder into which sample cases are written to be opened."""
     places = QStandardPaths.standardLocations(QStandardPaths.StandardLocation.CacheLocation)
     return Path(places[0] if places else tempfile.gettempdir()) / "slideviz-samples"
 

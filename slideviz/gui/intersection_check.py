@@ -34,11 +34,11 @@ class IntersectionCheck(QObject):
 
     @property
     def busy(self) -> bool:
-        """Tell whether an answer is still to come."""
+        """Tell whether a check runs or is about to."""
         return self._runner.busy or self._timer.isActive()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop checking."""
         self._timer.stop()
         self._runner.close()
 

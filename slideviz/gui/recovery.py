@@ -47,7 +47,7 @@ class SessionRecovery(QObject):
         self._trace = ""
 
     def look(self, crashes: Path | None = None) -> None:
-        """Look for sessions, and for traces of crashes in a folder, and offer what is found."""
+        """Find sessions to recover, and traces of crashes in a folder; offer the first session."""
         self.waiting, problems = find_sessions(self.autosave.path.parent)
         for path in old_crashes(crashes) if crashes is not None else ():
             log.warning("slideviz crashed; where it was is in %s", path)
@@ -73,7 +73,7 @@ class SessionRecovery(QObject):
         self.banner.ask(text, answers, self._trace, later=self._put_off)
 
     def answer(self, restore: bool) -> None:
-        """Open the session that is offered, or throw it away; then offer the next."""
+        """Open the offered session, or remove it; then offer the next."""
         found = self.waiting[0]
         if not restore:
             self.waiting.pop(0).remove()

@@ -1,4 +1,4 @@
-"""The jobs of a window: one after the other, each with one end, and what is told about them."""
+"""The jobs of a window: one after the other, each with one end, and messages about them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ log = logging.getLogger("slideviz")
 
 
 class Running(QObject):
-    """Starts jobs, keeps what they report, and tells how they end.
+    """The jobs of a window: their start, their reports and their ends.
 
     Signals
     -------
@@ -94,7 +94,7 @@ class Running(QObject):
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 
     def cancel(self) -> None:
-        """Ask the job that runs to stop."""
+        """Cancel the running job."""
         if self.runner.busy:
             self.runner.cancel()
 

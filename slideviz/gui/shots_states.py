@@ -1,4 +1,4 @@
-"""The states in which the window is photographed for ``screenshots/``."""
+"""States of the window for the pictures in ``screenshots/``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PATIENCE = 300.0
 
 
 def wait(until: Callable[[], bool]) -> None:
-    """Let the window work until a condition holds.
+    """Process events until a condition holds.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def wait(until: Callable[[], bool]) -> None:
 
 
 def settle(window: MainWindow) -> None:
-    """Let the window end what it does, and half a second more for what is drawn later."""
+    """Wait for the end of a job, and half a second more for late drawings."""
     wait(lambda: not window.runner.busy)
     end = time.monotonic() + 0.5
     wait(lambda: time.monotonic() > end)
@@ -68,7 +68,7 @@ OUTER = ("SHROUD", "PER1", "PER2", "INFLOW", "OUTFLOW")
 
 @dataclass(frozen=True)
 class State:
-    """A state of the window: the name of its picture, and what brings the window there."""
+    """A state of the window: name of its picture, and function that brings it about."""
 
     name: str
     bring: Callable[[MainWindow, Path], None]
@@ -143,10 +143,10 @@ def section(window: MainWindow, place: Path) -> None:
     window.docks_.lead_to("sections")
     window.docks_.panel(SectionsPanel).add["cylinder"].click()
     window.store.change(changes.set_view, copies=1)
-    window.cutting.want_flat(True)
+    window.section_views.want_flat(True)
     window.store.change(changes.show, OUTER, False)
     settle(window)
-    window.cutting.setSizes([45, 55])
+    window.section_views.setSizes([45, 55])
     _look(window, 25.0, -10.0)
 
 

@@ -1,4 +1,4 @@
-"""The start page: what to do when nothing is open."""
+"""The start page, over the view while no mesh is open."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -40,7 +40,7 @@ TRIED = "passage"
 
 
 class StartPage(QScrollArea):
-    """Try it, open, the files used last, and the sample cases."""
+    """The start page: buttons to try and to open, recent files, sample cases."""
 
     try_wanted = Signal(str)
     file_wanted = Signal(object)

@@ -1,4 +1,4 @@
-"""The main window: the view in the middle, panels around it, and what connects them."""
+"""The main window: the views in the middle, the panels around them, and their connections."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -32,8 +32,8 @@ from slideviz.gui.responsiveness.warmup_thread import WarmupThread
 from slideviz.gui.running import Running
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewport.canvas import View3D
-from slideviz.gui.viewport.cutting import Cutting
 from slideviz.gui.viewport.player import Player
+from slideviz.gui.viewport.section_views import SectionViews
 from slideviz.gui.viewport.viewing import Viewing
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.banner import Banner
@@ -119,10 +119,10 @@ class MainWindow(Services):
         grid.setContentsMargins(0, 0, 0, 0)
         # The start page lies over the view: a view that is never shown has no size.
         self.viewing = Viewing(self.store, multi_samples, stack)
-        self.cutting = Cutting(self.viewing, multi_samples, stack)
+        self.section_views = SectionViews(self.viewing, multi_samples, stack)
         self.start = StartPage(self.files.samples, stack)
         self.start.setAutoFillBackground(True)
-        grid.addWidget(self.cutting, 0, 0)
+        grid.addWidget(self.section_views, 0, 0)
         grid.addWidget(self.start, 0, 0)
         self.start.raise_()
         self.start.show_recent(self.files.recent())
@@ -141,7 +141,7 @@ class MainWindow(Services):
 
     @property
     def scene(self) -> Scene:
-        """Return what the first view draws."""
+        """Return the scene of the first view."""
         return self.viewing.scene
 
     @property
@@ -204,7 +204,7 @@ class MainWindow(Services):
     # The session -----------------------------------------------------------------------
 
     def sync_actions(self) -> None:
-        """Show in menus, tool bar and title what is and what can be done."""
+        """Bring menus, tool bar, title and mesh text up to date."""
         session = self.store.session
         self.actions_.sync(
             Now(
@@ -259,7 +259,7 @@ class MainWindow(Services):
         self.running.start_run()
 
     def cancel(self) -> None:
-        """Ask the job that runs to stop."""
+        """Cancel the running job."""
         if self.runner.busy:
             self.run_panel.show_cancelling()
             self.running.cancel()
@@ -281,7 +281,7 @@ class MainWindow(Services):
     # The view --------------------------------------------------------------------------
 
     def lead_to(self, missing: Requirement) -> None:
-        """Bring the panel to the front where something is put right, and the field."""
+        """Bring the panel to the front in which a requirement is met, and its field."""
         if missing.place == "open":
             self.files.ask_and_open()
             return
@@ -301,7 +301,7 @@ class MainWindow(Services):
         self.player.sync(self.store.session)
         for panel in self.findChildren(Panel):
             panel.take_theme(look)
-        self.cutting.set_look(look)
+        self.section_views.set_look(look)
         self.viewing.set_look(look)
 
     # Qt --------------------------------------------------------------------------------
@@ -339,7 +339,7 @@ class MainWindow(Services):
             if self.autosave is not None:
                 self.autosave.close()
             self.docks_.panel(LogPanel).detach()
-            self.cutting.close_views()
+            self.section_views.close_views()
             self.viewing.close_views()
             self._kept.close()
         super().closeEvent(event)

@@ -108,7 +108,7 @@ def test_the_preview_follows_the_options(renderer, qtbot):
     dialog.background.show_value("transparent")
     dialog.background.chosen.emit("transparent")
     qtbot.waitUntil(lambda: dialog.preview.pixmap().toImage() != white)
-    assert dialog.figure.background == "transparent"
+    assert dialog.picture_options.background == "transparent"
     dialog.reject()
 
 
@@ -118,14 +118,14 @@ def test_sizes_in_pixels_and_on_paper(renderer, qtbot):
     for name, size in (("1920x1080", (1920, 1080)), ("view", (900, 700))):
         dialog.size_choice.show_value(name)
         dialog.size_choice.chosen.emit(name)
-        assert dialog.figure.size == size
+        assert dialog.picture_options.size == size
     dialog.width_px.setValue(777)
     assert dialog.size_choice.currentData() == "other"
     dialog.size_choice.show_value("paper")
     dialog.size_choice.chosen.emit("paper")
     dialog.width_cm.setValue(8.0)
     dialog.height_cm.setValue(5.0)
-    figure = dialog.figure
+    figure = dialog.picture_options
     assert figure.size == (945, 591)
     assert figure.dpi == 300
     # Letters of 8.5 points.
@@ -157,13 +157,13 @@ def test_choices_are_offered_again_and_broken_ones_are_not(renderer, qtbot):
     dialog.width_px.setValue(700)
     again = PictureDialog(None, renderer, kept=dialog.choices)
     qtbot.addWidget(again)
-    assert again.figure.title
-    assert again.figure.size == dialog.figure.size
+    assert again.picture_options.title
+    assert again.picture_options.size == dialog.picture_options.size
     assert again.size_choice.currentData() == "other"
     for broken in ("{", "[1]", json.dumps({"size": "x"}), json.dumps({"paper": [1]})):
         usual = PictureDialog(None, renderer, kept=broken)
         qtbot.addWidget(usual)
-        assert usual.figure.background == "white"
+        assert usual.picture_options.background == "white"
 
 
 def test_copy_in_the_dialog_and_by_keys(opened, qtbot):
@@ -429,12 +429,12 @@ def test_a_copy_while_the_preview_is_drawn_is_whole_and_so_is_the_preview(opened
     pictures = []
 
     def look(dialog):
-        qtbot.waitUntil(lambda: dialog._turns.busy)
+        qtbot.waitUntil(lambda: dialog._runner.busy)
         dialog._copy()
         pictures.append(QApplication.clipboard().image().size())
         assert dialog.preview.pixmap().isNull()
         qtbot.waitUntil(lambda: not dialog.preview.pixmap().isNull())
-        pictures.append(dialog.figure.size)
+        pictures.append(dialog.picture_options.size)
         return False
 
     in_dialog(look)
@@ -625,9 +625,9 @@ def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_
     ran.window.store.change(changes.mark, 3)
     with ran.window.exports._renderer() as renderer:
         dialog = PictureDialog(ran.window, renderer)
-        assert dialog.figure.showing(renderer.session).view.marked == 3
+        assert dialog.picture_options.showing(renderer.session).view.marked == 3
         dialog.options["marked"].setChecked(False)
-        assert dialog.figure.showing(renderer.session).view.marked is None
+        assert dialog.picture_options.showing(renderer.session).view.marked is None
         assert dialog._form.isRowVisible(dialog.options["marked"])
         form = FilmForm(renderer)
         assert form.layout().isRowVisible(form.mark)

@@ -38,7 +38,7 @@ def sections(window):
 
 def ball(window, view=None):
     """Where the ball is, in space."""
-    handle = window.cutting.handles.of(view or window.view)
+    handle = window.section_views.handles.of(view or window.view)
     (point,) = handle.section.shape.surface(
         handle.section, np.array([handle.place]), handle.section.size
     )
@@ -124,7 +124,7 @@ def test_that_of_a_cone_is_pulled_to_another_half_angle(window, driver, panel):
     assert np.abs(first.distance(point[None])).max() < 1e-12
     assert len(blue(window.view)) > 30
     low, high = panel.editor._span
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     for wanted in (high - 0.2 * (high - low), low + 0.2 * (high - low)):
         section, point = sections(window)[1], ball(window)
         (there,) = section.shape.surface(section, np.array([handle.place]), wanted)
@@ -208,9 +208,9 @@ def test_it_leaves_nothing(window, driver, panel):
 def test_another_kind_of_section_has_another_handle(window, driver, panel):
     driver.click(panel.add["plane"])
     assert not marks(window.view)
-    assert isinstance(window.cutting.handles.of(window.view), PlaneHandle)
+    assert isinstance(window.section_views.handles.of(window.view), PlaneHandle)
     panel.list.setCurrentRow(0)
-    assert isinstance(window.cutting.handles.of(window.view), RoundHandle)
+    assert isinstance(window.section_views.handles.of(window.view), RoundHandle)
     assert marks(window.view)
 
 
@@ -221,7 +221,7 @@ def test_beside_the_mesh_it_can_be_pulled_back(window, driver, panel):
     assert len(window.scene.sections.drawn["section:0"].polygons) == 0
     points = window.store.session.mesh.points
     assert np.linalg.norm(points - ball(window), axis=1).min() < 0.3
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     start = pixel(window.view, ball(window))
     x, y = start
     if not (0 < x < window.view.width() and 0 < y < window.view.height()):
@@ -229,7 +229,7 @@ def test_beside_the_mesh_it_can_be_pulled_back(window, driver, panel):
         window.view.snapshot()
     pull(window, 0.3)
     assert sections(window)[0].radius == pytest.approx(0.3, abs=0.02)
-    assert handle is window.cutting.handles.of(window.view)
+    assert handle is window.section_views.handles.of(window.view)
 
 
 def test_of_two_views_each_has_one(window, driver, panel):
@@ -246,7 +246,7 @@ def test_of_two_views_each_has_one(window, driver, panel):
     wanted = low + 0.8 * (high - low)
     pull(window, wanted, second)
     assert sections(window)[0].radius == pytest.approx(wanted, abs=0.02 * (high - low))
-    handles = window.cutting.handles
+    handles = window.section_views.handles
     assert handles.of(window.view).section == handles.of(second).section == sections(window)[0]
     window.store.change(changes.show_beside, None)
     assert handles.of(second) is None

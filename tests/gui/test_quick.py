@@ -79,7 +79,7 @@ def test_what_tells_of_a_change_is_painted_together_with_the_view(framed_view, q
 def test_a_window_is_painted_though_its_view_goes_before_it_was(framed_view, qtbot):
     frame = framed_view
     painted = Painted(frame.label)
-    frame.view._one_paint._timer.setInterval(10**6)
+    frame.view._repaints._timer.setInterval(10**6)
     frame.view.render()
     frame.label.update()
     turns()

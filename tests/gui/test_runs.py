@@ -414,7 +414,7 @@ def test_moving_one_camera_moves_the_other_and_both_are_drawn(ran, leads):
     QApplication.processEvents()
     painted = []
     views[1 - leads].signals.resized.disconnect()
-    views[1 - leads]._one_paint._timer.timeout.connect(lambda: painted.append(1))
+    views[1 - leads]._repaints._timer.timeout.connect(lambda: painted.append(1))
     where = QPointF(60, 90)
     none = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase
     wheel = QWheelEvent(where, where, QPoint(), QPoint(0, 120), *none, False)
@@ -460,7 +460,7 @@ def test_linked_views_come_to_rest(ran, qtbot):
     viewing = compare(ran)
     drawn = []
     for view in (viewing.view, viewing.second):
-        view._one_paint._timer.timeout.connect(lambda: drawn.append(1))
+        view._repaints._timer.timeout.connect(lambda: drawn.append(1))
     viewing.scene.zoom_at(50, 50, 1.1)
     qtbot.waitUntil(lambda: bool(drawn))
     for _ in range(40):

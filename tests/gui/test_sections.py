@@ -10,9 +10,9 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.viewport.cutting import place_for
 from slideviz.gui.viewport.flats import stack
 from slideviz.gui.viewport.plane_handle import PlaneHandle
+from slideviz.gui.viewport.section_views import place_for
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.ruler import Ruler, nice_ticks, tick_text
 from slideviz.samples.table import write_sample
@@ -95,10 +95,10 @@ def test_each_drag_of_the_slider_is_undone_as_one(window, driver, panel):
     assert sections(window) == first
     window.store.undo()
     assert sections(window) == ()
-    assert window.cutting.section is None
+    assert window.section_views.section is None
     window.store.redo()
     assert sections(window) == first
-    assert window.cutting.section == first[0]
+    assert window.section_views.section == first[0]
 
 
 def test_numbers_are_typed(window, driver, panel):
@@ -156,7 +156,7 @@ def test_an_undone_tilt_is_no_free_normal_any_more(window, driver, panel):
     driver.click(panel.add["plane"])
     driver.choose(editor.axis, "z")
     panel.handle.click()
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     handle.widget.InvokeEvent("StartInteractionEvent")
     handle.shape.SetNormal(0.3, 0.0, 0.95)
     handle.widget.InvokeEvent("EndInteractionEvent")
@@ -182,11 +182,11 @@ def test_a_hidden_section_has_no_flat_view_until_it_is_shown_again(window, drive
     driver.click(panel.add["cylinder"])
     panel.flat.click()
     panel.list.item(0).setCheckState(Qt.CheckState.Unchecked)
-    assert window.cutting.flat is None
+    assert window.section_views.flat is None
     assert not panel.flat.isEnabled()
     assert panel.flat.isChecked()
     panel.list.item(0).setCheckState(Qt.CheckState.Checked)
-    assert window.cutting.flat.scene.section.kind == "cylinder"
+    assert window.section_views.flat.scene.section.kind == "cylinder"
     assert panel.flat.isEnabled()
 
 
@@ -201,7 +201,7 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
     assert [section.shown for section in sections(window)] == [True, False]
     assert set(window.scene.sections.drawn) == {"section:0"}
     panel.list.setCurrentRow(0)
-    assert window.cutting.section.kind == "plane"
+    assert window.section_views.section.kind == "plane"
     tip = panel.handle.toolTip()
     panel.list.setCurrentRow(1)
     assert panel.handle.toolTip() not in (tip, "")
@@ -217,7 +217,7 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
     driver.click(panel.add["cylinder"])
     assert panel.flat.text() == "Unrolled"
     panel.flat.click()
-    flat = window.cutting.flat
+    flat = window.section_views.flat
     driver.qtbot.waitUntil(lambda: flat.view.isVisible() and flat.across.high > 0.01)
     QApplication.processEvents()
     before = flat.scene.polygons
@@ -238,7 +238,7 @@ def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, w
     assert flat.scene.ranges() == zoomed
     assert f"{sections(window)[0].radius:.6g}" in flat.title.text
     driver.click(flat.title.close_button)
-    assert window.cutting.flat is None
+    assert window.section_views.flat is None
     assert not panel.flat.isChecked()
 
 
@@ -246,14 +246,14 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     driver.click(panel.add["plane"])
     driver.click(panel.add["cylinder"])
     panel.flat.click()
-    assert window.cutting.flat.scene.section.kind == "cylinder"
+    assert window.section_views.flat.scene.section.kind == "cylinder"
     answers("ask_save", tmp_path / "again.cfg")
     window.actions_.by_name["save_case"].trigger()
     assert "cut, unrolled)" in (tmp_path / "again.cfg").read_text()
     window.store.undo()
-    assert window.cutting.flat is None
+    assert window.section_views.flat is None
     driver.open(tmp_path / "again.cfg")
-    assert window.cutting.flat.scene.section.kind == "cylinder"
+    assert window.section_views.flat.scene.section.kind == "cylinder"
     assert window.store.session.view.chosen == 1
     assert panel.flat.isChecked()
 
@@ -284,7 +284,7 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     assert sections(window)[0].describe() == "cone 9.5° about z from apex (0, 0, -1.6)"
     window.store.change(changes.set_view, copies=1)
     panel.flat.click()
-    flat = window.cutting.flat
+    flat = window.section_views.flat
     driver.qtbot.waitUntil(lambda: flat.view.isVisible() and flat.across.high > 0.01)
     assert flat.title.text == sections(window)[0].describe()
     assert flat.across.name == "s cos(θ sin α)"
@@ -298,7 +298,7 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     kept = sections(window)
     driver.open(tmp_path / "again.cfg")
     assert sections(window) == kept
-    assert window.cutting.flat.scene.section == kept[0]
+    assert window.section_views.flat.scene.section == kept[0]
 
 
 def test_a_cone_that_opens_backwards_has_no_axis_of_the_list(window, driver, panel):
@@ -329,15 +329,15 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
     panel.list.setCurrentRow(0)
     panel.handle.click()
     view = window.view
-    assert isinstance(window.cutting.handles.of(view), PlaneHandle)
+    assert isinstance(window.section_views.handles.of(view), PlaneHandle)
     undo, redo = window.store.undo, window.store.redo
     assert window.store.can_undo == "handle"
     undo()
-    assert not window.cutting.handles
+    assert not window.section_views.handles
     assert not panel.handle.isChecked()
     undo()
     assert panel.list.currentRow() == 1
-    assert window.cutting.section.kind == "cylinder"
+    assert window.section_views.section.kind == "cylinder"
     undo()
     assert window.store.session.view.chosen is None
     assert sections(window) == ()
@@ -345,13 +345,13 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
         redo()
     assert panel.list.currentRow() == 0
     assert panel.handle.isChecked()
-    assert isinstance(window.cutting.handles.of(view), PlaneHandle)
+    assert isinstance(window.section_views.handles.of(view), PlaneHandle)
 
 
 def test_the_flat_view_shows_the_step(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
-    flat = window.cutting.flat
+    flat = window.section_views.flat
     window.start_run()
     driver.settle()
     assert len(window.store.session.frames) > 1
@@ -365,7 +365,7 @@ def test_the_flat_view_shows_the_step(window, driver, panel):
 def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
-    flat = window.cutting.flat
+    flat = window.section_views.flat
     driver.qtbot.waitUntil(flat.view.isVisible)
     QApplication.processEvents()
     flat.fit()
@@ -383,7 +383,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     driver.click(panel.add["plane"])
     (plane,) = sections(window)
     panel.handle.click()
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     assert handle.widget.GetEnabled()
     assert handle.shape.GetOrigin() == pytest.approx(plane.origin)
     interactor = window.view.iren.interactor
@@ -399,7 +399,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
     driver.type(panel.editor.number, "0.3")
     assert np.dot(handle.shape.GetOrigin(), plane.direction) == pytest.approx(0.3)
     panel.handle.click()
-    assert not window.cutting.handles
+    assert not window.section_views.handles
     assert handle.widget.GetInteractor() is None
     assert interactor is window.view.iren.interactor
 
@@ -407,7 +407,7 @@ def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
 def test_the_ball_of_the_handle_moves_the_plane_along_its_normal(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.handle.click()
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     for state, then in (("MovingOrigin", "Pushing"), ("Rotating", "Rotating")):
         handle.shape.SetInteractionState(getattr(handle.shape, state))
         handle.widget.InvokeEvent("StartInteractionEvent")
@@ -440,8 +440,8 @@ def test_another_mesh_has_no_handle_and_no_flat_view(window, driver, panel, pass
     panel.handle.click()
     panel.flat.click()
     driver.open(passage_file)
-    assert not window.cutting.handles
-    assert window.cutting.flat is None
+    assert not window.section_views.handles
+    assert window.section_views.flat is None
     assert sections(window) == ()
     assert panel.add["plane"].text() == "Line"
     assert panel.add["cylinder"].text() == "Circle"
@@ -456,7 +456,7 @@ def test_two_runs_have_two_flat_views_that_show_the_same(window, driver, panel):
     panel.flat.click()
     window.start_run()
     driver.settle()
-    flats = window.cutting.flats
+    flats = window.section_views.flats
     assert flats.second is None
     window.store.change(changes.show_beside, changes.UNDEFORMED)
     driver.qtbot.waitUntil(lambda: flats.second is not None and flats.second.view.isVisible())
@@ -496,7 +496,7 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
     driver.click(flat_panel.add["plane"])
     assert flat_panel.flat.text() == "Curve"
     flat_panel.flat.click()
-    view = window.cutting.flat
+    view = window.section_views.flat
     assert [row.label for row in view.rows] == ["undeformed"]
     before = view.facts.text()
     assert "cells cut" in before
@@ -517,7 +517,7 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
     assert view.area.empty
     assert view.facts.text() == "it cuts no cell"
     driver.click(view.title.close_button)
-    assert window.cutting.flat is None
+    assert window.section_views.flat is None
     assert not flat_panel.flat.isChecked()
 
 
@@ -525,7 +525,7 @@ def test_the_curve_is_saved(window, driver, flat_panel, answers, tmp_path):
     driver.click(flat_panel.add["cylinder"])
     flat_panel.flat.click()
     answers("ask_save", tmp_path / "along.svg")
-    driver.click(window.cutting.flat.save_button)
+    driver.click(window.section_views.flat.save_button)
     assert b"<svg" in (tmp_path / "along.svg").read_bytes()
 
 
@@ -539,10 +539,10 @@ def test_a_flat_view_of_a_3d_mesh_becomes_a_curve_with_a_2d_one(
     panel.flat.click()
     answers("ask_save", tmp_path / "again.cfg")
     window.actions_.by_name["save_case"].trigger()
-    assert window.cutting.flat.objectName() == "curve_view"
+    assert window.section_views.flat.objectName() == "curve_view"
     driver.open(tmp_path / "again.cfg")
-    assert window.cutting.flat.objectName() == "curve_view"
-    assert window.cutting.flat.rows
+    assert window.section_views.flat.objectName() == "curve_view"
+    assert window.section_views.flat.rows
 
 
 @pytest.fixture
@@ -579,7 +579,7 @@ def test_a_line_is_dragged_by_its_middle_and_turned_by_its_end(window, driver, f
     (moved,) = sections(window)
     assert moved.origin[:2] == pytest.approx(tuple(start + shift), abs=0.01)
     assert moved.direction == line.direction
-    end = window.cutting.handles.of(window.view)._handle_parts.ends[1]
+    end = window.section_views.handles.of(window.view)._handle_parts.ends[1]
     drag_in_view(window.view, end, np.array(moved.origin[:2]) + 0.5)
     (turned,) = sections(window)
     assert np.abs(turned.direction) == pytest.approx((0.7071, 0.7071, 0.0), abs=0.02)
@@ -603,7 +603,7 @@ def test_a_circle_is_dragged_to_another_radius(window, driver, flat_panel):
     centre = np.array(circle.origin[:2])
     drag_in_view(
         window.view,
-        window.cutting.handles.of(window.view)._handle_parts.ends[0],
+        window.section_views.handles.of(window.view)._handle_parts.ends[0],
         centre + np.array([0.2, 0.0]),
     )
     assert sections(window)[0].radius == pytest.approx(0.2, abs=0.01)
@@ -616,7 +616,7 @@ def test_the_handle_of_a_line_leaves_nothing(window, driver, flat_panel):
     driver.click(flat_panel.add["plane"])
     flat_panel.handle.click()
     assert any(name.startswith("handle:") for name in window.view.actors)
-    handle = window.cutting.handles.of(window.view)
+    handle = window.section_views.handles.of(window.view)
     # What is dragged beside it moves the view, as ever.
     camera = window.scene.camera.place
     beside = handle._handle_parts.ends[0] + 0.2
@@ -636,11 +636,11 @@ def test_closing_with_handle_and_flat_view_leaves_nothing(window, driver, panel,
     panel.handle.click()
     panel.flat.click()
     QApplication.processEvents()
-    cutting, handle = window.cutting, window.cutting.handles.of(window.view)
+    section_views, handle = window.section_views, window.section_views.handles.of(window.view)
     monkeypatch.setattr(questions, "ask_unsaved", lambda *_: "discard")
     window.close()
     assert handle.widget.GetInteractor() is None
-    assert cutting.flat is None
+    assert section_views.flat is None
     QApplication.processEvents()
 
 
@@ -648,7 +648,10 @@ def test_a_closed_flat_view_is_freed(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.flat.click()
     QApplication.processEvents()
-    view, scene = weakref.ref(window.cutting.flat), weakref.ref(window.cutting.flat.scene)
+    view, scene = (
+        weakref.ref(window.section_views.flat),
+        weakref.ref(window.section_views.flat.scene),
+    )
     panel.flat.click()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     QApplication.processEvents()
@@ -676,7 +679,7 @@ def compare(window, driver):
 def test_of_two_views_each_has_a_handle(window, driver, panel):
     driver.click(panel.add["plane"])
     panel.handle.click()
-    handles = window.cutting.handles
+    handles = window.section_views.handles
     first = handles.of(window.view)
     second_view = compare(window, driver)
     second = handles.of(second_view)

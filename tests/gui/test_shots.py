@@ -55,8 +55,8 @@ def test_section_is_a_cylinder_that_is_unrolled(window, tmp_path):
     (cut,) = window.store.session.view.sections
     assert cut.kind == "cylinder"
     assert cut.radius == pytest.approx(0.275, abs=5e-3)  # within a cell of mid-span
-    assert window.cutting.flat is not None
-    assert window.cutting.flat.isVisible()
+    assert window.section_views.flat is not None
+    assert window.section_views.flat.isVisible()
 
 
 def test_side_by_side_shows_what_sliding_is_good_for(window, tmp_path):

@@ -1,4 +1,4 @@
-"""What is taken away from a window: pictures, films, tables of quality, meshes of all steps."""
+"""Exports: pictures, films, tables of quality, meshes of all steps."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COPIED_WIDTH = 1600
 
 
 class Exports(QObject):
-    """The exports of a window."""
+    """The exports of a window, each with the questions that it asks."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -44,7 +44,7 @@ class Exports(QObject):
     # Pictures --------------------------------------------------------------------------
 
     def picture(self) -> None:
-        """Ask what a picture has and how large it is, then for a name, and write it."""
+        """Ask for the options of a picture, then for a name, and write the picture."""
         if self._session.mesh is None:
             return
         view, settings = self.window.viewing, self.window.settings
@@ -52,7 +52,7 @@ class Exports(QObject):
             kept = str(settings.value("picture", ""))
             dialog = PictureDialog(self.window, renderer, (view.width(), view.height()), kept)
             accepted = dialog.exec() == PictureDialog.DialogCode.Accepted
-            figure, kept = dialog.figure, dialog.choices
+            options, kept = dialog.picture_options, dialog.choices
             dialog.deleteLater()
             if not accepted:
                 return
@@ -61,24 +61,24 @@ class Exports(QObject):
             filters = picture_filters(self._session)
             path = questions.ask_save(self.window, "Export picture", default, filters)
             if path is not None:
-                self._write_picture(renderer, figure, path)
+                self._write_picture(renderer, options, path)
 
     def _write_picture(
-        self, renderer: OffscreenRenderer, figure: PictureOptions, path: Path
+        self, renderer: OffscreenRenderer, options: PictureOptions, path: Path
     ) -> None:
         try:
             with wait_cursor():
                 if path.suffix.lower() in SUFFIXES:
-                    write_vector(renderer, figure, path)
+                    write_vector(renderer, options, path)
                 else:
-                    renderer.write(figure, path)
+                    renderer.write(options, path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return
         self._written(path)
 
     def copy_picture(self) -> None:
-        """Put a picture of what is shown on the clipboard, with a white background."""
+        """Put a picture of the view on the clipboard, with a white background."""
         if self._session.mesh is None:
             return
         view = self.window.viewing
@@ -87,20 +87,20 @@ class Exports(QObject):
         size = round(larger * width), round(larger * height)
         shown = self._session.view
         with self._renderer() as renderer, wait_cursor():
-            figure = PictureOptions(
+            options = PictureOptions(
                 size,
                 legend="legend" in shown.drawn,
                 edges="edges" in shown.drawn,
                 fill=renderer.fills,
                 letters=LETTERS * size[0] / size[1] / 1.6,
             )
-            copy_image(to_image(renderer.image(figure)))
+            copy_image(to_image(renderer.image(options)))
         self.window.say(f"Copied a picture of {size[0]} × {size[1]} pixels")
 
     # Films -----------------------------------------------------------------------------
 
     def make_film(self) -> None:
-        """Ask how a film of the steps is made, and make it while the window goes on."""
+        """Open the dialog that makes a film of the steps while the window goes on."""
         if self.film is not None:
             self.film.raise_()
             self.film.activateWindow()
@@ -133,7 +133,7 @@ class Exports(QObject):
             self.film = None
 
     def end(self) -> None:
-        """Stop what is being filmed: its mesh is closed."""
+        """Stop the film that is being made: its mesh is closed."""
         if self.film is not None:
             self.film.reject()
 

@@ -1,4 +1,4 @@
-"""The dialog for films: how one is made, its first and last image, and its progress."""
+"""The dialog for films: options, preview of the first and last image, and progress."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.reel import Drawn
 from slideviz.gui.dialogs.film_form import FilmForm
+from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.build import QuietBar, hint_label, in_column, in_row, set_style
 from slideviz.gui.widgets.pixmaps import drawn_for, fitted, framed, preview_label, to_image
 
@@ -23,7 +23,7 @@ PREVIEW = (360, 225)
 
 
 class FilmDialog(QDialog):
-    """Asks how a film is made and makes it, a piece in each turn of the event loop.
+    """The dialog that makes a film, a piece in each turn of the event loop.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class FilmDialog(QDialog):
         self.renderer = renderer
         self._ask = ask
         self._file: Path | None = None
-        self._turns, self._previewing = Turns(self), Turns(self)
-        self._turns.came.connect(self._came)
-        self._turns.done.connect(self._done)
-        self._turns.failed.connect(self._failed)
+        self._runner, self._previewing = PieceRunner(self), PieceRunner(self)
+        self._runner.came.connect(self._came)
+        self._runner.done.connect(self._done)
+        self._runner.failed.connect(self._failed)
         self._previewing.failed.connect(raise_again)
         self.form = FilmForm(renderer)
         self.form.changed.connect(self._changed)
@@ -100,10 +100,10 @@ class FilmDialog(QDialog):
 
     def _drawing(self) -> Generator[object, Any, None]:
         """Draw the first and the last image, from one place, in pieces."""
-        figure = self.form.figure.within(drawn_for(self.renderer, PREVIEW))
-        yield from posing(self.renderer, figure)
+        options = self.form.picture_options.within(drawn_for(self.renderer, PREVIEW))
+        yield from posing(self.renderer, options)
         for label, frame in zip(self.previews, (0, self.form.frames - 1), strict=True):
-            pixels = yield from self.renderer.picturing(figure, aim=False, frame=frame)
+            pixels = yield from self.renderer.picturing(options, aim=False, frame=frame)
             label.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     # Filming ---------------------------------------------------------------------------
@@ -111,7 +111,7 @@ class FilmDialog(QDialog):
     @property
     def filming(self) -> bool:
         """Tell whether a film is being made."""
-        return self._turns.busy
+        return self._runner.busy
 
     def _start(self) -> None:
         file = self._ask(self.form.kind.currentData())
@@ -119,8 +119,8 @@ class FilmDialog(QDialog):
             return
         self._previewing.stop()
         self._file = file
-        figure, reel = self.form.figure, self.form.reel
-        self._turns.start(filming(self.renderer, figure, file, reel, overwrite=True))
+        options, reel = self.form.picture_options, self.form.reel
+        self._runner.start(filming(self.renderer, options, file, reel, overwrite=True))
         self._show_filming(True)
 
     def _came(self, drawn: Drawn) -> None:
@@ -140,7 +140,7 @@ class FilmDialog(QDialog):
     def cancel(self) -> None:
         """Stop filming, if it goes on; no file is left."""
         if self.filming:
-            self._turns.stop()
+            self._runner.stop()
             self._end()
             self.stopped.emit()
 

@@ -1,4 +1,4 @@
-"""How a film is made: kind, size, speed, images in between, background."""
+"""The form for a film: kind, size, speed, images in between, background."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SIZE_WORDS = {
 
 
 class FilmForm(QWidget):
-    """The fields that say how a film is made.
+    """The fields for the options of a film.
 
     Parameters
     ----------
@@ -103,13 +103,13 @@ class FilmForm(QWidget):
 
     @property
     def reel(self) -> Reel:
-        """Return how the film is made."""
+        """Return size, speed and images in between."""
         size = self.width_px.value(), self.height_px.value()
         return Reel(size, self.fps.value(), self.hold.value(), self.between.value())
 
     @property
-    def figure(self) -> PictureOptions:
-        """Return what its images have."""
+    def picture_options(self) -> PictureOptions:
+        """Return the picture options of its images."""
         size = self.width_px.value(), self.height_px.value()
         view = self.renderer.session.view
         return PictureOptions(
@@ -146,7 +146,7 @@ class FilmForm(QWidget):
         self._changed()
 
     def problem(self) -> str:
-        """Return why no film can be made like that; empty when it can."""
+        """Return why no film can be made with these options; empty if one can."""
         kind = self.kind.currentData()
         try:
             # Any name in a folder that is there; the real one is asked for later.
@@ -157,7 +157,7 @@ class FilmForm(QWidget):
 
     @property
     def words(self) -> str:
-        """Return in words how long the film is."""
+        """Return in words how many images the film has, and how long it is."""
         return length_words(self.reel, self.frames, self.kind.currentData())
 
     def _changed(self, _: object = None) -> None:

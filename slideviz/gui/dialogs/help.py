@@ -70,7 +70,7 @@ class Help(QObject):
         self._show("about", lambda: AboutDialog(self.window))
 
     def copy_details(self) -> None:
-        """Copy what a bug report needs."""
+        """Copy versions, graphics, mesh and messages for a bug report."""
         QApplication.clipboard().setText(details(self.window))
         self.window.say("Copied; paste it into the report and say what you did")
 
@@ -84,7 +84,7 @@ class Help(QObject):
 
 
 class ShortcutsDialog(QDialog):
-    """Every action with its keys, by menu, and the mouse; a field finds some."""
+    """The dialog with the keys of all actions, by menu, and the mouse; a field finds some."""
 
     def __init__(self, window: Services) -> None:
         super().__init__(window)
@@ -131,7 +131,7 @@ class ShortcutsDialog(QDialog):
 
 
 class TextDialog(QDialog):
-    """A long text, in which words can be found."""
+    """A dialog with a long text, in which words can be found."""
 
     def __init__(self, parent: QWidget, title: str, text: str) -> None:
         super().__init__(parent)
@@ -159,7 +159,7 @@ class TextDialog(QDialog):
         self.next()
 
     def next(self) -> None:
-        """Go to the next place where the words are; from the end on at the beginning."""
+        """Go to the next place that has the words; after the last one to the first."""
         wanted = self.search.text()
         if wanted and not self.text.find(wanted, QTextDocument.FindFlag(0)):
             self.text.moveCursor(QTextCursor.MoveOperation.Start)
@@ -167,7 +167,7 @@ class TextDialog(QDialog):
 
 
 class AboutDialog(QDialog):
-    """Version, libraries and licence."""
+    """The dialog with version, libraries and licence."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -202,8 +202,8 @@ def _search_field(words: str) -> QLineEdit:
 
 
 def shortcut_rows(window: Services) -> list[tuple[str, list[tuple[str, str, str]]]]:
-    """Return for each menu the commands that have keys: title, keys, what they do."""
-    # What would be undone just now is not told.
+    """Return the commands with keys, by menu: title, keys and tip of each."""
+    # Without what would be undone just now.
     now, native = Now(window.store.session), QKeySequence.SequenceFormat.NativeText
     rows = {
         menu.title: [
@@ -221,7 +221,7 @@ def _plain(title: str) -> str:
 
 
 def details(window: Services) -> str:
-    """Return what a bug report needs: versions, graphics, mesh, settings, the last messages."""
+    """Return the text for a bug report: versions, graphics, mesh, settings, the last messages."""
     session = window.store.session
     lines = [versions(), _graphics(window)]
     mesh = session.mesh

@@ -23,7 +23,7 @@ ABOUT = (
 
 
 class TableDialog(QDialog):
-    """Shows a table and tells at once what it does, or what is wrong with it.
+    """The dialog for a table of displacements; below it stands its effect, or its mistake.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class TableDialog(QDialog):
         self.check()
 
     def check(self) -> None:
-        """Say what the table does, or what is wrong with it."""
+        """Show the effect of the table, or its mistake."""
         self._soon.stop()
         try:
             said, wrong = self.rows.check(self.text), False

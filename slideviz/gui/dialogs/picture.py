@@ -1,4 +1,4 @@
-"""The dialog for pictures: what is in them, how large they are, and a preview of it."""
+"""The dialog for pictures: their options and a preview."""
 
 # ruff: noqa: N802  (Qt's names)
 
@@ -24,9 +24,9 @@ from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
 from slideviz.export.vector import MOST_CELLS
+from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
 from slideviz.gui.responsiveness.timers import later
-from slideviz.gui.responsiveness.turns import Turns, raise_again
 from slideviz.gui.widgets.build import (
     boxed,
     check_box,
@@ -78,7 +78,7 @@ OPTIONS = {
 
 
 class PictureDialog(QDialog):
-    """Asks for what a picture has and how large it is, and shows what it will be.
+    """The dialog for the options of a picture, with a preview.
 
     Parameters
     ----------
@@ -109,8 +109,8 @@ class PictureDialog(QDialog):
         parts = in_row(left, in_column(self._form, None), spacing=16)
         self.setLayout(in_column(parts, self._make_buttons()))
         self._timer = later(self, self._draw, PREVIEW_MS)
-        self._turns = Turns(self)
-        self._turns.failed.connect(raise_again)
+        self._runner = PieceRunner(self)
+        self._runner.failed.connect(raise_again)
         self._take(kept)
         self._changed()
 
@@ -142,14 +142,12 @@ class PictureDialog(QDialog):
         self._paper = boxed(in_row(*paper, None))
         self._form.addRow("", self._pixels)
         self._form.addRow("", self._paper)
-        self.text = Choice(TEXT)
-        self.text.setToolTip("How large letters are; on paper, normal is 8.5 points.")
+        self.text = Choice(TEXT, "How large letters are; on paper, normal is 8.5 points.")
         self.text.chosen.connect(self._changed)
         self._form.addRow("Letters", self.text)
 
     def _make_options(self) -> None:
-        self.background = Choice(BACKGROUNDS)
-        self.background.setToolTip("What is behind the mesh.")
+        self.background = Choice(BACKGROUNDS, "What is behind the mesh.")
         self.background.chosen.connect(self._changed)
         self._form.addRow("Background", self.background)
         self.options: dict[str, QCheckBox] = {}
@@ -173,8 +171,8 @@ class PictureDialog(QDialog):
     # What was chosen -------------------------------------------------------------------
 
     @property
-    def figure(self) -> PictureOptions:
-        """Return what was chosen."""
+    def picture_options(self) -> PictureOptions:
+        """Return the options of the picture."""
         picked: dict[str, Any] = {name: box.isChecked() for name, box in self.options.items()}
         background, text = self.background.currentData(), float(self.text.currentData())
         if self.size_choice.currentData() != "paper":
@@ -189,18 +187,18 @@ class PictureDialog(QDialog):
 
     @property
     def choices(self) -> str:
-        """Return what was chosen as a text, to be offered the next time."""
-        figure = asdict(self.figure)
+        """Return the options as a text, to be offered the next time."""
+        kept = asdict(self.picture_options)
         numbers = (self.width_cm.value(), self.height_cm.value(), self.dpi.value())
-        figure.update(
+        kept.update(
             preset=self.size_choice.currentData(), text=self.text.currentData(), paper=numbers
         )
         # Whether the mesh fills the picture depends on how it is looked at.
-        del figure["fill"], figure["both"]
-        return json.dumps(figure)
+        del kept["fill"], kept["both"]
+        return json.dumps(kept)
 
     def _take(self, kept: str) -> None:
-        """Show what was chosen the last time, or what makes a good figure."""
+        """Show what was chosen the last time, or what makes a good picture."""
         usual = replace(PictureOptions(), fill=self.renderer.fills)
         known = asdict(usual)
         try:
@@ -238,12 +236,12 @@ class PictureDialog(QDialog):
         self._changed()
 
     def _changed(self, _: object = None) -> None:
-        figure = self.figure
-        too_large = max(figure.size) > LARGEST or min(figure.size) < SMALLEST
+        options = self.picture_options
+        too_large = max(options.size) > LARGEST or min(options.size) < SMALLEST
         self.words.setText(
-            f"{words_of_size(figure)}: width and height can be {SMALLEST} to {LARGEST} pixels"
+            f"{words_of_size(options)}: width and height can be {SMALLEST} to {LARGEST} pixels"
             if too_large
-            else words_of_size(figure)
+            else words_of_size(options)
         )
         set_style(self.words, "bad", too_large)
         for button in (self.save, self.copy):
@@ -254,20 +252,20 @@ class PictureDialog(QDialog):
     # Picture ---------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        self._turns.start(self._drawing())
+        self._runner.start(self._drawing())
 
     def _drawing(self) -> Generator[object, Any, None]:
         """Draw the preview in pieces: of a large mesh, all at once would take a second."""
-        figure = self.figure.within(drawn_for(self.renderer, PREVIEW))
-        pixels = yield from self.renderer.picturing(figure)
+        options = self.picture_options.within(drawn_for(self.renderer, PREVIEW))
+        pixels = yield from self.renderer.picturing(options)
         self.preview.setPixmap(framed(fitted(to_image(pixels), PREVIEW)))
 
     def _copy(self) -> None:
-        if self._turns.busy:  # a preview in pieces: nothing else may be drawn meanwhile
-            self._turns.stop()
+        if self._runner.busy:  # a preview in pieces: nothing else may be drawn meanwhile
+            self._runner.stop()
             self._timer.start()
         with wait_cursor():
-            copy_image(to_image(self.renderer.image(self.figure)))
+            copy_image(to_image(self.renderer.image(self.picture_options)))
         self.words.setText("Copied to the clipboard.")
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -278,7 +276,7 @@ class PictureDialog(QDialog):
     def done(self, result: int) -> None:
         """Close; nothing is drawn any more."""
         self._timer.stop()
-        self._turns.stop()
+        self._runner.stop()
         super().done(result)
 
 

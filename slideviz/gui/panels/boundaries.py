@@ -32,7 +32,7 @@ NAME, COUNT, ROLE = 0, 1, 2
 
 
 class BoundariesTable(QTableWidget):
-    """A table that the tab key leaves, whose menu is about what is selected.
+    """The table of the boundaries, which the tab key leaves, with a menu for selected rows.
 
     Signals
     -------
@@ -48,7 +48,7 @@ class BoundariesTable(QTableWidget):
         self.setTabKeyNavigation(False)
 
     def chosen_row(self) -> int:
-        """Return the row that a key is about: the current one, or the first that is selected."""
+        """Return the row for a key: the current one, or the first that is selected."""
         rows = sorted({index.row() for index in self.selectionModel().selectedRows()})
         return rows[0] if rows and self.currentRow() not in rows else self.currentRow()
 
@@ -231,7 +231,7 @@ class BoundariesPanel(Panel):
 
 
 def boundary_menu(parent: QWidget, store: Store, names: tuple[str, ...]) -> QMenu:
-    """Return a menu for these boundaries: role, visibility."""
+    """Return the menu of some boundaries: role, visibility."""
     menu = QMenu(parent)
     menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     menu.setToolTipsVisible(True)

@@ -21,7 +21,6 @@ from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import curves
 from slideviz.plots.draw import convergence, quality_by_step
@@ -46,7 +45,7 @@ WHAT = {"minimum": "minimum", "mean": "mean"}
 
 
 class CurveCanvas(PlotCanvas):
-    """A plot that tells the value of the horizontal axis where it is clicked."""
+    """A plot that hands over the value of the horizontal axis at a click."""
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
@@ -74,8 +73,7 @@ class CurvesPanel(Panel):
         self.follow(_concerned)
 
     def _make_head(self) -> QHBoxLayout:
-        self.kind = Choice(KINDS)
-        self.kind.setObjectName("curve_kind")
+        self.kind = Choice(KINDS, name="curve_kind")
         self.kind.explain(TIPS)
         self.kind.chosen.connect(lambda _: self._other_plot())
         self.save = push_button("Save…", "Save the plot as PNG, SVG or PDF.", self._save)
@@ -88,14 +86,11 @@ class CurvesPanel(Panel):
         return in_row(self.kind, self.whole, self.save, wide=[self.kind])
 
     def _make_span(self) -> QWidget:
-        self.what = Choice(WHAT)
-        self.what.setToolTip("The lowest or the mean quality of each layer.")
-        self.coordinate = Choice({})
-        self.coordinate.setToolTip(
-            wrapped(
-                "What the layers of the undeformed mesh are counted along; the radius is that "
-                "about the axis of the case."
-            )
+        self.what = Choice(WHAT, "The lowest or the mean quality of each layer.")
+        self.coordinate = Choice(
+            {},
+            "What the layers of the undeformed mesh are counted along; the radius is that about "
+            "the axis of the case.",
         )
         both = (self.what, self.coordinate)
         for choice in both:
@@ -151,7 +146,7 @@ class CurvesPanel(Panel):
     # Drawing ---------------------------------------------------------------------------
 
     def drawing(self) -> Draw:
-        """Return what draws the plot that is chosen."""
+        """Return the function that draws the selected plot."""
         session, kind = self.store.session, self.kind.currentData()
         if self._missing(session, kind):
             return lambda _figure, _style: None
@@ -207,7 +202,7 @@ def draw_steps(session: Session, whole: bool, figure: Figure, style: Style) -> N
 
 
 def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
-    """Draw how the error of the step that is shown fell."""
+    """Draw the error of the shown step against control nodes."""
     axes, run = figure.add_subplot(), curves.greedy_run(session)
     assert run is not None
     convergence(axes, [run], style=style)
@@ -223,7 +218,7 @@ def draw_span(
     figure: Figure,
     style: Style,
 ) -> None:
-    """Draw the quality along a coordinate, lowest or mean; or why it cannot be."""
+    """Draw the lowest or mean quality along a coordinate, or words that say why there is none."""
     axes = figure.add_subplot()
     try:
         found = profiles.of(session, coordinate)

@@ -54,7 +54,7 @@ class Copies(NumberBox):
         self.set_around(None)
 
     def set_around(self, around: int | None) -> None:
-        """Take how many passages the wheel has; None: a row without an end."""
+        """Set the number of passages of the whole wheel; None for a row without an end."""
         self.around = around
         self.setRange(0, MOST_COPIES if around is None else max(around // 2, 1))
 
@@ -67,14 +67,14 @@ class Copies(NumberBox):
         return f"{value} on each side"
 
     def valueFromText(self, text: str) -> int:
-        """Return the number that is typed, or that words stand for."""
+        """Return the number of neighbours for typed words or digits."""
         if text.strip().startswith("all"):
             return self.maximum()
         digits = "".join(sign for sign in text if sign.isdigit())
         return min(int(digits), self.maximum()) if digits else 0
 
     def validate(self, text: str, at: int) -> tuple[QValidator.State, str, int]:
-        """Let anything be typed that a number can be read from."""
+        """Accept any text that a number can be read from."""
         good = any(sign.isdigit() for sign in text) or text.strip() == "all"
         state = QValidator.State.Acceptable if good else QValidator.State.Intermediate
         return state, text, at
@@ -103,13 +103,13 @@ class Span(QWidget):
         return f"{number_text(value)} must be {than} than {number_text(other.value)}"
 
     def show_values(self, values: tuple[float, float]) -> None:
-        """Show two numbers without telling."""
+        """Show two numbers; nothing is emitted."""
         for field, value in zip((self.low, self.high), values, strict=True):
             if value != field.value:
                 field.show_value(value)
 
     def set_tip(self, text: str) -> None:
-        """Explain both."""
+        """Set the tooltip of both fields."""
         self.low.set_tip(text)
         self.high.set_tip(text)
 
@@ -187,8 +187,7 @@ class DisplayPanel(Panel):
         self.form.addRow("Show", grid)
 
     def _choice(self, name: str, words: dict, field: str) -> Choice:
-        choice = Choice(words)
-        choice.setObjectName(name)
+        choice = Choice(words, name=name)
         choice.chosen.connect(lambda value: self._set(**{field: value}))
         return choice
 

@@ -31,7 +31,7 @@ from slideviz.session import changes
 from slideviz.session.state import Frame, Session
 from slideviz.session.store import Store
 
-GRIP_PX = 6
+END_PX = 6
 """A press so near to an end of the range moves that end."""
 
 Range = tuple[float, float]
@@ -64,7 +64,7 @@ class BrushCanvas(PlotCanvas):
         return float(np.clip(self.to_value(x_px), *self.figure.axes[0].get_xlim()))
 
     def pixel_of(self, value: float) -> float:
-        """Return the x of a value in pixels of the widget, within the axis."""
+        """Return the horizontal pixel of a value in the widget, within the axis."""
         return self.to_pixel(float(np.clip(value, *self.figure.axes[0].get_xlim())))
 
     def show_band(self, band: Range | None) -> None:
@@ -81,13 +81,13 @@ class BrushCanvas(PlotCanvas):
         if self.band is not None:
             ends = [self.pixel_of(value) for value in self.band]
             for near, far in ((0, 1), (1, 0)):
-                if abs(x - ends[near]) <= GRIP_PX:
+                if abs(x - ends[near]) <= END_PX:
                     self._held, self._moved = self.band[far], True
         self.held.emit(True)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._held is None:
-            self._show_grip(event.position().x())
+            self._show_cursor(event.position().x())
             return
         here = self.value_at(event.position().x())
         self._moved = self._moved or abs(self.pixel_of(self._held) - event.position().x()) > 3
@@ -105,9 +105,9 @@ class BrushCanvas(PlotCanvas):
     def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
         self.brushed.emit(None)
 
-    def _show_grip(self, x: float) -> None:
+    def _show_cursor(self, x: float) -> None:
         ends = (self.band or ()) if self.figure.axes else ()
-        near = any(abs(x - self.pixel_of(value)) <= GRIP_PX for value in ends)
+        near = any(abs(x - self.pixel_of(value)) <= END_PX for value in ends)
         shape = Qt.CursorShape.SizeHorCursor if near else Qt.CursorShape.CrossCursor
         self.setCursor(shape)
 
@@ -128,7 +128,7 @@ class BrushCanvas(PlotCanvas):
 
 
 class HistogramPanel(Panel):
-    """The values of the step that is shown, of the undeformed mesh and of other runs."""
+    """The panel with the histogram of the shown step, the undeformed mesh and other runs."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -233,7 +233,7 @@ class HistogramPanel(Panel):
     # Drawing ---------------------------------------------------------------------------
 
     def drawing(self) -> Draw:
-        """Return what draws the histogram of what is shown now."""
+        """Return the function that draws the histogram of the shown step."""
         session, how = self.store.session, (self.log.isChecked(), self.whole.isChecked())
         return partial(draw_histogram, self._counts, session, how)
 

@@ -24,7 +24,7 @@ from slideviz.gui.widgets.vector_field import VectorField, a_direction
 
 
 def number_field(kind: Kind) -> NumberField:
-    """Return a field for numbers of a kind, which says what the kind says of others."""
+    """Return a field for numbers that a kind of value allows."""
     return NumberField(0.0, lambda value: kind.problem(number_text(value)))
 
 
@@ -56,7 +56,7 @@ FIELDS: dict[Entry, tuple[Callable[[Kind], Field], str]] = {
 
 
 class KeyForm(QFormLayout):
-    """A form of settings of a case.
+    """A form with the settings of a case.
 
     Parameters
     ----------

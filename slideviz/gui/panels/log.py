@@ -1,4 +1,4 @@
-"""The log panel: what happened, with times; also what libraries complain about."""
+"""The log panel: messages with times, also the warnings of libraries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class _Bridge(QObject):
 
 
 class LogHandler(logging.Handler):
-    """Hands log lines of any thread to the window's thread."""
+    """A log handler that hands lines of any thread to the window's thread."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class LogHandler(logging.Handler):
         self.setFormatter(logging.Formatter("%(asctime)s  %(levelname)-7s %(message)s", "%H:%M:%S"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Pass one line on."""
+        """Emit the line of a log record."""
         line = self.format(record)
         # What a library says for every picture it draws would hide everything else.
         what, self._last = self._last, (record.levelno, record.getMessage())
@@ -45,7 +45,7 @@ class LogHandler(logging.Handler):
 
 
 class LogPanel(QPlainTextEdit):
-    """Shows the newest lines of the log."""
+    """The panel with the newest lines of the log."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -41,7 +41,7 @@ LEVEL_ENDS = {"size": KEYS["LVL_SIZE"], "tol": KEYS["LVL_TOL_CRIT"]}
 
 
 class MoreSettings(QWidget):
-    """A button that opens and closes a form.
+    """The settings below “More settings”, a button that opens and closes their form.
 
     Signals
     -------
@@ -54,8 +54,7 @@ class MoreSettings(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._criterion = Reduction().criterion
-        self.levels = Choice({"none": "none", **labels(LEVEL_CRITERIA)})
-        self.levels.setObjectName("levels")
+        self.levels = Choice({"none": "none", **labels(LEVEL_CRITERIA)}, name="levels")
         self.levels.chosen.connect(self._levels_chosen)
         self.level_end = NumberField(16, lambda value: self._level.kind.problem(number_text(value)))
         self.level_end.setObjectName("level_end")
@@ -87,7 +86,7 @@ class MoreSettings(QWidget):
         self.body.setVisible(shown)
 
     def sync(self, case: Case, spare: Case) -> None:
-        """Show the settings of a case, and of a spare one those that the case has not."""
+        """Show the settings of a case, and those that it lacks of a spare case."""
         given = case.reduction or spare.reduction
         self._criterion = given.criterion
         self.levels.show_value(given.criterion if given.multilevel else "none")

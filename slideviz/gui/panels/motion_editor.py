@@ -1,4 +1,4 @@
-"""The form for one motion: which boundary, what kind, its numbers."""
+"""The editor of a motion: boundary, kind, numbers."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 class MotionEditor(MotionForm):
-    """Shows a motion and tells each valid change of it.
+    """The editor of a motion, which emits each valid change.
 
     Signals
     -------
@@ -65,7 +65,7 @@ class MotionEditor(MotionForm):
         self.table.clicked.connect(lambda _: self.table_wanted.emit())
 
     def show_motion(self, motion: Motion | None, targets: tuple[Target, ...], dim: int) -> None:
-        """Show a motion of one of these targets, or nothing."""
+        """Show a motion whose target is one of those given, or nothing."""
         self._motion, self._dim = motion, dim
         self.setVisible(motion is not None)
         if motion is None:
@@ -181,11 +181,11 @@ class MotionEditor(MotionForm):
         self.show_motion(self._motion, self._targets, self._dim)
 
     def show_another(self) -> None:
-        """Take note that another motion is shown from now on: nothing has been chosen for it."""
+        """Forget the choice of a point: another motion is shown from now on."""
         self._as_point = False
 
     def focus(self) -> None:
-        """Put the cursor into the first field, so that what is typed goes there."""
+        """Put the cursor into the first field."""
         first = {
             Translate: self.vector.fields[0],
             Rotate: self.angle,
@@ -198,15 +198,15 @@ class MotionEditor(MotionForm):
             first.selectAll()
 
     def set_centroid(self, centroid: Callable[[Target], tuple[float, ...]]) -> None:
-        """Take what returns the centroid of a target, where a point starts."""
+        """Set the function that returns the centroid of a target, where a point starts."""
         self._centroid = centroid
 
     def set_extent(self, extent: float) -> None:
-        """Take the size of the mesh, beside which what rounding left of zero is shown as 0."""
+        """Set the size of the mesh, beside which rounding errors are shown as 0."""
         self.point.set_scale(extent)
 
     def set_machine(self, machine: Axis | None) -> None:
-        """Take the axis about which the mesh repeats; None where it does not."""
+        """Set the axis about which the mesh repeats; None where it does not."""
         self._machine = machine
 
     def _tell(self) -> None:

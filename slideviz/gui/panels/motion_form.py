@@ -1,4 +1,4 @@
-"""The fields for one motion, in a form: a row for each thing that some kind of motion has."""
+"""The form of a motion: a row for each number that some kind of motion has."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target,
 from slideviz.gui.widgets.build import boxed, grow_fields, in_row
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.fields import NumberField, not_zero
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.session.motions import Axis
 from slideviz.terms import MOTION_KINDS
@@ -24,7 +23,7 @@ ABOUT = {
 
 
 class MotionForm(QWidget):
-    """The fields; who shows a motion in them chooses the rows."""
+    """The fields of a motion, in a form whose rows can be hidden."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -35,32 +34,33 @@ class MotionForm(QWidget):
         self._place_fields()
 
     def _make_fields(self) -> None:
-        self.marker = Choice({})
+        self.marker = Choice(
+            {},
+            "What moves. To move some boundaries as one body, about their common centroid, "
+            "select them in the table of boundaries: they are offered here then.",
+        )
         self.kind = Choice(KINDS)
-        self.vector = VectorField()
-        self.vector.set_tip("How far it moves along each axis, in the mesh's length unit.")
-        self.angle = NumberField()
-        self.angle.set_tip("Degrees; positive turns counter-clockwise seen against the axis.")
-        self.factors = VectorField((1.0, 1.0, 1.0))
-        self.factors.set_tip("Enlargement along each axis: 1 leaves it, 2 doubles it.")
+        self.vector = VectorField(
+            tip="How far it moves along each axis, in the mesh's length unit."
+        )
+        self.angle = NumberField(
+            tip="Degrees; positive turns counter-clockwise seen against the axis."
+        )
+        self.factors = VectorField(
+            (1.0, 1.0, 1.0), tip="Enlargement along each axis: 1 leaves it, 2 doubles it."
+        )
         for field in self.factors.fields:
             field._allowed = not_zero
-        self.percent = NumberField(allowed=_above_minus_100)
-        self.percent.set_tip("How much larger the radius becomes, in percent: 3 is 3 % outwards.")
-        self.distance = NumberField()
-        self.distance.set_tip("How far outwards besides, in the mesh's length unit.")
-        self.about = Choice({"centroid": ABOUT["centroid"], "point": ABOUT["point"]})
-        self.about.setToolTip("What stays in place while it turns or grows.")
-        self.marker.setToolTip(
-            wrapped(
-                "What moves. To move some boundaries as one body, about their common centroid, "
-                "select them in the table of boundaries: they are offered here then."
-            )
+        self.percent = NumberField(
+            allowed=_above_minus_100,
+            tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
         )
-        self.point = VectorField()
-        self.point.set_tip("The point that stays in place.")
-        self.axis = VectorField((0.0, 0.0, 1.0), a_direction)
-        self.axis.set_tip("Direction of the axis; its length does not matter.")
+        self.distance = NumberField(tip="How far outwards besides, in the mesh's length unit.")
+        self.about = Choice(ABOUT, "What stays in place while it turns or grows.")
+        self.point = VectorField(tip="The point that stays in place.")
+        self.axis = VectorField(
+            (0.0, 0.0, 1.0), a_direction, tip="Direction of the axis; its length does not matter."
+        )
         self.path = QLineEdit()
         self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
@@ -97,7 +97,7 @@ class MotionForm(QWidget):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_rows(self, names: set[str]) -> None:
-        """Show these rows only."""
+        """Show some rows of the form only."""
         for name, widget in self._rows.items():
             self.form.setRowVisible(widget, name in names)
 
@@ -117,7 +117,7 @@ KINDS: dict[type, str] = {
 
 
 def new_motion(kind: type, marker: Target, dim: int, machine: Axis | None = None) -> Motion:
-    """Return a motion of that kind which does not move anything yet.
+    """Return a motion of a kind that does not move anything yet.
 
     Where the mesh repeats about an axis, what turns or is pushed does so about that axis.
     """

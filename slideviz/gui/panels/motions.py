@@ -1,4 +1,4 @@
-"""The motion panel: what the moving boundaries do, in sequence, and the form for one of them."""
+"""The motion panel: the motions of the boundaries, in sequence, and the form for one of them."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -223,14 +223,14 @@ class MotionPanel(Panel):
             self._insert(motion if fits else replace(motion, marker=new_target(session)))
 
     def new_table(self) -> None:
-        """Let a table of displacements be typed, and add a motion that uses it."""
+        """Open a dialog for a table of displacements, and add a motion that uses it."""
         marker = new_target(self.store.session)
         path = self._ask_table(marker, Path())
         if path is not None:
             self.store.change(changes.add_motion, FromFile(path, marker))
 
     def edit_table(self) -> None:
-        """Let the rows of the displacement file of a motion be typed."""
+        """Open a dialog for the displacement file of a motion."""
         row = self.list.currentRow()
         motion = self.store.session.case.motions[row]
         assert isinstance(motion, FromFile)

@@ -1,4 +1,4 @@
-"""The run panel: start, what is missing, progress, cancel."""
+"""The run panel: run, requirements, progress, cancel."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class RunPanel(Panel):
         return button
 
     def sync(self, session: Session) -> None:
-        """Show whether a run can start, and if not what it needs."""
+        """Show whether a run can start, or its first requirement."""
         # Some checks look at the mesh: not again while only the view changes.
         key = (session.mesh, session.case, session.intersection, session.invalid)
         if key != self._key:
@@ -147,7 +147,7 @@ class RunPanel(Panel):
         self.sync(self.store.session)
 
     def show_doing(self, doing: Doing) -> None:
-        """Show how far the job is."""
+        """Show the progress of the job."""
         if not self._busy:
             return
         self.text.setText(html.escape(doing.text))

@@ -1,8 +1,6 @@
-"""The runs panel: what was computed with which settings, and how good it is."""
+"""The runs panel: settings and quality of each run."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 from qtpy.QtCore import QPoint, QSignalBlocker, Qt
 from qtpy.QtGui import QIcon
@@ -25,33 +23,14 @@ EMPTY = "Nothing was computed yet. Each run will be listed here with its setting
 
 
 class RunsPanel(Panel):
-    """The list of the runs; a click shows one, with Ctrl beside the one that is shown.
+    """The list of the runs; a click shows one, with Ctrl beside the one that is shown."""
 
-    Parameters
-    ----------
-    store : Store
-    save_mesh : callable
-        Asks for a name and writes the mesh that is shown.
-    tell_error : callable
-        Shows an error.
-    say : callable
-        Shows that something was done.
-    """
-
-    def __init__(
-        self,
-        store: Store,
-        save_mesh: Callable[[], None] = lambda: None,
-        tell_error: Callable[[BaseException], None] = lambda _: None,
-        say: Callable[[str], None] = lambda _: None,
-    ) -> None:
+    def __init__(self, store: Store) -> None:
         super().__init__(store)
         self._drawn: tuple[object, ...] = ()
         self.empty = hint_label(EMPTY, Qt.AlignmentFlag.AlignTop)
         self.tree = RunTree()
-        self.actions_ = RunActions(
-            self, self.tree, store, save_mesh=save_mesh, tell_error=tell_error, say=say
-        )
+        self.actions_ = RunActions(self, self.tree, store)
         self.buttons = self.actions_.buttons
         self._connect()
         parts = (self.empty, self.tree, self.actions_.row)

@@ -1,4 +1,4 @@
-"""What can be done with runs: the buttons below their list, and the menu of a row."""
+"""The actions for runs: buttons below their list, and the menu of a row."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import QApplication, QMenu, QToolButton, QWidget
 
-from slideviz.errors import SlidevizError
 from slideviz.gui.commands import COMPARE
 from slideviz.gui.panels.runs_tree import RunTree
-from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import in_row, tool_button
 from slideviz.gui.widgets.command import Command
+from slideviz.gui.widgets.plot_canvas import ask_and_write
 from slideviz.gui.widgets.runs_menu import fill_compare
+from slideviz.gui.widgets.services import Services, main_window
 from slideviz.session import changes
 from slideviz.session.runs_table import table_text, write_table
 from slideviz.session.runs_words import run_words
@@ -25,7 +25,7 @@ TABLE_FILTERS = "Table (*.csv)"
 
 
 class RunActions:
-    """The actions of the runs panel, each about the run that is chosen or one that is given.
+    """The actions of the runs panel, for the selected run or one that is given.
 
     Attributes
     ----------
@@ -34,18 +34,8 @@ class RunActions:
         Where they are.
     """
 
-    def __init__(
-        self,
-        panel: QWidget,
-        tree: RunTree,
-        store: Store,
-        *,
-        save_mesh: Callable[[], None],
-        tell_error: Callable[[BaseException], None],
-        say: Callable[[str], None],
-    ) -> None:
-        self.panel, self.tree, self.store, self._save = panel, tree, store, save_mesh
-        self._tell_error, self._say = tell_error, say
+    def __init__(self, panel: QWidget, tree: RunTree, store: Store) -> None:
+        self.panel, self.tree, self.store = panel, tree, store
         self.buttons: dict[str, QToolButton] = {"compare": self._make_compare()}
         for command in filter(None, RUN_COMMANDS):
             self.buttons[command.name] = tool_button(
@@ -57,13 +47,19 @@ class RunActions:
         shown = (None if one is None else self.buttons[one.name] for one in RUN_COMMANDS)
         self.row = in_row(self.buttons["compare"], *shown, spacing=2)
 
+    @property
+    def _window(self) -> Services:
+        window = main_window(self.panel)
+        assert window is not None
+        return window
+
     def _make_compare(self) -> QToolButton:
         menu, tip = QMenu(), f"{COMPARE.tip} Ctrl+click on a run does so too."
         menu.aboutToShow.connect(lambda: fill_compare(menu, self.store))
         return tool_button(tip, image="beside", text="Compare", menu=menu)
 
     def sync(self, session: Session) -> None:
-        """Show what can be done."""
+        """Show which actions can be done."""
         run = session.run_shown
         self.buttons["compare"].setEnabled(run is not None and run.last is not None)
         for command in filter(None, RUN_COMMANDS):
@@ -89,20 +85,20 @@ class RunActions:
             ),
             ("Rename\tF2", True, lambda: self.tree.edit_name(number)),
         ):
-            act = menu.addAction(text)
-            act.setEnabled(can)
-            act.triggered.connect(lambda _=False, function=function: function())
+            menu.addAction(text, function).setEnabled(can)
         for command in RUN_COMMANDS:
             if command is None:
                 menu.addSeparator()
                 continue
-            act = menu.addAction(command.title)
+            act = menu.addAction(command.title, self._doing(command, number))
             act.setEnabled(command.enabled(run))
-            act.triggered.connect(lambda _=False, do=command.do: do(self, number))
         return menu
 
+    def _doing(self, command: Command, number: int) -> Callable[[], object]:
+        return lambda: command.do(self, number)
+
     def show_beside(self, number: int) -> None:
-        """Show a run beside the one that is shown, or no longer."""
+        """Show a run beside the shown one, or end that."""
         session = self.store.session
         if number != session.shown:
             ends = session.view.beside == number
@@ -115,7 +111,7 @@ class RunActions:
     def save_mesh(self, number: int | None = None) -> None:
         """Show a run and save the mesh of its last step."""
         self.store.change(changes.show_run, number or self.tree.number)
-        self._save()
+        self._window.files.save_mesh()
 
     def remove(self, number: int | None = None) -> None:
         """Remove a run from the list."""
@@ -123,28 +119,25 @@ class RunActions:
         if number is None:
             return
         self.store.change(changes.remove_run, number)
-        self._say(f"Run {number} removed (Ctrl+Z brings it back)")
+        self._window.say(f"Run {number} removed (Ctrl+Z brings it back)")
 
     def copy_table(self, _number: int | None = None) -> None:
         """Put the table into the clipboard, for a spreadsheet."""
         QApplication.clipboard().setText(table_text(self.store.session.runs, "\t"))
-        self._say("Copied the table of runs")
+        self._window.say("Copied the table of runs")
 
     def export_table(self, _number: int | None = None) -> None:
         """Ask for a name and write the table."""
         session = self.store.session
         folder = session.path.parent if session.path is not None else Path.home()
         stem = session.path.stem if session.path is not None else "mesh"
-        default = folder / f"{stem}_runs.csv"
-        path = questions.ask_save(self.panel, "Export the table of runs", default, TABLE_FILTERS)
-        if path is None:
-            return
-        try:
-            write_table(path, session.runs)
-        except SlidevizError as error:
-            self._tell_error(error)
-            return
-        self._say(f"Saved {path}")
+        ask_and_write(
+            self.panel,
+            "Export the table of runs",
+            folder / f"{stem}_runs.csv",
+            TABLE_FILTERS,
+            lambda path: write_table(path, session.runs),
+        )
 
 
 # fmt: off

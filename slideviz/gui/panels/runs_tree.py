@@ -98,7 +98,7 @@ class _FirstLine(QStyledItemDelegate):
 
 
 def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QColor:
-    """Return the colour of letters in a row, chosen or not."""
+    """Return the colour of letters in a row, selected or not."""
     chosen = bool(option.state & QStyle.StateFlag.State_Selected)
     active = bool(option.state & QStyle.StateFlag.State_Active)
     group = QPalette.ColorGroup.Active if active else QPalette.ColorGroup.Inactive
@@ -151,12 +151,12 @@ class RunTree(QTreeWidget):
 
     @property
     def number(self) -> int | None:
-        """Return the number of the run whose row is chosen."""
+        """Return the number of the run whose row is selected."""
         item = self.currentItem()
         return None if item is None else item.data(RUN, NUMBER)
 
     def edit_name(self, number: int | None = None) -> None:
-        """Let the name of a run be typed in its row; of that which is chosen."""
+        """Open the field for the name of a run, by default of the selected one."""
         number = self.number if number is None else number
         for place in range(self.topLevelItemCount()):
             item = self.topLevelItem(place)

@@ -1,4 +1,4 @@
-"""The form for one section: direction, point, position or size, whole cells or cut."""
+"""The editor of a section: direction, point, position or size, whole cells or cut."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ AXES: dict[str, Triple] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0
 
 
 class SectionEditor(QWidget):
-    """Shows a section and tells each valid change of it.
+    """The editor of a section, which emits each valid change.
 
-    What the slider is dragged through is told once per turn of the event loop, so that drawing
+    What the slider is dragged through is emitted once per turn of the event loop, so that drawing
     never falls behind the mouse.
     """
 
@@ -53,8 +53,7 @@ class SectionEditor(QWidget):
     def _make_fields(self) -> None:
         self.axis = Choice({**{word: word for word in AXES}, FREE: "free"})
         self.axis.chosen.connect(self._axis_chosen)
-        self.direction = VectorField((0.0, 0.0, 1.0))
-        self.direction.set_tip("Any length but zero.")
+        self.direction = VectorField((0.0, 0.0, 1.0), tip="Any length but zero.")
         self.direction.changed.connect(self._direction_typed)
         self.centre = VectorField()
         self.centre.changed.connect(self._centre_typed)
@@ -92,7 +91,7 @@ class SectionEditor(QWidget):
     def show_section(
         self, section: Section | None, mesh: Mesh | None, place: int | None = None
     ) -> None:
-        """Show a section of a mesh, or nothing; its place in the list tells it from others."""
+        """Show a section of a mesh, or nothing; ``place`` is its row in the list."""
         other = (place, _way(section)) != (self._place, _way(self._section))
         self._section, self._place = section, place
         self.setVisible(section is not None and mesh is not None)
@@ -152,7 +151,7 @@ class SectionEditor(QWidget):
         with QSignalBlocker(self.slider):
             self.slider.setValue(round(float(np.clip(share, 0.0, 1.0)) * STEPS))
 
-    # What is told ----------------------------------------------------------------------
+    # Widgets to state ------------------------------------------------------------------
 
     def _tell(self, **values: object) -> None:
         if self._section is not None:

@@ -1,4 +1,4 @@
-"""The sections panel: what cuts the mesh, and the form for one section."""
+"""The sections panel: the list of sections, and the editor of one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from slideviz.session.section_start import first_section
 from slideviz.session.state import Session
 
 if TYPE_CHECKING:
-    from slideviz.gui.viewport.cutting import Cutting
+    from slideviz.gui.viewport.section_views import SectionViews
 
 HINTS = {
     3: f"Cut the mesh with a {names()} to see its cells inside.",
@@ -54,11 +54,11 @@ SIZES = {
 
 
 class SectionsPanel(Panel):
-    """The list of the sections, and the form for the one that is chosen.
+    """The list of the sections, and the editor of the selected one.
 
     Parameters
     ----------
-    cutting : Cutting
+    section_views : SectionViews
         The handle and the flat view of that section.
 
     Signals
@@ -69,10 +69,10 @@ class SectionsPanel(Panel):
 
     picture_wanted = Signal(object)
 
-    def __init__(self, cutting: Cutting) -> None:
-        super().__init__(cutting.store)
+    def __init__(self, section_views: SectionViews) -> None:
+        super().__init__(section_views.store)
         self.setObjectName("sections")
-        self.cutting = cutting
+        self.section_views = section_views
         self._period = Period()
         self._size = 8.5, 12.0  # cm
         self._make_list()
@@ -108,8 +108,8 @@ class SectionsPanel(Panel):
     def _make_tools(self) -> None:
         self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")
         self.handle.clicked.connect(self._want_handle)
-        self.flat.clicked.connect(self.cutting.want_flat)
-        self.look = tool_button("", self.cutting.look_along, image="along")
+        self.flat.clicked.connect(self.section_views.want_flat)
+        self.look = tool_button("", self.section_views.look_along, image="along")
         self.sizes = QMenu()
         self.picture = tool_button(
             "Save a picture of this section (PNG, SVG, PDF)…", image="picture", menu=self.sizes
@@ -249,14 +249,14 @@ def _concerned(old: Session, new: Session) -> bool:
 
 
 def sections_panel(window: Services) -> SectionsPanel:
-    """Return the panel of a window."""
-    panel = SectionsPanel(window.cutting)
+    """Return the sections panel of a window."""
+    panel = SectionsPanel(window.section_views)
     panel.picture_wanted.connect(lambda paper: save_picture(window, paper))
     return panel
 
 
 def save_picture(window: Services, paper: Paper) -> None:
-    """Ask for a name and write a picture of the section that is chosen, as it is shown."""
+    """Ask for a name and write a picture of the selected section, as it is shown."""
     session, section = window.store.session, window.store.session.view.section
     if section is None or session.frame is None or window.runner.busy:
         return

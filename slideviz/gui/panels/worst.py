@@ -1,4 +1,4 @@
-"""The worst cells of the step that is shown: a table; a click flies to one and marks it."""
+"""The panel of the worst cells of the shown step; a click flies to a cell and marks it."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -36,7 +36,7 @@ from slideviz.terms import COLOUR_BY
 
 
 class WorstPanel(Panel):
-    """The hundred worst cells; the one that is marked is the current row.
+    """The table of the hundred worst cells; the marked cell is the current row.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class WorstPanel(Panel):
     # State to widgets ------------------------------------------------------------------
 
     def sync(self, session: Session) -> None:
-        """Show the session; the list of a step that is played by comes when there is time."""
+        """Show the session; while steps are played, the list is filled when there is time."""
         there = session.frame is not None
         self.stack.setCurrentWidget(self.table if there else self.words)
         for widget in (self.back, self.export):
@@ -208,7 +208,7 @@ class WorstPanel(Panel):
 
 
 def info_text(session: Session, cell: int, every: bool = False) -> str:
-    """Return what is told of a cell of the step that is shown, as rich text of few lines.
+    """Return the facts of a cell of the shown step, as rich text of few lines.
 
     ``every`` tells every corner.
     """

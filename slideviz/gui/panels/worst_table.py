@@ -35,7 +35,7 @@ TIPS = {
 
 
 def digits_apart(values: FloatArray) -> int:
-    """Return the digits behind the point by which most of so many values (n,) can be told apart."""
+    """Return the digits behind the point by which most of some values (n,) differ."""
     different = len(np.unique(values.round(MOST)))
     for digits in range(FEWEST, MOST):
         if not len(values) or len(np.unique(values.round(digits))) > 0.5 * different:
@@ -44,7 +44,7 @@ def digits_apart(values: FloatArray) -> int:
 
 
 class WorstModel(QAbstractTableModel):
-    """The rows of the table, in the order that was asked for."""
+    """The model of the worst cells: rows in any order."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -58,7 +58,7 @@ class WorstModel(QAbstractTableModel):
         self._by, self._down = QUALITY, False
 
     def show(self, worst: WorstCells | None, around: Around | None = None) -> None:
-        """Show another list, with places about an axis, if there is one."""
+        """Show other worst cells, with coordinates about an axis if one is given."""
         self.beginResetModel()
         self.worst = worst
         if worst is not None:
@@ -91,7 +91,7 @@ class WorstModel(QAbstractTableModel):
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Return the words above the columns."""
+        """Return the titles of the columns."""
         return (*COLUMNS, *self.names, *((LAST,) if self._mixed else ()))
 
     def _alignment(self, column: int) -> int:
@@ -165,7 +165,7 @@ class WorstModel(QAbstractTableModel):
 
 
 class WorstTable(QTableView):
-    """A table that tells to which row the keys have gone.
+    """The table of the worst cells, which emits the row to which the keys have gone.
 
     The current row itself would tell too much: the focus alone makes the first one current.
     """

@@ -1,1 +1,1 @@
-"""What steers threads, timers, garbage and repaints of the window."""
+"""Threads, timers, garbage collection and repaints of the window."""

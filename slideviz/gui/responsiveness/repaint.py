@@ -12,7 +12,7 @@ from slideviz.gui.responsiveness.timers import later
 
 
 class RepaintCoalescer(QObject):
-    """Paints a view in the next turn of the event loop, and the widgets around it together with it.
+    """The coalescer of repaints: a view and the widgets around it are painted together, soon.
 
     Clicks and timers come between what changed a scene and the drawing of it, which takes as long
     again where no graphics card draws. The labels around the view, which tell of the same change,
@@ -28,7 +28,7 @@ class RepaintCoalescer(QObject):
         self._timer = later(self, self._paint, REPAINT_MS)
 
     def ask(self) -> None:
-        """Paint soon."""
+        """Schedule a repaint."""
         window = self._view.window()
         if window is not self._window:
             self._let_go()
@@ -38,7 +38,7 @@ class RepaintCoalescer(QObject):
             self._timer.start()
 
     def end(self) -> None:
-        """Paint no more; the window is painted as any other."""
+        """Stop; the window is painted as any other."""
         self._timer.stop()
         self._let_go()
 

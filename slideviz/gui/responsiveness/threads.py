@@ -1,4 +1,4 @@
-"""Threads beside the window, which goes before all of them, and Python's garbage."""
+"""Threads beside the window, all of lower priority, and garbage collection."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from slideviz.gui.responsiveness.settings import (
 
 
 def ready_numerics() -> None:
-    """Import what computes, before there is any other thread, and let the window go before it."""
+    """Import the numerics before there is another thread, and give their threads low priority."""
     # Here, once: two threads that import Numba at the same time (the warm-up and a run) find it
     # half-made.
     import_module("slideviz.deformation.solver")
@@ -40,7 +40,7 @@ def ready_numerics() -> None:
 
 
 def be_quick() -> GarbageCollector:
-    """Set Python up for a window that must answer while other threads compute.
+    """Set Python up for a window that answers while other threads compute.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def be_quick() -> GarbageCollector:
 
 
 def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> Thread:
-    """Return a thread that stands back behind the window, as do those that it starts.
+    """Return a started thread of lower priority than the window, as are those that it starts.
 
     A daemon: the program must be able to end while a library keeps its thread.
     """
@@ -72,7 +72,7 @@ def start_thread(work: Callable[[], object], name: str, daemon: bool = True) -> 
 
 
 def stand_back(thread: int | None = None) -> None:
-    """Let the window go before a thread (default: this one), and before those that it starts.
+    """Lower the priority of a thread (default: this one), and of those that it starts.
 
     Without a graphics card the picture is drawn by the same processor that computes.
 
@@ -89,7 +89,7 @@ def stand_back(thread: int | None = None) -> None:
 
 
 def hold_libraries_back() -> None:
-    """Let the window go before the threads in which libraries compute, BLAS for example.
+    """Lower the priority of the threads of libraries, BLAS for example.
 
     They are as many as there are processors, begin when the library is imported, and bear the name
     of the program, unlike those of Qt and of the graphics. Called once.
@@ -107,7 +107,7 @@ def hold_libraries_back() -> None:
 
 
 class GarbageCollector(QObject):
-    """Takes over from Python, which looks for garbage in whatever thread makes many objects.
+    """The collector of garbage in the window's thread, in place of Python's in any thread.
 
     That thread keeps the interpreter to itself meanwhile: one that computes, and stands back
     behind the window, for up to 90 ms. Besides, what belongs to Qt and VTK may end in the window's
@@ -126,12 +126,12 @@ class GarbageCollector(QObject):
         self._timer.start()
 
     def end(self) -> None:
-        """Leave it to Python again."""
+        """Switch Python's automatic collection on again."""
         self._timer.stop()
         gc.enable()
 
     def look(self) -> None:
-        """Look for garbage, if much was made since the last time."""
+        """Collect garbage, if much was made since the last time."""
         if gc.get_count()[0] < GARBAGE_OBJECTS:
             return
         began = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Timers that wait for the end of what comes in quick succession."""
+"""Timers that call once for many events in quick succession."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from qtpy.QtCore import QObject, QTimer
 
 
 def later(parent: QObject | None, call: Callable[[], object], wait_ms: int = 0) -> QTimer:
-    """Return a timer that calls once, so long after it was last started.
+    """Return a timer that calls once, ``wait_ms`` after it was last started.
 
     At 0 ms that is the next turn of the event loop: once for all that happens in this one.
     """

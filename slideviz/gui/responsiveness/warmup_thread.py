@@ -60,12 +60,12 @@ class WarmupThread(QObject):
         self.thread_: Thread | None = None
 
     def start(self) -> None:
-        """Start, unless it was started before."""
+        """Start the thread, unless it was started before."""
         if self.thread_ is None:
             self.thread_ = start_thread(self._run, "slideviz-warm-up")
 
     def close(self) -> None:
-        """Ask it to end, without waiting."""
+        """Ask the thread to end, without waiting."""
         self._stop.set()
         self.blockSignals(True)
 

@@ -26,7 +26,7 @@ log = logging.getLogger("slideviz")
 
 
 class JobRunner(QObject):
-    """Runs ``function(*values, report, stopped)`` beside the window.
+    """The runner of jobs, ``function(*values, report, stopped)``, beside the window.
 
     Signals
     -------
@@ -61,11 +61,11 @@ class JobRunner(QObject):
 
     @property
     def alive(self) -> bool:
-        """Tell whether the thread of a job goes on, whatever the window knows of it."""
+        """Tell whether the thread of a job is alive, also when the job was closed."""
         return self._thread is not None and self._thread.is_alive()
 
     def start(self, function: Callable[..., Any], *values: Any) -> None:
-        """Start a job; there must be none."""
+        """Start a job; none may be running."""
         assert not self.busy, "a job is running"
         self.busy = True
         self._stop = Event()
@@ -73,7 +73,7 @@ class JobRunner(QObject):
         self._thread = start_thread(work, "slideviz")
 
     def cancel(self) -> None:
-        """Ask the job to end; it does within a second, with ``cancelled``."""
+        """Ask the job to end, within a second, with ``cancelled``."""
         self._stop.set()
 
     def close(self) -> bool:

@@ -1,4 +1,4 @@
-"""The handle of what has an axis in a 3D mesh: a frame around the cut, and a ball to pull it."""
+"""The handle of a section about an axis: a frame around the cut, and a ball to change its size."""
 
 from __future__ import annotations
 
@@ -45,37 +45,37 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         super().__init__(view, *others)
         self._patch: Patch | None = None
         self.place: Place | None = None
-        self._mark = HandleMark(view)
+        self._drawn = HandleActors(view)
 
     def watched(self) -> tuple[vtkObject, str]:
         """Return the renderer: before each drawing the camera or the view's size may differ."""
         return self.view.renderer, "StartEvent"
 
     def show(self, section: Section, patch: Patch, look: Look) -> None:
-        """Stand where the section is, around that part of it."""
+        """Show the handle of a section, around a part of it."""
         self.section, self._patch = section, patch
-        self._mark.colour(look, self._part is not None)
-        self._mark.draw_frame(frame_of(section, patch))
+        self._drawn.colour(look, self._part is not None)
+        self._drawn.draw_frame(frame_of(section, patch))
         self.put()
 
     def close(self) -> None:
-        """Leave the view for ever."""
+        """Remove the handle from the view for good."""
         self._patch = None
-        self._mark.remove()
+        self._drawn.remove()
         super().close()
 
     def seen(self, points: FloatArray) -> FloatArray:
-        """Return where points (n, 3) are seen, (n, 2) in pixels from the lower left."""
+        """Return the pixels (n, 2) of points (n, 3), from the lower left of the view."""
         return to_display(self.view, points)
 
     def put(self) -> None:
-        """Put the ball where it is in reach, and what points to where it can be pulled."""
+        """Put the ball where it is in reach, with arrows to where it can be dragged."""
         if self.section is None or self._patch is None:
             return
         self.place = self._start[0][1] if self._start is not None else self._in_reach(self._patch)
         at, way, _ = drag(self.seen, self.section, self.place, self.section.size)
-        self._mark.draw_ball(at, way / np.linalg.norm(way))
-        self._mark.highlight(self._part is not None)
+        self._drawn.draw_ball(at, way / np.linalg.norm(way))
+        self._drawn.highlight(self._part is not None)
         if self._part is not None and not self.dragging and self.part_at(self._mouse) is None:
             # It went from below the mouse, which stayed.
             self._point_at(None)
@@ -101,7 +101,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         return np.array(self.view.to_pixels(where))
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return whether the mouse would take the ball at a position of the widget."""
+        """Return ``ball`` where the mouse would take it at a position of the widget, or None."""
         if self.section is None or self.place is None:
             return None
         at, *_ = drag(self.seen, self.section, self.place, self.section.size)
@@ -109,7 +109,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
     def grasp(self) -> tuple[Section, Place]:
-        """Return the section, and where the ball lies."""
+        """Return the section, and the place of the ball."""
         assert self.section is not None
         assert self.place is not None
         return self.section, self.place
@@ -135,8 +135,8 @@ _ARROW = (
 """Shaft and head of one that points to the right."""
 
 
-class HandleMark:
-    """Draws into a view, in front of all else and of one size wherever the camera is.
+class HandleActors:
+    """The actors of the handle: in front of all else, of one size wherever the camera is.
 
     Parameters
     ----------
@@ -155,12 +155,12 @@ class HandleMark:
         self._text = "black"
 
     def remove(self) -> None:
-        """Leave the view."""
+        """Remove the actors from the view."""
         for name in (FRAME, RIM, BALL):
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
 
     def colour(self, look: Look, held: bool) -> None:
-        """Take the colours of a look, and that of what the mouse holds."""
+        """Set the colours of a color scheme, and that of a held ball."""
         self._text = look.text
         self._actors[RIM].GetProperty().SetColor(*pv.Color(look.text).float_rgb)
         self.highlight(held)
@@ -171,7 +171,7 @@ class HandleMark:
         self._actors[BALL].GetProperty().SetColor(*pv.Color(name).float_rgb)
 
     def draw_frame(self, lines: list[FloatArray]) -> None:
-        """Draw the frame, lines (k, 3) each."""
+        """Draw the frame: lines of points (k, 3) each."""
         shape = pv.PolyData()
         # Given at once, points would be drawn as such.
         shape.points = np.concatenate(lines)

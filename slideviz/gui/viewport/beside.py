@@ -1,4 +1,4 @@
-"""Two views side by side: what stands above them, and the cameras that move together."""
+"""Two views side by side: their titles, and the link between their cameras."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -94,7 +94,7 @@ class TitleBar(QFrame):
 
 
 class CameraLink:
-    """Keeps the cameras of two views alike, whichever of them is moved.
+    """The link between the cameras of two views, which keeps them alike whichever is moved.
 
     Each has a camera of its own: what is near and far enough to be drawn differs between two
     meshes, and the strip of the legend is kept free in one of them only.
@@ -129,7 +129,7 @@ class CameraLink:
         return follow
 
     def end(self) -> None:
-        """Let each camera go its own way."""
+        """End the link."""
         for scene in self._scenes:
             scene.camera.beside = None
         for camera, tag in self._tags:

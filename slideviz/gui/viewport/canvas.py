@@ -52,7 +52,7 @@ class ViewSignals(QObject):
 
 
 class View3D(QtInteractor):
-    """pyvistaqt's widget, painted only when something changed."""
+    """A 3D view: pyvistaqt's widget, painted only when something changed."""
 
     def __init__(self, parent: QWidget | None = None, multi_samples: int = 4) -> None:
         super().__init__(parent, auto_update=False, multi_samples=multi_samples)
@@ -61,15 +61,15 @@ class View3D(QtInteractor):
         self.signals = ViewSignals(self)
         self._pressed: QPoint | None = None
         self.flat = False
-        self._one_paint = RepaintCoalescer(self)
+        self._repaints = RepaintCoalescer(self)
         self._veiled: list[list[vtkProp]] = []
         self._resizing = False
 
     def render(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
         """Schedule one repaint; pyvista calls this everywhere."""
-        if hasattr(self, "_one_paint") and not self._closed:
+        if hasattr(self, "_repaints") and not self._closed:
             self._rendered = True
-            self._one_paint.ask()
+            self._repaints.ask()
 
     render_soon = render
 
@@ -108,24 +108,24 @@ class View3D(QtInteractor):
             QTimer.singleShot(0, self._unveil_next)
 
     def close(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
-        """Give the graphics back; nothing is painted any more."""
+        """Release the graphics; nothing is painted any more."""
         # Its parent may be gone already, and have closed it.
         with contextlib.suppress(RuntimeError):
-            self._one_paint.end()
+            self._repaints.end()
         super().close()
         # Of Qt's surface, which ends now, PySide knows the address only: as long as it is named
         # here, whatever has that address later is taken for it, an action for example.
         self._surface = None
 
     def snapshot(self) -> np.ndarray:
-        """Return what the view shows now, (height, width, 3)."""
+        """Return the pixels (height, width, 3) of the view as it is now."""
         while self._veiled:
             self._unveil_next()
         self._render()  # type: ignore[call-arg]  # pyvistaqt's decorator hides it
         return np.asarray(self.screenshot(return_img=True))
 
     def spare_software(self) -> None:
-        """Give up what is hardly seen but takes most of the time where no graphics card draws.
+        """Switch off effects that are hardly seen but slow where no graphics card draws.
 
         These are smooth edges, order of what is seen through, and four of five lights.
         """

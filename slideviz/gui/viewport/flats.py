@@ -1,4 +1,4 @@
-"""What is laid flat beside the view: one section, of one run or of two that are compared."""
+"""The flat views beside the 3D views: one section, of one run or of two that are compared."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Flats(QWidget):
         self._row.setSpacing(2)
 
     def show_section(self, session: Session, section: Section) -> None:
-        """Show a section of all that the views show."""
+        """Show a section of the meshes in all views."""
         assert session.mesh is not None
         other = beside(session)
         own = session, self.viewing.scene.sections.cuts
@@ -106,14 +106,14 @@ class Flats(QWidget):
             second.deleteLater()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         self.look = look
         for view in (self.first, self.second):
             if view is not None:
                 view.set_look(look)
 
     def close_views(self) -> None:
-        """Give the graphics back."""
+        """Release the graphics."""
         self._drop_second()
         if self.first is not None:
             self.first.close_view()
@@ -128,7 +128,7 @@ def beside(session: Session) -> Session | None:
 
 
 def called(session: Session) -> str:
-    """Return what a view shows, in a few words."""
+    """Return the run that a view shows, in a few words."""
     return f"Run {session.shown}" if session.view.frame and session.shown else "Undeformed"
 
 
@@ -150,7 +150,7 @@ def stack(extent: tuple[float, float], room: tuple[int, int]) -> bool:
 
 
 def _direction(swapped: bool, stacked: bool) -> QHBoxLayout.Direction:
-    """Return from where to where the first and the second view stand."""
+    """Return the direction from the first view to the second."""
     ways = QHBoxLayout.Direction
     if stacked:
         return ways.BottomToTop if swapped else ways.TopToBottom

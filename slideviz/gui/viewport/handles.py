@@ -1,4 +1,4 @@
-"""The handles of the section that is chosen: one in each view, to move it by."""
+"""The handles of the selected section, one in each view."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ROOM = 0.03
 
 
 class Handles:
-    """Shows where a section is in the views, and tells where it is dragged to.
+    """The handles of a section, one in each view, by which it is dragged.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Handles:
     def show(
         self, views: list[tuple[View3D, Scene, Mesh]], section: Section, mesh: Mesh, look: Look
     ) -> None:
-        """Let every view have a handle of a section.
+        """Show a handle of a section in every view.
 
         Parameters
         ----------
@@ -84,14 +84,14 @@ class Handles:
         return made(view, scene.stage.strip, self._moved, self._held)
 
     def drop(self, view: View3D) -> None:
-        """Take the handle from a view."""
+        """Remove the handle from a view."""
         handle = self._of.pop(view, None)
         if handle is not None:
             handle.close()
             view.render_soon()
 
     def clear(self) -> None:
-        """Take the handles from all views."""
+        """Remove the handles from all views."""
         for view in list(self._of):
             self.drop(view)
 
@@ -107,7 +107,7 @@ class Handles:
 
 
 def kind_of(section: Section, mesh: Mesh) -> type[Handle]:
-    """Return what moves a section of a mesh."""
+    """Return the class of the handle of a section of a mesh."""
     if mesh.dim == 2:
         return FlatHandle
     return {"push": PlaneHandle, "pull": RoundHandle}[section.shape.handle]

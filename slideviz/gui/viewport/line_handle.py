@@ -30,7 +30,7 @@ NAMES = ("handle:rim", "handle:points", "handle:held")
 
 
 class FlatHandle(MouseHandle[tuple[Section, Box]]):
-    """Points on a line or circle that the mouse moves it by.
+    """The handle of a line or circle: points that the mouse drags.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         return self.view.camera, "ModifiedEvent"
 
     def show(self, section: Section, lift: float, look: Look) -> None:
-        """Stand where the section is, so far above the mesh."""
+        """Show the handle of a section, lifted above the mesh."""
         self.section, self._lift, self._look = section, lift, look
         self.put()
 
     def close(self) -> None:
-        """Leave the view for ever."""
+        """Remove the handle from the view for good."""
         for name in NAMES:
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
         super().close()
@@ -63,7 +63,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
     # Drawing ---------------------------------------------------------------------------
 
     def seen(self) -> Box:
-        """Return what the view shows of the mesh's plane, without its edges."""
+        """Return the part of the mesh's plane that the view shows, without its edges."""
         wide, high = self.view.window_size
         corners = (
             on_plane(self.view, EDGE_PX, EDGE_PX),
@@ -122,7 +122,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
     # Mouse -----------------------------------------------------------------------------
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return what the mouse would take at a position of the widget."""
+        """Return the part that the mouse would take at a position of the widget."""
         if self._handle_parts is None or self.section is None:
             return None
         shown: list[tuple[Part, FloatArray]] = [
@@ -143,7 +143,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         return np.array(on_plane(self.view, *self.view.to_pixels(where)))
 
     def grasp(self) -> tuple[Section, Box]:
-        """Return the section, and what the view shows of the plane."""
+        """Return the section, and the part of the plane that the view shows."""
         assert self.section is not None
         return self.section, self.seen()
 

@@ -1,4 +1,4 @@
-"""What the handles have in common that the mouse pulls: the part it takes, and where it goes."""
+"""The base of handles that the mouse drags."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -28,7 +28,7 @@ Grasp = TypeVar("Grasp")
 
 
 class MouseHandle(QObject, Generic[Grasp]):
-    """A handle of a section in a view; who draws it says what the mouse takes and does.
+    """A handle of a section in a view; a subclass draws it and says what dragging does.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ class MouseHandle(QObject, Generic[Grasp]):
 
     @property
     def dragging(self) -> bool:
-        """Tell whether the mouse holds it."""
+        """Tell whether the mouse drags the handle."""
         return self._start is not None
 
     def close(self) -> None:
-        """Leave the view for ever."""
+        """Remove the handle from the view for good."""
         self._soon.stop()
         self._unwatch()
         self.view.removeEventFilter(self)
@@ -79,27 +79,27 @@ class MouseHandle(QObject, Generic[Grasp]):
     # What differs ----------------------------------------------------------------------
 
     def watched(self) -> tuple[vtkObject, str]:
-        """Return what belongs to the view and its event after which the handle is put again."""
+        """Return the VTK object and its event after which the handle is drawn again."""
         raise NotImplementedError
 
     def part_at(self, where: QPoint) -> str | None:
-        """Return what the mouse would take at a position of the widget."""
+        """Return the part that the mouse would take at a position of the widget."""
         raise NotImplementedError
 
     def place_of(self, where: QPoint) -> FloatArray:
-        """Return a position of the widget as the handle counts it."""
+        """Return a position of the widget in the coordinates of the handle."""
         raise NotImplementedError
 
     def grasp(self) -> Grasp:
-        """Return what must be known of the moment at which the mouse takes it."""
+        """Return the state at the moment when the mouse takes the handle, the section first."""
         raise NotImplementedError
 
     def put(self) -> None:
-        """Draw it where it is, and what the mouse would take."""
+        """Draw the handle at its place, and the part that the mouse would take."""
         raise NotImplementedError
 
     def pulled(self, grasp: Grasp, start: FloatArray, end: FloatArray) -> Section:
-        """Return the section pulled from one place to another."""
+        """Return the section dragged from one place to another."""
         raise NotImplementedError
 
     # Mouse -----------------------------------------------------------------------------
@@ -162,6 +162,6 @@ class MouseHandle(QObject, Generic[Grasp]):
         self.view.render_soon()
 
     def tell(self) -> None:
-        """Tell where the section is now."""
+        """Hand over the dragged section."""
         if self._start is not None and self._at is not None:
             self._moved(self.pulled(*self._start, self._at))

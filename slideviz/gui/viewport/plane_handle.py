@@ -24,7 +24,7 @@ Bounds = tuple[float, float, float, float, float, float]
 
 
 class PlaneHandle:
-    """A frame, an arrow and a ball that move a plane.
+    """The handle of a plane: a frame, an arrow and a ball.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class PlaneHandle:
             self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
 
     def show(self, section: Section, bounds: Bounds, look: Look) -> None:
-        """Stand where the section is; while it is dragged, it knows better."""
+        """Show the handle of a section; while it is dragged, only its colours change."""
         self._colour(look)
         if bounds != self._bounds:
             self._bounds = bounds
@@ -76,7 +76,7 @@ class PlaneHandle:
             self.widget.On()
 
     def close(self) -> None:
-        """Leave the view for ever."""
+        """Remove the handle from the view for good."""
         self._soon.stop()
         self.dragging = False
         self.widget.Off()
@@ -84,7 +84,7 @@ class PlaneHandle:
         self.widget.SetInteractor(None)  # type: ignore[arg-type]  # None is taken, too
 
     def tell(self) -> None:
-        """Tell where the plane is now."""
+        """Hand over origin and normal of the dragged plane."""
         origin, normal = np.array(self.shape.GetOrigin()), np.array(self.shape.GetNormal())
         # More digits than anybody can aim for would be all one reads.
         normal = normal.round(4) + 0.0

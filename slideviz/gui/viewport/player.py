@@ -29,13 +29,13 @@ NARROW = 540
 
 
 def step_ms(steps: int, speed: float = 1.0) -> float:
-    """Return how long each of ``steps`` is seen, in milliseconds."""
+    """Return the time for which each of ``steps`` is shown, in milliseconds."""
     shortest, longest = STEP_MS
     return min(max(FILM_MS / max(steps, 1), shortest), longest) / speed
 
 
 class Player(QWidget):
-    """First, back, play, forward, last, a slider, and the numbers of the step."""
+    """The player of the steps: buttons, a slider, and the numbers of the shown step."""
 
     def __init__(self, store: Store, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -100,7 +100,7 @@ class Player(QWidget):
         self.set_speed(self.speed)
 
     def set_speed(self, speed: float) -> None:
-        """Play that many times as fast as usual, also what plays already."""
+        """Set the speed, as a multiple of the usual one."""
         self.speed = speed
         self.speeds[speed].setChecked(True)
         self.speed_button.setText(f"{speed:g}×")
@@ -134,7 +134,7 @@ class Player(QWidget):
         self.step_text.setText("" if session.mesh is None else self._step_words(at, last))
         self.speed_button.setEnabled(last > 0)
         self.result.show_parts(result_parts(session))
-        # Inverted cells are told of in the narrowest window, too.
+        # Inverted cells are shown in the narrowest window, too.
         self.result.setMinimumWidth(self.result.least)
         if not last:
             self.stop()
@@ -209,7 +209,7 @@ SEPARATOR = "&nbsp;· "
 
 
 class Results(QLabel):
-    """The numbers of a step, in the order of what matters.
+    """The label with the numbers of a step, the most important first.
 
     In little room words and numbers are shorter; where even that is too long, the last are left
     out.
@@ -225,7 +225,7 @@ class Results(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def show_parts(self, forms: list[list[str]]) -> None:
-        """Show other numbers: the same ones, as rich text, in full and in shorter forms."""
+        """Show numbers, given as rich text in full and in shorter forms."""
         if forms != self._forms:
             self._forms = forms
             self._fit()
@@ -264,7 +264,7 @@ class Results(QLabel):
 
 
 def plain(rich: str) -> str:
-    """Return rich text without its marks."""
+    """Return rich text as plain text."""
     document = QTextDocument()
     document.setHtml(rich)
     return document.toPlainText()

@@ -29,7 +29,7 @@ NOTHING = "The section cuts no cell."
 
 
 class CurveView(QWidget):
-    """The numbers along one section, of all runs that are shown and of the undeformed mesh.
+    """The curves along a section, of all shown runs and of the undeformed mesh.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class CurveView(QWidget):
         self.set_look(look)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
-        """Show a section of what the views show, the first one first."""
+        """Show a section of the meshes in the views, that of the first view first."""
         session, cuts = shown[0]
         self.rows = self._made.of(shown, section)
         self._labels, self._colours = labels_of(session, section), colours_of(session)
@@ -77,15 +77,15 @@ class CurveView(QWidget):
             self.area.say(NOTHING)
 
     def drawing(self) -> Draw:
-        """Return what draws the curves there are now."""
+        """Return the function that draws the present curves."""
         return partial(_draw, self.rows, self._labels, self._colours)
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         self.area.canvas.set_look(look)
 
     def close_view(self) -> None:
-        """Draw no more."""
+        """Forget the curves."""
         self.rows = ()
 
     def _picked(self, position: float) -> None:

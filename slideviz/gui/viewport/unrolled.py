@@ -21,7 +21,7 @@ from slideviz.session.store import Store
 
 
 class FlatView(QWidget):
-    """One section laid flat, with rulers, what is told of it, and buttons to fit and close.
+    """A flat view: a section laid flat, with rulers, facts, and buttons to fit and close.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class FlatView(QWidget):
         self._watching = self.view.camera.AddObserver("ModifiedEvent", lambda *_: self._looked())
 
     def link(self, other: FlatView | None) -> None:
-        """Show from now on what another view shows of its section, and it what this one does."""
+        """Link the camera with that of another flat view; None ends that."""
         for one, partner in ((self._partner, None), (self, other), (other, self)):
             if one is not None:
                 one._partner = partner
@@ -106,7 +106,7 @@ class FlatView(QWidget):
         self.view.render()
 
     def refit(self) -> None:
-        """Make the section fill the view, where nobody has chosen a detail."""
+        """Make the section fill the view, unless a detail of it is shown."""
         if self.scene.ranges() == self._ranges:
             self.fit()
 
@@ -126,12 +126,12 @@ class FlatView(QWidget):
             partner.view.render_soon()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         self.scene.set_look(look)
         self.view.render()
 
     def close_view(self) -> None:
-        """Give the graphics back."""
+        """Release the graphics."""
         self._refit.stop()
         self.view.camera.RemoveObserver(self._watching)
         self.view.close()

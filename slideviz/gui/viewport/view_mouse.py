@@ -51,7 +51,7 @@ class CellMouse(QObject):
             QToolTip.showText(event.globalPos(), info_text(self.scene.session, cell), self.view)
 
     def mark(self, where: QPoint) -> None:
-        """Mark the cell at a place of the view; beside the mesh, or on the marked one: none."""
+        """Mark the cell at a place of the view; none beside the mesh, or if it is marked."""
         cell = self.scene.pick_cell(*self.view.to_pixels(where))
         marked = self.store.session.view.marked
         self.store.change(changes.mark, None if cell == marked else cell)

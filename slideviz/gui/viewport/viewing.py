@@ -24,7 +24,7 @@ from slideviz.session.store import Store
 
 
 class Viewing(QWidget):
-    """One view, or two side by side with one camera and one range of colours.
+    """The 3D views: one, or two side by side with one camera and one range of colours.
 
     Attributes
     ----------
@@ -203,7 +203,7 @@ class Viewing(QWidget):
         self.view.unveil()
 
     def sync(self, old: Session, new: Session) -> None:
-        """Show what changed."""
+        """Show the changes of the session."""
         if old.case != new.case and self._ghosts is not None and self._ghosts.mesh is new.mesh:
             moved = self._ghosts.moved(new.case)
             for scene in self._scenes():
@@ -238,7 +238,7 @@ class Viewing(QWidget):
             self.second.render_soon()
 
     def pairs(self) -> list[tuple[View3D, Scene]]:
-        """Return the views with what each draws, one or two."""
+        """Return the views, one or two, each with its scene."""
         views = (self.view,) if self.second is None else (self.view, self.second)
         return list(zip(views, self._scenes(), strict=True))
 
@@ -259,19 +259,19 @@ class Viewing(QWidget):
     # Camera and pictures ---------------------------------------------------------------
 
     def render(self) -> None:  # type: ignore[override]  # as the views do
-        """Draw again what is shown."""
+        """Repaint the views."""
         self.view.render()
         if self.second is not None:
             self.second.render()
 
     def fit(self) -> None:
-        """Make everything fill the view."""
+        """Make the whole mesh fill the view."""
         self._before = None
         self._leader.fit()
         self.render()
 
     def refit(self) -> None:
-        """Show everything again, where some left a view for which nobody chose another camera.
+        """Show the whole mesh again, where a part left a view whose camera nobody has moved.
 
         While everything is seen the camera stays: a jump would look like a motion of the mesh.
         """
@@ -280,14 +280,14 @@ class Viewing(QWidget):
             self.fit()
 
     def fly_to(self, cell: int) -> None:
-        """Look at a cell of the mesh that is shown; `fly_back` returns."""
+        """Fly the camera to a cell of the shown mesh; `fly_back` returns."""
         if self._before is None:
             self._before = self.scene.camera.place
         self.scene.fly_to(cell)
         self.render()
 
     def fly_back(self) -> None:
-        """Look from where one looked before flying to cells; at all of the mesh if one did not."""
+        """Fly the camera back to its place before `fly_to`, or show the whole mesh."""
         before, self._before = self._before, None
         if before is None:
             self.fit()
@@ -296,17 +296,17 @@ class Viewing(QWidget):
             self.render()
 
     def look_from(self, side: str) -> None:
-        """Look from a side."""
+        """Look at the mesh from a side."""
         self._leader.look_from(side)
         self.render()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         for scene in self._scenes():
             scene.set_look(look)
         self.render()
 
     def close_views(self) -> None:
-        """Give the views' graphics back."""
+        """Release the graphics of the views."""
         self._drop_second()
         self.view.close()

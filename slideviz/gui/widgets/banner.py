@@ -132,7 +132,7 @@ class Banner(QFrame):
             later()
 
     def count(self, times: int) -> None:
-        """Show how often what the message tells has happened."""
+        """Show how often the error of the message has come."""
         self.text.setText(f"{self._brief} <i>({times:,} times)</i>")
 
     def _show_details(self) -> None:

@@ -17,12 +17,20 @@ Value = TypeVar("Value")
 
 
 class Choice(QComboBox):
-    """A drop-down of values with words; the wheel scrolls the panel instead of changing it."""
+    """A drop-down of values with words; the wheel scrolls the panel instead of changing it.
+
+    Signals
+    -------
+    chosen(object)
+        The value that the user has chosen.
+    """
 
     chosen = Signal(object)
 
-    def __init__(self, words: Mapping[Value, str]) -> None:
+    def __init__(self, words: Mapping[Value, str], tip: str = "", name: str = "") -> None:
         super().__init__()
+        self.setToolTip(wrapped(tip))
+        self.setObjectName(name)
         self.words = dict(words)
         for value, text in words.items():
             self.addItem(text, value)
@@ -30,13 +38,13 @@ class Choice(QComboBox):
         self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
 
     def show_value(self, value: object) -> None:
-        """Show a value without telling."""
+        """Show a value; `chosen` is not emitted."""
         index = self.findData(value)
         if index >= 0 and index != self.currentIndex():
             self.setCurrentIndex(index)
 
     def explain(self, tips: Mapping[str, str]) -> None:
-        """Explain entries, by their value, to who is about to choose one."""
+        """Give entries tooltips, by their values."""
         for value, tip in tips.items():
             self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
 

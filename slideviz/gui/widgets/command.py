@@ -26,7 +26,7 @@ def always(_: Any) -> bool:
 
 @dataclass(frozen=True)
 class Command:
-    """Something that can be done, with all its words, for whatever offers it.
+    """A command: function, words, keys, icon, and when it can be done.
 
     Attributes
     ----------
@@ -67,11 +67,11 @@ class Command:
     short: str = ""
 
     def called(self, now: Now) -> str:
-        """Return its title, as it is now if it is offered now."""
+        """Return the present title of the command."""
         return (self.title_now(now) if self.title_now else "") or self.title
 
     def action(self, window: Services) -> QAction:
-        """Return an action that does it; `show` keeps it up to date."""
+        """Return an action for the command, which `show` keeps up to date."""
         act = QAction(self.title, window)
         act.setObjectName(self.name)
         act.setShortcuts([QKeySequence(keys) for keys in self.keys])
@@ -90,7 +90,7 @@ class Command:
         act.setToolTip(wrapped(f"{tip} ({keys})" if keys else tip))
 
     def show(self, act: QAction, now: Now) -> None:
-        """Let its action show what can be done now."""
+        """Show in its action whether the command can be done now, and under which title."""
         able = self.enabled(now)
         if self.title_now is not None:
             title = self.title_now(now)
@@ -107,7 +107,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Menu:
-    """A menu: what is in it, by lines and menus in it.
+    """A menu: its commands, lines and submenus.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Menu:
     tooltips: bool = False
 
     def commands(self) -> Iterator[Command]:
-        """Yield the commands in it and in the menus in it."""
+        """Yield the commands of the menu and of its submenus."""
         for entry in self.entries:
             if isinstance(entry, Menu):
                 yield from entry.commands()
@@ -140,7 +140,7 @@ class Menu:
 
 @dataclass(frozen=True)
 class Now:
-    """What decides which commands of the window can be done.
+    """The state of the window by which commands can be done or not.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ def solid(now: Now) -> bool:
 
 
 def valued(now: Now) -> bool:
-    """Tell whether the colours say a value of cells."""
+    """Tell whether cells are coloured by a value."""
     return opened(now) and now.session.view.colour_by != "role"
 
 
@@ -197,6 +197,6 @@ def stepped_and_idle(now: Now) -> bool:
 
 
 def why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
-    """Return what says why something cannot be done, if it cannot."""
+    """Return a function that returns why a command cannot be done, or an empty text."""
     wait = "Wait for the end of what runs, or cancel it."
     return lambda now: "" if able(now) else wait if opened(now) and now.busy else why

@@ -42,7 +42,7 @@ class ElidedLabel(QLabel):
 
     @property
     def shown(self) -> str:
-        """Return what there is room for."""
+        """Return the text for which there is room."""
         room = self.contentsRect().width()
         return self.fontMetrics().elidedText(self.text(), self._mode, room)
 

@@ -1,4 +1,4 @@
-"""What nobody expected: told once, counted after that, with details to copy; the window goes on."""
+"""Unexpected errors: shown once, then counted, with details to copy, while the window goes on."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from slideviz.mesh.io.cleanup import is_alive
 from slideviz.mesh.io.private import private_file, private_folder
 
 REST_S = 5.0
-"""An error that was told is told again when it has not come for so long."""
+"""An error that was shown is shown again when it has not come for so long."""
 PACKAGES = (
     "slideviz",
     "numpy",
@@ -50,17 +50,17 @@ log = logging.getLogger("slideviz")
 
 
 class Notice(Protocol):
-    """What shows an error, and how often it came."""
+    """A widget that shows an error, and how often it came."""
 
     def tell_error(self, error: BaseException) -> None:
         """Show an error."""
 
     def count(self, times: int) -> None:
-        """Show how often it came."""
+        """Show how often the error came."""
 
 
 class Faults(QObject):
-    """Tells of errors in the banner of a window: each once, with how often it came.
+    """The errors of a window: each is shown once in its banner, with how often it came.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Faults(QObject):
         self._came.connect(self._take)
 
     def tell(self, error: BaseException) -> None:
-        """Tell of an error, from any thread."""
+        """Show an error, from any thread."""
         with contextlib.suppress(RuntimeError):  # the window may be gone
             self._came.emit(error)
 
@@ -116,13 +116,13 @@ def _place(error: BaseException) -> tuple[object, ...]:
 
 
 def details_of(error: BaseException) -> str:
-    """Return what somebody who looks for the mistake needs: trace, versions, platform."""
+    """Return the details of an error for its developers: trace, versions, platform."""
     trace = "".join(traceback.format_exception(error))
     return f"{trace}\n{versions()}\n"
 
 
 def versions() -> str:
-    """Return the versions of what takes part, and the platform, a line for each."""
+    """Return the versions of libraries, and the platform, a line for each."""
     lines = [f"Python {platform.python_version()}", f"Qt {qVersion()}"]
     for name in PACKAGES:
         with contextlib.suppress(metadata.PackageNotFoundError):
@@ -132,7 +132,7 @@ def versions() -> str:
 
 @contextlib.contextmanager
 def caught(faults: Faults) -> Iterator[None]:
-    """Tell of every error that nobody catches; what Qt, VTK and Python warn of goes to the log."""
+    """Show every uncaught error; warnings of Qt, VTK and Python go to the log."""
     with ExitStack() as stack:
         stack.callback(setattr, sys, "excepthook", sys.excepthook)
         stack.callback(setattr, threading, "excepthook", threading.excepthook)

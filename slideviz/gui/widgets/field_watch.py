@@ -1,4 +1,4 @@
-"""Tells the session which fields of a panel are not valid, so that no run starts meanwhile."""
+"""Invalid fields of a panel are noted in the session, so that no run starts meanwhile."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from slideviz.session.store import Store
 
 
 class FieldWatch(QObject):
-    """Keeps ``Session.invalid`` up to date for one panel: what is marked there as not valid."""
+    """The invalid fields of a panel, kept up to date in ``Session.invalid``."""
 
     def __init__(self, panel: QWidget, store: Store, place: Place) -> None:
         super().__init__(panel)
@@ -27,7 +27,7 @@ class FieldWatch(QObject):
         store.listen(lambda *_: self.look())
 
     def look(self) -> None:
-        """Tell the session which fields are not valid."""
+        """Note the invalid fields in the session."""
         faults = tuple(
             f"{_title(field, self.panel)}: {field.fault}."
             for field in self._fields
@@ -36,7 +36,7 @@ class FieldWatch(QObject):
         self.store.change(changes.set_invalid, self.place, tuple(dict.fromkeys(faults)))
 
     def focus(self) -> bool:
-        """Put the cursor into the first field that is not valid; return whether there is one."""
+        """Put the cursor into the first invalid field; return whether there is one."""
         field = next((field for field in self._fields if field.fault), None)
         if field is not None:
             field.setFocus()

@@ -1,4 +1,4 @@
-"""Small input fields: numbers and vectors that are checked as they are typed."""
+"""Input fields for numbers that are checked as they are typed."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -16,7 +16,7 @@ from slideviz.gui.widgets.tips import wrapped
 
 
 def number_text(value: float) -> str:
-    """Return a number as short as it can be without losing a digit."""
+    """Return a number as text, without losing a digit."""
     text = repr(float(value))
     return text.removesuffix(".0")
 
@@ -29,7 +29,7 @@ NOTHING = 1e-10
 
 
 def short_text(value: float, scale: float = 0.0) -> str:
-    """Return a number with six digits, or all if they are few; 0 if it is nothing beside scale."""
+    """Return a number as text of six digits, or all if they are few; 0 if tiny beside ``scale``."""
     if abs(value) < NOTHING * abs(scale) or value == 0:
         return "0"
     exact = number_text(value)
@@ -37,7 +37,7 @@ def short_text(value: float, scale: float = 0.0) -> str:
 
 
 def is_stray(event: QEvent, letters: str = "eE") -> bool:
-    """Tell whether a key is a letter that is in no number: it belongs to the window's shortcuts."""
+    """Tell whether a key is a letter that no number has: it belongs to the window's shortcuts."""
     kinds = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress)
     if not isinstance(event, QKeyEvent) or event.type() not in kinds:
         return False
@@ -46,7 +46,7 @@ def is_stray(event: QEvent, letters: str = "eE") -> bool:
 
 
 class NumberField(QLineEdit):
-    """A number; what is not allowed is marked at once, with the reason as tooltip.
+    """A field for a number; an invalid one is marked at once, with the reason as tooltip.
 
     ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
     while it is edited; the value keeps them all. What is not valid when the field is left goes
@@ -58,12 +58,18 @@ class NumberField(QLineEdit):
     changed = Signal(float)
     marked = Signal()
 
-    def __init__(self, value: float = 0.0, allowed: Callable[[float], str] | None = None) -> None:
+    def __init__(
+        self,
+        value: float = 0.0,
+        allowed: Callable[[float], str] | None = None,
+        tip: str = "",
+    ) -> None:
         super().__init__(short_text(value))
         self._allowed = allowed or (lambda _: "")
         self._value = self._before = float(value)
         self._scale = 0.0
-        self._tip = self.fault = self.together = ""
+        self._tip, self.fault, self.together = tip, "", ""
+        self.setToolTip(wrapped(tip))
         self._whole = False
         self._twice_ms = float("-inf")
         self.setCursorPosition(0)
@@ -94,19 +100,19 @@ class NumberField(QLineEdit):
         return self._allowed(value)
 
     def set_tip(self, text: str) -> None:
-        """Explain the field; shown while its value is valid."""
+        """Set the tooltip, which is shown while the value is valid."""
         self._tip = text
         self.mark()
 
     def set_scale(self, scale: float) -> None:
-        """Take a length beside which the smallest numbers are shown as 0."""
+        """Set the length beside which the smallest numbers are shown as 0."""
         if scale != self._scale:
             self._scale = scale
             if not (self.hasFocus() or self.isModified()):
                 self._write()
 
     def show_value(self, value: float) -> None:
-        """Show a number without telling; what is being typed is left if it means the same."""
+        """Show a number; nothing is emitted, and a text that means the same stays."""
         if value == self._value and (self.hasFocus() or self.isModified() or not self.problem):
             return
         if not (self.hasFocus() and self.isModified()):
@@ -184,7 +190,7 @@ class NumberField(QLineEdit):
         self.mark()
 
     def mark(self) -> None:
-        """Show that the number is not valid, and why, or that it is."""
+        """Mark the field while its number is invalid, with the reason as tooltip."""
         problem = self.problem or self.together
         self.setToolTip(wrapped(problem or self._tip))
         set_style(self, "bad", bool(problem))
@@ -194,7 +200,7 @@ class NumberField(QLineEdit):
 
 
 class NumberBox(QSpinBox):
-    """A whole number with arrows; one without digits is marked as a ``NumberField`` is.
+    """A field for a whole number with arrows; without digits it is marked as a `NumberField` is.
 
     The wheel scrolls the panel instead of changing it. Of ``letters``, its words may have some.
     """
@@ -219,7 +225,7 @@ class NumberBox(QSpinBox):
         event.ignore()
 
     def show_value(self, value: int) -> None:
-        """Show a number without telling."""
+        """Show a number; nothing is emitted."""
         if self.value() != value:
             with QSignalBlocker(self):
                 self.setValue(value)
@@ -233,10 +239,10 @@ class NumberBox(QSpinBox):
 
 
 class Switch(QCheckBox):
-    """A setting that is on or off; ``clicked`` tells what the user wants."""
+    """A box for a setting that is on or off."""
 
     def show_value(self, on: bool) -> None:
-        """Show whether it is on."""
+        """Show whether the setting is on."""
         self.setChecked(on)
 
 

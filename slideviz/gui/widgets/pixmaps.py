@@ -1,4 +1,4 @@
-"""Images of numbers as Qt's: for previews and the clipboard."""
+"""Images of Qt for previews and the clipboard."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ LARGE = 50_000
 
 
 def to_image(pixels: np.ndarray) -> QImage:
-    """Return an image (height, width, 3 or 4) as Qt's, with memory of its own."""
+    """Return the image of pixels (height, width, 3 or 4), with memory of its own."""
     height, width, depth = pixels.shape
     kind = QImage.Format.Format_RGBA8888 if depth == 4 else QImage.Format.Format_RGB888
     return QImage(pixels.tobytes(), width, height, depth * width, kind).copy()
 
 
 def drawn_for(renderer: OffscreenRenderer, box: tuple[int, int]) -> tuple[int, int]:
-    """Return the size that a preview is drawn at: twice the box, for lines are a pixel wide.
+    """Return the size at which a preview is drawn: twice the box, for lines are a pixel wide.
 
     Not of a large mesh, which takes its time.
     """
@@ -66,7 +66,7 @@ def preview_label(name: str, box: tuple[int, int]) -> QLabel:
 
 @contextmanager
 def wait_cursor() -> Iterator[None]:
-    """Show that the window does not answer for a moment: a large mesh takes a second or two."""
+    """Show the wait cursor while a drawing takes a second or two."""
     QApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
     try:
         yield

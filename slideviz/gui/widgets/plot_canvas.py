@@ -32,7 +32,7 @@ PLOT_FILTERS = "PNG picture (*.png);;SVG drawing (*.svg);;PDF drawing (*.pdf)"
 
 
 class PlotCanvas(QWidget):
-    """A plot that is drawn beside the window; what is shown is the newest image of it.
+    """A plot that is drawn beside the window, shown by its newest image.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class PlotCanvas(QWidget):
         self._picture = Picture()
         self._coming: Future[Picture] | None = None
         self._timer = later(self, self.fill)
-        # Asked for rather than told: the thread need not know of a widget that may be gone.
+        # Asked for rather than signalled: the thread need not know of a widget that may be gone.
         self._look_after = QTimer(self)
         self._look_after.setInterval(LOOK_MS)
         self._look_after.timeout.connect(self._take)
@@ -72,12 +72,12 @@ class PlotCanvas(QWidget):
 
     @property
     def style_(self) -> Style:
-        """Return how it is drawn in the window."""
+        """Return the style of the plot in the window."""
         return Style(self.look, size=8.0, width=1.3)
 
     @property
     def figure(self) -> Figure:
-        """Return what is shown."""
+        """Return the figure that is shown."""
         return self._picture.figure
 
     @property
@@ -88,14 +88,14 @@ class PlotCanvas(QWidget):
     # Drawing ---------------------------------------------------------------------------
 
     def ask(self) -> None:
-        """Draw what there is now, soon; hidden plots wait until they are seen."""
+        """Schedule a drawing; a hidden plot waits until it is seen."""
         self._stale = True
         if is_seen(self) and not self.busy:
             since = (time.monotonic() - self._last) * 1000.0
             self._timer.start(max(0, round(self._rest_ms() - since)))
 
     def wipe(self) -> None:
-        """Show nothing until the next drawing is there: what is shown is another plot."""
+        """Show nothing until the next drawing is there: the present one is of another plot."""
         self.wiped = True
         self.update()
 
@@ -104,7 +104,7 @@ class PlotCanvas(QWidget):
         return min(max(REST_MS, REST_TIMES * 1000.0 * self._picture.seconds), MOST_REST * REST_MS)
 
     def fill(self) -> None:
-        """Have drawn what there is now; while a drawing goes on, after it."""
+        """Start a drawing, or note that another one is needed after the present one."""
         self._stale = self._coming is not None
         if self._stale:
             return
@@ -130,7 +130,7 @@ class PlotCanvas(QWidget):
             self.ask()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         self.look = look
         self.ask()
 
@@ -143,12 +143,12 @@ class PlotCanvas(QWidget):
         return wide / max(self.width(), 1), high / max(self.height(), 1)
 
     def to_value(self, x_px: float) -> float:
-        """Return what the horizontal axis has at a position of the mouse."""
+        """Return the value of the horizontal axis at a position of the mouse."""
         place = x_px * self._scale[0], 0.0
         return float(self.figure.axes[0].transData.inverted().transform(place)[0])
 
     def to_pixel(self, value: float) -> float:
-        """Return where a value of the horizontal axis is, in pixels of the widget."""
+        """Return the pixel of the widget at which the horizontal axis has a value."""
         place = self.figure.axes[0].transData.transform((value, 1.0))
         return float(place[0] / self._scale[0])
 
@@ -216,7 +216,7 @@ def is_seen(widget: QWidget) -> bool:
 
 
 def words_label() -> QLabel:
-    """Return a label for what a panel says while it has nothing to show."""
+    """Return a label for the words of a panel that has nothing to show."""
     label = hint_label(align=Qt.AlignmentFlag.AlignCenter)
     label.setMargin(12)
     return label
@@ -243,7 +243,7 @@ def write_plot(path: Path, draw_on: Draw) -> None:
 def ask_and_write(
     parent: QWidget, title: str, default: Path, filters: str, write: Callable[[Path], None]
 ) -> None:
-    """Ask for a name and write a file; tell how it went in the window, if there is one."""
+    """Ask for a name and write a file; the window, if there is one, shows success or error."""
     path = questions.ask_save(parent, title, default, filters)
     if path is None:
         return

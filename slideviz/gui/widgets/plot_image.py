@@ -1,4 +1,4 @@
-"""A plot as an image, drawn beside the window: matplotlib takes 60 to 300 ms for one."""
+"""Images of plots, drawn beside the window: matplotlib takes 60 to 300 ms for one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Draw = Callable[[Figure, Style], None]
 
 @dataclass(frozen=True)
 class Paper:
-    """What a plot is drawn on: width and height in pixels, pixels per unit of Qt, style."""
+    """The size and style of a plot: pixels, pixels per unit of Qt, style."""
 
     width: int
     height: int
@@ -37,7 +37,7 @@ class Paper:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the axes are (left, bottom, width, height), as long as ``key`` is the same."""
+    """The place of the axes (left, bottom, width, height), valid while ``key`` is the same."""
 
     key: tuple[object, ...] = ()
     bounds: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
@@ -45,7 +45,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure that was drawn; nobody draws it again, so that any thread may ask it.
+    """A drawn figure; nobody draws it again, so that any thread may ask it.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def _arrange(figure: Figure, place: Place) -> Place:
 
 
 def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:
-    """Return at once what will be the plot, or what went wrong with it."""
+    """Return the future of a plot that is drawn in a thread."""
     coming: Future[Picture] = Future()
 
     def work() -> None:

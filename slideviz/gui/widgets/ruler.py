@@ -14,7 +14,7 @@ from slideviz.plots.ticks import ticks
 
 
 class Ruler(QWidget):
-    """The numbers of one axis; upright at the left, or lying below.
+    """The ruler of one axis; upright at the left, or lying below.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ class Ruler(QWidget):
             self.setFixedHeight(34)
 
     def show_range(self, low: float, high: float, name: str) -> None:
-        """Show the numbers from the left or lower end to the other, and what they are."""
+        """Show the numbers between the ends of the axis, and its name."""
         if (low, high, name) != (self.low, self.high, self.name):
             self.low, self.high, self.name = low, high, name
             self.update()
 
     def ticks(self) -> list[float]:
-        """Return the numbers that are written, rising."""
+        """Return the numbers on the ruler, rising."""
         length = self.height() if self.upright else self.width()
         room, least = (34, 15) if self.upright else (70, 50)
         most = max(length // room, 2)

@@ -1,4 +1,4 @@
-"""Menus of runs: which of them a view shows, and which the shown one is compared with."""
+"""Menus of runs: to show one in a view, and to compare the shown one."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from slideviz.session.store import Store
 
 
 def fill_pane(menu: QMenu, store: Store, pane: int) -> None:
-    """Put into a menu what one of two views can show: the undeformed mesh and the runs."""
+    """Fill the menu of one of two views: the undeformed mesh and the runs."""
     _fill(menu, store, panes(store.session)[pane], lambda n: store.change(show_in, pane, n))
 
 
 def fill_compare(menu: QMenu, store: Store) -> None:
-    """Put into a menu with what the run that is shown can be compared, and the end of that."""
+    """Fill the menu that compares the shown run, and ends the comparison."""
     beside, shown = store.session.view.beside, store.session.shown
     _fill(menu, store, beside, lambda n: store.change(changes.show_beside, n), leave=shown)
     menu.addSeparator()

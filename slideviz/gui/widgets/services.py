@@ -1,4 +1,4 @@
-"""What panels and dialogs use of the window that they are in, without knowing it."""
+"""The services of the window that panels and dialogs use, without knowing the window."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from slideviz.session.store import Store
 if TYPE_CHECKING:
     from slideviz.gui.docks import Docks
     from slideviz.gui.files import Files
-    from slideviz.gui.viewport.cutting import Cutting
+    from slideviz.gui.viewport.section_views import SectionViews
     from slideviz.gui.viewport.viewing import Viewing
 
 
 class Services(QMainWindow):
-    """The window, as panels and dialogs see it; `slideviz.gui.window.MainWindow` is the one.
+    """The window as panels and dialogs see it: the base of `slideviz.gui.window.MainWindow`.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Services(QMainWindow):
         Whether a job runs; `start_job` starts one.
     files : Files
         Where file dialogs start, and what the files that they offer begin with.
-    viewing, cutting
+    viewing, section_views
         The views of the mesh, and of the section that is laid flat.
     docks_ : Docks
         The panels.
@@ -47,7 +47,7 @@ class Services(QMainWindow):
     runner: JobRunner
     files: Files
     viewing: Viewing
-    cutting: Cutting
+    section_views: SectionViews
     docks_: Docks
 
     def say(self, text: str) -> None:
@@ -73,6 +73,6 @@ def main_window(widget: QWidget | None) -> Services | None:
 
 
 def folder_of(widget: QWidget) -> Path:
-    """Return where file dialogs start."""
+    """Return the folder in which file dialogs start."""
     window = main_window(widget)
     return window.files.folder() if window is not None else Path.home()

@@ -13,7 +13,7 @@ from slideviz.gui.widgets.fields import NumberField
 
 
 class VectorField(QWidget):
-    """Two or three numbers in a row.
+    """A field for two or three numbers in a row.
 
     ``allowed`` returns an empty text, or why the numbers together may not be; they are marked
     then, and ``changed`` is not emitted. When the last of them is left, they go back to what they
@@ -27,10 +27,11 @@ class VectorField(QWidget):
         values: Sequence[float] = (0.0, 0.0, 0.0),
         allowed: Callable[[Sequence[float]], str] | None = None,
         names: str = "xyz",
+        tip: str = "",
     ) -> None:
         super().__init__()
         self._allowed = allowed or (lambda _: "")
-        self.fields = [NumberField(value) for value in values]
+        self.fields = [NumberField(value, tip=tip) for value in values]
         self._labels = [QLabel(name) for name in names]
         for label, field in zip(self._labels, self.fields, strict=True):
             field.setAccessibleName(label.text())
@@ -80,12 +81,12 @@ class VectorField(QWidget):
             field.setVisible(index < count)
 
     def set_scale(self, scale: float) -> None:
-        """Take a length, of the mesh, beside which the smallest numbers are shown as 0."""
+        """Set the length beside which the smallest numbers are shown as 0."""
         self._scale = scale
         self._compare()
 
     def show_value(self, values: Sequence[float]) -> None:
-        """Show numbers without telling; what is being typed is left if it means the same."""
+        """Show numbers; nothing is emitted, and invalid ones that are being typed stay."""
         if not (self.problem and tuple(values) == self._good):
             self._write(values)
 
@@ -103,7 +104,7 @@ class VectorField(QWidget):
             field.set_scale(scale)
 
     def set_tip(self, text: str) -> None:
-        """Explain the field."""
+        """Set the tooltip of all numbers."""
         for field in self.fields:
             field.set_tip(text)
         self._mark()

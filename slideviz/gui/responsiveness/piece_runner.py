@@ -1,4 +1,4 @@
-"""Work in pieces: what draws in turns of the event loop, the rest beside the window."""
+"""Jobs in pieces: those that draw in turns of the event loop, the others beside the window."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from slideviz.session.jobs import require_going
 from slideviz.session.pieces import Beside
 
 
-class Turns(QObject):
-    """Pulls a generator as `slideviz.session.pieces` describes it, one piece in each turn.
+class PieceRunner(QObject):
+    """The runner of a generator of `slideviz.session.pieces`, a piece in each turn.
 
     Signals
     -------
     came(object)
         Something that the generator yielded, neither None nor a `Beside`.
     done(object)
-        What it returned. Of work that is stopped nothing is told.
+        What it returned. Nothing is emitted of one that was stopped.
     failed(Exception)
         What it raised.
     """
@@ -46,17 +46,17 @@ class Turns(QObject):
 
     @property
     def busy(self) -> bool:
-        """Tell whether work goes on."""
+        """Tell whether a generator is being run."""
         return self._pieces is not None
 
     def start(self, pieces: Generator[object, Any, Any]) -> None:
-        """Do this work, and no longer what was being done."""
+        """Run a generator, instead of the one before."""
         self.stop()
         self._pieces = pieces
         self._timer.start()
 
     def stop(self) -> None:
-        """End the work; the generator cleans up."""
+        """Close the generator, which cleans up."""
         self._timer.stop()
         if self._runner.busy:
             self._runner.close()
@@ -87,7 +87,7 @@ class Turns(QObject):
 
 
 def raise_again(error: Exception) -> None:
-    """Raise what went wrong with work that nobody waits for: it is told as any other fault."""
+    """Raise the error of a generator that nobody waits for, to be shown as any other fault."""
     raise error
 
 

@@ -1,4 +1,4 @@
-"""What belongs to the section that is chosen: its handles in the views, and its flat picture."""
+"""The views of the selected section: its handles in the 3D views, and its flat views."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _LONG = 1.5
 """A section that is so many times larger below the view than beside it is put there."""
 
 
-class Cutting(QSplitter):
-    """The 3D view, and beside or below it the flat view of the section that is chosen.
+class SectionViews(QSplitter):
+    """The 3D views, and beside or below them the flat views of the selected section.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Cutting(QSplitter):
 
     @property
     def section(self) -> Section | None:
-        """Return the section that is chosen."""
+        """Return the selected section."""
         return self.store.session.view.section
 
     @property
@@ -75,17 +75,17 @@ class Cutting(QSplitter):
 
     @property
     def is_flat(self) -> bool:
-        """Tell whether the section that is chosen is laid flat."""
+        """Tell whether the selected section is laid flat."""
         return self.section is not None and self.section.flat
 
     def want_flat(self, wanted: bool) -> None:
-        """Lay the chosen section flat beside the 3D view, or do not."""
+        """Lay the selected section flat beside the 3D view, or end that."""
         if wanted != self.is_flat or not wanted:
             at = self.store.session.view.chosen if wanted else None
             self.store.change(changes.lay_flat, at)
 
     def look_along(self) -> None:
-        """Look at the plane that is chosen along its normal, at what has an axis from outside."""
+        """Look along the normal of the selected plane, or from outside if it is about an axis."""
         section, session = self.section, self.store.session
         if section is None or session.frame is None or session.frame.mesh.dim == 2:
             return
@@ -177,14 +177,14 @@ class Cutting(QSplitter):
             self.viewing.fit()
 
     def set_look(self, look: Look) -> None:
-        """Take other colours."""
+        """Draw in another color scheme."""
         self.look = look
         if self.flats is not None:
             self.flats.set_look(look)
         self._sync()
 
     def close_views(self) -> None:
-        """Give the graphics back, before those of the 3D view."""
+        """Release the graphics, before those of the 3D view."""
         self.handles.clear()
         if self.flats is not None:
             self.flats.close_views()
