@@ -34,6 +34,8 @@ class Running(QObject):
     -------
     began(str), doing(Doing), ended()
         A job started, with its name; is so far; ended, however it did.
+    cancelling()
+        The running job was asked to stop.
     said(str)
         Something for the status bar.
     """
@@ -41,6 +43,7 @@ class Running(QObject):
     began = Signal(str)
     doing = Signal(object)
     ended = Signal()
+    cancelling = Signal()
     said = Signal(str)
 
     def __init__(self, store: Store, banner: Banner, parent: QObject | None = None) -> None:
@@ -94,8 +97,9 @@ class Running(QObject):
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 
     def cancel(self) -> None:
-        """Cancel the running job."""
+        """Ask the running job to stop."""
         if self.runner.busy:
+            self.cancelling.emit()
             self.runner.cancel()
 
     def close(self) -> bool:

@@ -181,9 +181,14 @@ class MainWindow(Services):
 
     def _connect(self) -> None:
         running, panel = self.running, self.run_panel
-        running.began.connect(self._job_began)
+        running.began.connect(panel.set_busy)
         running.doing.connect(panel.show_doing)
-        running.ended.connect(self._job_ended)
+        running.cancelling.connect(panel.show_cancelling)
+        running.ended.connect(lambda: panel.set_busy(""))
+        # The mesh may have moved out of the view.
+        running.ended.connect(self.viewing.refit)
+        for change in (running.began, running.ended):
+            change.connect(lambda *_: self.sync_actions())
         running.said.connect(self.say)
         panel.place_wanted.connect(self.lead_to)
         self.start.file_wanted.connect(self.files.open_path)
@@ -250,8 +255,6 @@ class MainWindow(Services):
         *values: object,
     ) -> None:
         """Start a job beside the window; one that still runs is cancelled first."""
-        if self.runner.busy:
-            self.run_panel.show_cancelling()
         self.running.start_job(text, finish, function, *values)
 
     def start_run(self) -> None:
@@ -260,19 +263,7 @@ class MainWindow(Services):
 
     def cancel(self) -> None:
         """Cancel the running job."""
-        if self.runner.busy:
-            self.run_panel.show_cancelling()
-            self.running.cancel()
-
-    def _job_began(self, text: str) -> None:
-        self.run_panel.set_busy(text)
-        self.sync_actions()
-
-    def _job_ended(self) -> None:
-        self.run_panel.set_busy("")
-        # The mesh may have moved out of the view.
-        self.viewing.refit()
-        self.sync_actions()
+        self.running.cancel()
 
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty one takes it away."""

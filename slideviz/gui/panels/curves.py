@@ -24,7 +24,7 @@ from slideviz.gui.widgets.plot_image import Draw
 from slideviz.mesh.model import FloatArray
 from slideviz.plots import curves
 from slideviz.plots.draw import convergence, quality_by_step
-from slideviz.plots.spanwise import spanwise
+from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
@@ -156,7 +156,8 @@ class CurvesPanel(Panel):
         if kind == "steps":
             return partial(draw_steps, session, whole)
         coordinate, what = self.coordinate.currentData(), self.what.currentData()
-        return partial(draw_span, self._profiles, session, coordinate, what, whole)
+        find = partial(self._profiles.of, session, coordinate)
+        return partial(draw_span, find, coordinate, what, whole)
 
     # What the user does ----------------------------------------------------------------
 
@@ -210,8 +211,7 @@ def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
 
 
 def draw_span(
-    profiles: curves.Profiles,
-    session: Session,
+    find: Callable[[], list[Profile]],
     coordinate: curves.Coordinate,
     what: Literal["minimum", "mean"],
     whole: bool,
@@ -221,7 +221,7 @@ def draw_span(
     """Draw the lowest or mean quality along a coordinate, or words that say why there is none."""
     axes = figure.add_subplot()
     try:
-        found = profiles.of(session, coordinate)
+        found = find()
     except SlidevizError as error:
         axes.set_axis_off()
         figure.text(

@@ -31,7 +31,6 @@ class Choice(QComboBox):
         super().__init__()
         self.setToolTip(wrapped(tip))
         self.setObjectName(name)
-        self.words = dict(words)
         for value, text in words.items():
             self.addItem(text, value)
         self.setMinimumContentsLength(8)
