@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
+from slideviz.mesh.io.source import open_source, unreadable
 from slideviz.mesh.io.su2 import read_su2
 from slideviz.mesh.io.su2_scan import Progress
 from slideviz.mesh.io.su2_write import su2_blocks
@@ -21,9 +22,6 @@ from slideviz.mesh.io.su2b_write import su2b_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.terms import FileFormat
 
-_READ_BYTES = 1 << 22
-_READING = 0.1
-"""Fraction of the time for reading that getting the bytes takes."""
 _SNIFFED_BYTES = 1 << 16
 _UNSURE = ("", ".txt", ".dat", ".mesh", ".grid")
 _NDIME = re.compile(rb"^\s*NDIME\s*=", re.IGNORECASE | re.MULTILINE)
@@ -68,8 +66,7 @@ def read(
         if kind == "su2b":
             return read_su2b(path, zone, tick)
         if kind == "su2":
-            data = _read_bytes(path, tick)
-            return read_su2(path, data, zone, lambda done: tick(_READING + (1 - _READING) * done))
+            return read_su2(open_source(path), zone, tick)
         if zone not in (None, 1):
             raise path_error(
                 path, f"there is no zone {zone}, for only SU2 files have zones; leave it out"
@@ -100,41 +97,7 @@ def _format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
         with path.open("rb") as file:
             return "su2" if _NDIME.search(file.read(_SNIFFED_BYTES)) else None
     except (OSError, ValueError) as problem:
-        raise _unreadable(path, problem) from problem
-
-
-def _read_bytes(path: Path, progress: Progress) -> bytes:
-    """Return the content, block by block so that it can be stopped."""
-    blocks, done = [], 0
-    for size, block in _blocks(path):
-        blocks.append(block)
-        done += len(block)
-        progress(_READING * min(done / size, 1.0))
-    return b"".join(blocks)
-
-
-def _blocks(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield the size of the file and a block of it, again and again."""
-    try:
-        with path.open("rb") as file:
-            size = max(path.stat().st_size, 1)
-            while block := file.read(_READ_BYTES):
-                yield size, block
-    except OSError as problem:
-        raise _unreadable(path, problem) from problem
-
-
-def _unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
-    """Return the error for a file that the system does not give."""
-    if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
-        return path_error(path, "there is no such file; check the name and the folder")
-    if isinstance(problem, IsADirectoryError):
-        return path_error(path, "this is a folder; choose a mesh file in it")
-    if isinstance(problem, PermissionError):
-        remedy = "no permission; change its permissions or copy it to another folder"
-    else:
-        remedy = f"{problem.strerror or problem}; check the disk, or copy the file elsewhere"
-    return path_error(path, f"cannot be read: {remedy}")
+        raise unreadable(path, problem) from problem
 
 
 def write(

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 
 from slideviz.mesh.check import printable
+from slideviz.mesh.io.source import Source
 from slideviz.mesh.io.su2_halo import find_halo
+from slideviz.mesh.io.su2_lines import Lines, Rows, number_of
 from slideviz.mesh.io.su2_numbers import parse_cells, parse_points
-from slideviz.mesh.io.su2_scan import Lines, Progress, scan
+from slideviz.mesh.io.su2_scan import Progress, scan
 from slideviz.mesh.io.su2_sections import find_bounds, find_sections
 from slideviz.mesh.io.su2_zone import find_zone
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
-_SCANNED = 0.4
+_SCANNED = 0.2
 """Fraction of the time for reading that finding the lines takes."""
 
 
@@ -24,10 +25,10 @@ class Document:
 
     Attributes
     ----------
-    raw : bytes
+    raw : Source
         The whole file.
-    begins, ends : (n, d) int64
-        First byte of each coordinate, and the byte after its last.
+    rows : tuple of Piece
+        Where the points are in it.
     points : (n, d) float64
         The points as read.
     cells : Cells
@@ -40,9 +41,8 @@ class Document:
         First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
     """
 
-    raw: bytes
-    begins: IntArray
-    ends: IntArray
+    raw: Source
+    rows: Rows
     points: FloatArray
     cells: Cells
     markers: tuple[Marker, ...]
@@ -51,15 +51,13 @@ class Document:
     kept: tuple[tuple[int, int], ...]
 
 
-def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> Mesh:
+def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
     """Return one zone of an SU2 file.
 
     Parameters
     ----------
-    path : Path
-        The file, for messages.
-    data : bytes
-        Its content.
+    raw : Source
+        The file.
     zone : int or None
         The zone, from 1; None for the first.
     progress : callable
@@ -70,23 +68,25 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
     MeshError
         The file has a mistake; the message has the line.
     """
-    lines = scan(data, printable(path), lambda done: progress(_SCANNED * done))
+    lines = scan(raw, lambda done: progress(_SCANNED * done))
     sections = find_sections(lines)
     found = find_zone(lines, sections, find_bounds(lines, sections, zone))
-    sizes = [len(found.elements), len(found.points), *(len(m.rows) for m in found.markers)]
+    n_points = number_of(found.points)
+    sizes = [
+        rows[-1].end - rows[0].begin if rows else 0
+        for rows in (found.elements, found.points, *(m.rows for m in found.markers))
+    ]
     first, second, *rest = _shares(sizes, progress)
-    cells = parse_cells(lines, found.elements, found.dim, len(found.points), first)
-    points, begins, ends = parse_points(lines, found.points, found.dim, second)
+    cells = parse_cells(lines, found.elements, found.dim, n_points, first)
+    points = parse_points(lines, found.points, found.dim, second)
     markers = tuple(
-        Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, len(points), share))
+        Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, n_points, share))
         for part, share in zip(found.markers, rest, strict=True)
     )
-    points = frozen_array(points, float)
     progress(1.0)
     document = Document(
-        raw=data,
-        begins=frozen_array(begins, int),
-        ends=frozen_array(ends, int),
+        raw=raw,
+        rows=found.points,
         points=points,
         cells=cells,
         markers=markers,
@@ -99,10 +99,10 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
         cells=cells,
         markers=markers,
         document=document,
-        name=printable(path.name),
+        name=printable(raw.path.name),
         zone=found.bounds.number,
         zones=found.bounds.zones,
-        source=path.resolve(),
+        source=raw.path.resolve(),
     )
     halo, remarks = find_halo(lines, found, mesh)
     return replace(mesh, halo=halo, remarks=remarks)
@@ -110,7 +110,7 @@ def read_su2(path: Path, data: bytes, zone: int | None, progress: Progress) -> M
 
 def _bytes(lines: Lines, ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
     """Return the bounds in bytes of ranges of lines."""
-    return tuple((int(lines.starts[a]), int(lines.starts[b])) for a, b in ranges)
+    return tuple((lines.byte(a), lines.byte(b)) for a, b in ranges)
 
 
 def _shares(sizes: list[int], progress: Progress) -> list[Progress]:

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
-from slideviz.mesh.io.su2_scan import Lines
+from slideviz.mesh.io.su2_lines import Lines
 from slideviz.mesh.io.su2_zone import SendRows, Zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -104,7 +104,8 @@ def _best(
 
 def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | None:
     """Return node and transform of each row, (r, 2), or None where a row is no such thing."""
-    rows = [lines.line(int(row)).split()[:3] for part in parts for row in part.rows]
+    pieces = (piece for part in parts for piece in part.rows)
+    rows = [row.split()[:3] for piece in pieces for _, row in lines.numeric(piece)]
     if not rows or any(len(row) < 3 or not all(w.isdigit() for w in row) for row in rows):
         return None
     table = np.array(rows, dtype="S18").astype(np.int64)

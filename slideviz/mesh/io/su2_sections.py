@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from slideviz.errors import MeshError
-from slideviz.mesh.io.su2_scan import Lines, show
+from slideviz.mesh.io.su2_lines import KEYWORD, Lines, show
 
 _KEY = re.compile(rb"[A-Za-z_]\w*")
 _COUNT = re.compile(rb"\+?\d{1,18}")
@@ -40,7 +40,7 @@ class Bounds:
 def find_sections(lines: Lines) -> list[Section]:
     """Return all sections of the file, in order."""
     heads = []
-    for index in lines.equals.tolist():
+    for index in lines.firsts[:-1][lines.kinds == KEYWORD].tolist():
         key, _, value = lines.line(index).partition(b"=")
         if _KEY.fullmatch(key.strip()):
             heads.append((key.strip().decode().upper(), value.strip(), index))

@@ -6,17 +6,23 @@ Numbers are written with as few digits as identify the float64, so that nothing 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, check_points
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.su2 import Document
+from slideviz.mesh.io.su2_lines import Piece
+from slideviz.mesh.io.su2_scan import BLOCK_BYTES
 from slideviz.mesh.io.su2_zone import SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
 _BLOCK_ROWS = 20_000
+_NUMBER_BYTES = 20
+"""No index has more digits, with the blank after it."""
 
 
 def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
@@ -44,11 +50,13 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
         yield from _markers(mesh.markers, 0)
         return
     raw, (begin, end) = document.raw, document.zone
-    yield raw[:begin]
+    raw.require_same()
+    yield from (raw[a:b] for a, b in _ranges(0, begin))
     yield from _zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
     yield from (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
-    yield raw[end:]
+    yield from (raw[a:b] for a, b in _ranges(end, raw.size))
+    raw.require_same()
 
 
 def _only_points_differ(mesh: Mesh, document: Document) -> bool:
@@ -64,23 +72,49 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
 
 def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
     """Yield the file with every coordinate that changed, in any bit, in its place."""
-    changed = np.flatnonzero(points.view(np.int64) != document.points.view(np.int64))
-    begins, ends = document.begins.ravel()[changed], document.ends.ravel()[changed]
-    values = points.ravel()[changed]
+    raw = document.raw
+    raw.require_same()
     done = 0
-    for i in range(0, len(changed), _BLOCK_ROWS):
-        part = slice(i, i + _BLOCK_ROWS)
-        stop = int(ends[part][-1])
-        text = document.raw[done:stop].decode("latin-1")
-        firsts = (begins[part] - done).tolist()
-        afters = [0, *(ends[part] - done).tolist()]
-        pieces = []
-        for after, first, value in zip(afters, firsts, values[part].tolist(), strict=False):
-            pieces.append(text[after:first])
-            pieces.append(repr(value))
-        yield "".join(pieces).encode("latin-1")
-        done = stop
-    yield document.raw[done:]
+    tasks: list[tuple[int, int] | Piece] = []
+    for piece in document.rows:
+        tasks += [*_ranges(done, piece.begin), piece]
+        done = piece.end
+
+    def text(task: tuple[int, int] | Piece) -> bytes:
+        return raw[slice(*task)] if isinstance(task, tuple) else _piece(document, points, task)
+
+    yield from in_order(text, [*tasks, *_ranges(done, raw.size)])
+    raw.require_same()
+
+
+def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
+    """Return the bounds of blocks of a range of bytes."""
+    return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
+
+
+def _piece(document: Document, points: FloatArray, piece: Piece) -> bytes:
+    """Return some rows of points with every coordinate that changed in its place."""
+    from slideviz.mesh.io.su2_print import print_changed
+
+    text = document.raw[piece.begin : piece.end]
+    mine = slice(piece.row, piece.row + piece.rows)
+    changed = points[mine].view(np.int64) != document.points[mine].view(np.int64)
+    if not changed.any():
+        return text
+    broken = text if text.endswith(b"\n") else text + b"\n"
+    numbers = _digits(points[mine])
+    out = np.empty(len(broken) + len(numbers), np.uint8)
+    rows, size = print_changed(np.frombuffer(broken, np.uint8), numbers, changed, out)
+    if rows != piece.rows:
+        raise document.raw.changed()
+    return out[: size - len(broken) + len(text)].tobytes()
+
+
+def _digits(points: FloatArray) -> NDArray[np.uint8]:
+    """Return the bytes of ``[[x,y],[x,y]]``, with as few digits as identify each float64."""
+    import orjson
+
+    return np.frombuffer(orjson.dumps(points, option=orjson.OPT_SERIALIZE_NUMPY), np.uint8)
 
 
 def _check_name(mesh: Mesh, name: str) -> None:
@@ -101,11 +135,22 @@ def _zone(mesh: Mesh) -> Iterator[bytes]:
     yield f"NDIME= {mesh.dim}\nNELEM= {len(mesh.cells)}\n".encode()
     yield from _elements(mesh.cells, numbered=True)
     yield f"NPOIN= {len(mesh.points)}\n".encode()
-    for i in range(0, len(mesh.points), _BLOCK_ROWS):
-        rows = mesh.points[i : i + _BLOCK_ROWS].tolist()
-        yield "".join(
-            [f"{' '.join(map(repr, row))} {k}\n" for k, row in enumerate(rows, i)]
-        ).encode()
+    yield from in_order(partial(_point_rows, mesh.points), _starts(len(mesh.points)))
+
+
+def _starts(count: int) -> range:
+    """Return the first row of each block."""
+    return range(0, count, _BLOCK_ROWS)
+
+
+def _point_rows(points: FloatArray, first: int) -> bytes:
+    """Return a line for each point of a block: coordinates and index."""
+    from slideviz.mesh.io.su2_print import print_points
+
+    mine = points[first : first + _BLOCK_ROWS]
+    numbers = _digits(mine)
+    out = np.empty(len(numbers) + _NUMBER_BYTES * len(mine), np.uint8)
+    return out[: print_points(numbers, mine.shape[1], first, out)].tobytes()
 
 
 def _markers(markers: tuple[Marker, ...], sends: int) -> Iterator[bytes]:
@@ -117,14 +162,19 @@ def _markers(markers: tuple[Marker, ...], sends: int) -> Iterator[bytes]:
 
 def _elements(cells: Cells, *, numbered: bool) -> Iterator[bytes]:
     """Yield a line for each element: type, nodes, and its index where asked for."""
-    form = {vtk: f"{vtk}{' %d' * (row.n_nodes + numbered)}\n" for vtk, row in ELEMENTS.items()}
-    for i in range(0, len(cells), _BLOCK_ROWS):
-        types = cells.types[i : i + _BLOCK_ROWS].tolist()
-        offsets = cells.offsets[i : i + len(types) + 1]
-        numbers = cells.connectivity[offsets[0] : offsets[-1]]
-        if numbered:
-            numbers = np.insert(numbers, offsets[1:] - offsets[0], np.arange(i, i + len(types)))
-        yield ("".join([form[vtk] for vtk in types]) % tuple(numbers.tolist())).encode()
+    yield from in_order(partial(_cell_rows, cells, numbered), _starts(len(cells)))
+
+
+def _cell_rows(cells: Cells, numbered: bool, first: int) -> bytes:
+    """Return a line for each element of a block."""
+    from slideviz.mesh.io.su2_print import print_cells
+
+    types = cells.types[first : first + _BLOCK_ROWS]
+    offsets = cells.offsets[first : first + len(types) + 1]
+    nodes = cells.connectivity[offsets[0] : offsets[-1]]
+    out = np.empty(_NUMBER_BYTES * (len(nodes) + 2 * len(types)), np.uint8)
+    index = first if numbered else -1
+    return out[: print_cells(types, offsets, nodes, index, out)].tobytes()
 
 
 def _whole(text: bytes) -> bytes:

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.io.su2_scan import Lines, show
+from slideviz.mesh.io.su2_lines import ROWS, Lines, Rows, number_of, show
 from slideviz.mesh.io.su2_sections import KNOWN, Bounds, Section, count_of, misspelt
-from slideviz.mesh.model import IntArray
 
 SEND_RECEIVE = "SEND_RECEIVE"
 _NAME_IT = "; name the marker"
@@ -20,17 +19,11 @@ _COUNT_THEM = "; add it with the number of elements"
 
 
 class SectionRows:
-    """The lines of numbers, and of other text, of each section of a file."""
+    """The rows of numbers, and the lines of other text, of each section of a file."""
 
     def __init__(self, lines: Lines) -> None:
         self.lines = lines
-        self.data_lines = np.flatnonzero(lines.numeric)
-        self.text_lines = np.flatnonzero(~lines.numeric & (lines.words > 0))
-
-    def _numbers(self, section: Section) -> IntArray:
-        """Return the numeric lines of a section."""
-        i, j = np.searchsorted(self.data_lines, [section.line, section.stop])
-        return self.data_lines[i:j]
+        self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
     def none(self, section: Section) -> None:
         """Raise when a section that should have no numbers has some.
@@ -40,16 +33,16 @@ class SectionRows:
         MeshError
             It has some.
         """
-        rows = self._numbers(section)
-        if len(rows):
+        rows = self.lines.pieces(section.line, section.stop)
+        if rows:
             raise self.lines.error(
-                int(rows[0]),
+                self.lines.row(rows, 0),
                 f"numbers stand here after {section.key}= {show(section.value)}, where none "
                 "belong; remove the line or restore the keyword before it",
             )
 
-    def counted(self, section: Section, what: str) -> IntArray:
-        """Return the lines of numbers of a section, (r,).
+    def counted(self, section: Section, what: str) -> Rows:
+        """Return the rows of numbers of a section.
 
         Parameters
         ----------
@@ -62,52 +55,50 @@ class SectionRows:
             They are not as many as the number after the keyword says.
         """
         count = count_of(self.lines, section)
-        rows = self._numbers(section)
-        texts = self.text_lines[
-            np.searchsorted(self.text_lines, section.line, "right") : np.searchsorted(
-                self.text_lines, section.stop
-            )
-        ]
-        last = rows[count - 1] if 0 < count <= len(rows) else section.line
-        if len(texts) and (len(rows) < count or texts[0] < last):
-            word = self.lines.line(int(texts[0])).split()[0]
+        rows = self.lines.pieces(section.line, section.stop)
+        found = number_of(rows)
+        at = int(np.searchsorted(self.text_lines, section.line, "right"))
+        text = int(self.text_lines[at]) if at < len(self.text_lines) else section.stop
+        before = number_of(self.lines.pieces(section.line, text))
+        if text < section.stop and before < count:
+            word = self.lines.line(text).split()[0]
             raise self.lines.error(
-                int(texts[0]),
+                text,
                 f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
                 f"on line {section.line + 1}); correct it",
             )
-        if len(rows) < count:
+        if found < count:
             raise self.lines.error(
                 min(section.stop, len(self.lines) - 1),
-                f"only {len(rows)} {what} precede this line, but {section.key}= {count} (line "
+                f"only {found} {what} precede this line, but {section.key}= {count} (line "
                 f"{section.line + 1}) says {count}; restore the missing lines or correct the count",
             )
-        if len(rows) > count:
+        if found > count:
             raise self.lines.error(
-                int(rows[count]),
+                self.lines.row(rows, count),
                 f"more {what} stand here than {section.key}= {count} (line {section.line + 1}) "
-                f"says: {len(rows)}; correct the count",
+                f"says: {found}; correct the count",
             )
         return rows
 
 
 @dataclass(frozen=True, eq=False)
 class MarkerRows:
-    """A boundary: its name, the line of the name, and the lines of its elements (r,)."""
+    """A boundary: its name, the line of the name, and the rows of its elements."""
 
     name: str
     line: int
-    rows: IntArray
+    rows: Rows
 
 
 @dataclass(frozen=True, eq=False)
 class SendRows:
-    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, ``SEND_TO`` and its rows (r,)."""
+    """A ``SEND_RECEIVE`` marker: its lines ``begin:end``, ``SEND_TO`` and its rows."""
 
     begin: int
     end: int
     domain: bytes
-    rows: IntArray
+    rows: Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +111,8 @@ class Zone:
         Which zone, and its lines.
     dim : int
         2 or 3.
-    elements, points : (r,) int64
-        The lines of the elements and of the points.
+    elements, points : tuple of Piece
+        The rows of the elements and of the points.
     markers : tuple of MarkerRows
         The boundaries.
     sends : tuple of SendRows
@@ -132,8 +123,8 @@ class Zone:
 
     bounds: Bounds
     dim: int
-    elements: IntArray
-    points: IntArray
+    elements: Rows
+    points: Rows
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
     kept: tuple[Section, ...]
@@ -176,7 +167,7 @@ class _Walk:
         elements = self.rows.counted(heads["NELEM"], "elements")
         points = self.rows.counted(heads["NPOIN"], "points")
         for key, rows in (("NELEM", elements), ("NPOIN", points)):
-            if not len(rows):
+            if not rows:
                 raise self.lines.error(
                     heads[key].line, f"{key}= 0 leaves nothing to work on; export the volume mesh"
                 )

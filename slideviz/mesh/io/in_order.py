@@ -1,0 +1,37 @@
+"""Work on the blocks of a file on all cores, its results in order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+def in_order(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+    """Yield what ``work`` returns for each task, in order; what it raises comes in order, too.
+
+    It is done in as many threads as Numba uses, a few tasks ahead, so that many large results do
+    not pile up.
+    """
+    from numba import get_num_threads
+
+    threads = min(get_num_threads(), len(tasks))
+    if threads < 2:
+        yield from map(work, tasks)
+        return
+    waiting: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(threads, "slideviz-blocks") as pool:
+        try:
+            for task in tasks:
+                waiting.append(pool.submit(work, task))
+                if len(waiting) > 2 * threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()

@@ -1,0 +1,115 @@
+"""The bytes of a file that is read piece by piece, and perhaps once more when it is written again.
+
+A large file is not kept in memory but open: replacing it by another of its name, as `atomic_write`
+does, or removing it leaves what is open as it was. Only who changes it in its place changes it
+here, which is noticed. It is not mapped into memory, for a mapped file that is cut off ends the
+program.
+"""
+
+from __future__ import annotations
+
+import os
+import weakref
+from pathlib import Path
+from typing import BinaryIO
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import path_error
+
+KEPT_BYTES = 1 << 26
+"""Files up to this size are kept in memory: they may change while the mesh is worked on."""
+
+
+class Source:
+    """The bytes of a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file, for messages.
+    size : int
+        Number of bytes.
+    """
+
+    def __init__(self, path: Path, content: bytes | BinaryIO) -> None:
+        self.path = path
+        self._content = content if isinstance(content, bytes) else None
+        self._file = None if isinstance(content, bytes) else content
+        self._stamp = self._now()
+        self.size = len(content) if isinstance(content, bytes) else self._stamp[0]
+
+    def __getitem__(self, part: slice) -> bytes:
+        """Return a range of the bytes; may be called from several threads.
+
+        Raises
+        ------
+        MeshError
+            The system does not give them, or the file was changed since it was opened.
+        """
+        if self._file is None:
+            assert self._content is not None
+            return self._content[part]
+        begin, end, _ = part.indices(self.size)
+        pieces = []
+        try:
+            while begin < end:  # the system gives at most 2 GiB at once
+                pieces.append(os.pread(self._file.fileno(), end - begin, begin))
+                if not pieces[-1]:
+                    raise self.changed()
+                begin += len(pieces[-1])
+        except OSError as problem:
+            raise unreadable(self.path, problem) from problem
+        return pieces[0] if len(pieces) == 1 else b"".join(pieces)
+
+    def require_same(self) -> None:
+        """Raise when the file was changed since it was opened.
+
+        Raises
+        ------
+        MeshError
+            It was changed.
+        """
+        if self._now() != self._stamp:
+            raise self.changed()
+
+    def _now(self) -> tuple[int, int]:
+        if self._file is None:
+            return 0, 0
+        found = os.fstat(self._file.fileno())
+        return found.st_size, found.st_mtime_ns
+
+    def changed(self) -> MeshError:
+        """Return the error for a file that was changed since it was opened."""
+        return path_error(self.path, "was changed while it was in use; read it again")
+
+
+def open_source(path: Path) -> Source:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    MeshError
+        It cannot be opened.
+    """
+    try:
+        if path.stat().st_size <= KEPT_BYTES:
+            return Source(path, path.read_bytes())
+        file = path.open("rb")
+        source = Source(path, file)
+    except OSError as problem:
+        raise unreadable(path, problem) from problem
+    weakref.finalize(source, file.close)
+    return source
+
+
+def unreadable(path: Path, problem: OSError | ValueError) -> MeshError:
+    """Return the error for a file that the system does not give."""
+    if isinstance(problem, FileNotFoundError | NotADirectoryError | ValueError):
+        return path_error(path, "there is no such file; check the name and the folder")
+    if isinstance(problem, IsADirectoryError):
+        return path_error(path, "this is a folder; choose a mesh file in it")
+    if isinstance(problem, PermissionError):
+        remedy = "no permission; change its permissions or copy it to another folder"
+    else:
+        remedy = f"{problem.strerror or problem}; check the disk, or copy the file elsewhere"
+    return path_error(path, f"cannot be read: {remedy}")
