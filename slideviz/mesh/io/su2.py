@@ -83,6 +83,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         Marker(part.name, parse_cells(lines, part.rows, found.dim - 1, n_points, share))
         for part, share in zip(found.markers, rest, strict=True)
     )
+    raw.require_same()
     progress(1.0)
     document = Document(
         raw=raw,

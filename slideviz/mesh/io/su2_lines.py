@@ -139,7 +139,10 @@ class Lines:
     def row(self, pieces: Rows, number: int) -> int:
         """Return the number of the line of a row of numbers."""
         piece = next(piece for piece in pieces if number < piece.row + piece.rows)
-        return next(islice(self.numeric(piece), number - piece.row, None))[0]
+        found = next(islice(self.numeric(piece), number - piece.row, None), None)
+        if found is None:
+            raise self.raw.changed()
+        return found[0]
 
     def error(self, index: int, message: str) -> MeshError:
         """Return the error ``file:line: message`` for a line."""

@@ -61,7 +61,7 @@ class SectionRows:
         text = int(self.text_lines[at]) if at < len(self.text_lines) else section.stop
         before = number_of(self.lines.pieces(section.line, text))
         if text < section.stop and before < count:
-            word = self.lines.line(text).split()[0]
+            word = (self.lines.line(text).split() or [b""])[0]
             raise self.lines.error(
                 text,
                 f"'{show(word)}' stands where one of the {count} {what} should be ({section.key} "
