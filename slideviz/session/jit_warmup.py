@@ -1,13 +1,18 @@
-"""JIT warm-up: tiny deformations that make Numba compile, or load, its loops in advance."""
+"""JIT warm-up: tiny meshes, read and deformed to compile, or load, Numba's loops in advance."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Case, Translate
 from slideviz.errors import Cancelled, SlidevizError
+from slideviz.mesh.io.source import Source
+from slideviz.mesh.io.su2 import read_su2
+from slideviz.mesh.io.su2_write import su2_blocks
 from slideviz.samples.table import sample
 from slideviz.session.jobs import Stopped, require_going
 
@@ -25,7 +30,7 @@ _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
 
 
 def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
-    """Deform some cells of the samples, in memory.
+    """Write, read and deform some cells of the samples, in memory.
 
     Parameters
     ----------
@@ -48,9 +53,18 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         contextlib.suppress(Cancelled, SlidevizError),
         event.install_listener("numba:compile", Listener()),
     ):
+        _write_and_read()
         for name, settings in _RUNS:
             require_going(stopped)
             _deform(name, settings, stopped)
+
+
+def _write_and_read() -> None:
+    """Print a mesh as the text of an SU2 file, read it, and print it moved, in memory."""
+    mesh = sample("square", size=4).mesh
+    text = Source(Path(mesh.name), b"".join(su2_blocks(replace(mesh, document=None))))
+    read = read_su2(text, None, lambda _: None)
+    b"".join(su2_blocks(read.with_points(read.points / 3.0)))
 
 
 def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:

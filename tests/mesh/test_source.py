@@ -96,14 +96,18 @@ def test_no_change_while_it_is_read_gets_past_the_arrays(row, part):
     assert len(seen) > 1
 
 
+def open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
 def test_open_files_are_closed(tmp_path, monkeypatch):
     monkeypatch.setattr("slideviz.mesh.io.source.KEPT_BYTES", 0)
     path = save(tmp_path, SQUARE)
     gc.collect()
-    before = len(os.listdir("/proc/self/fd"))
+    before = open_files()
     meshes = [read(path) for _ in range(5)]
-    assert len(os.listdir("/proc/self/fd")) == before + 5
+    assert open_files() == before + 5
     assert_same(meshes[0], meshes[4])
     del meshes
     gc.collect()
-    assert len(os.listdir("/proc/self/fd")) == before
+    assert open_files() == before

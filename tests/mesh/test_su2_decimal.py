@@ -1,4 +1,4 @@
-"""Numbers in SU2 text: to the nearest float64 when read, and with the fewest digits when written."""
+"""Numbers in SU2 text: to the nearest float64, and with the fewest digits when written."""
 
 import re
 from fractions import Fraction
@@ -77,7 +77,9 @@ KINDS = {
         lambda r: [
             f"{w}e{q}"
             for w, q in zip(
-                r.integers(0, 2**63, MANY).tolist(), r.integers(-400, 350, MANY).tolist(), strict=True
+                r.integers(0, 2**63, MANY).tolist(),
+                r.integers(-400, 350, MANY).tolist(),
+                strict=True,
             )
         ],
         0.5,
