@@ -32,7 +32,7 @@ def read_words(folder, words: list[str]) -> np.ndarray:
 
 def compiled(words: list[str]) -> tuple[np.ndarray, set[int]]:
     """Return the numbers that the compiled loop finds, and the rows that it leaves."""
-    points, extra = np.empty((len(words) // 2, 2)), np.array([-1, -1])
+    points, extra = np.empty((len(words) // 2, 2)), np.array([0, len(words)])
     odd = np.empty((len(points), 2), np.int64)
     text = np.frombuffer(text_of(words), np.uint8)
     rows, left = point_block(text, 0, points.view(np.uint64), extra, odd)

@@ -158,7 +158,7 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     nodes : (k,) int64
         Receives the nodes.
     odd : (m, 3) int64
-        Receives row, first byte, and the place of the first node, of each row that is left.
+        Receives row, first byte of its line, and place of its first node, of each row left.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
     """
     at, row, k, n = 0, 0, 0, 0
     while at < len(text):
-        begin = _first_word(text, at)
+        line, begin = at, _first_word(text, at)
         if is_numeric(text[begin]):
             kind = _type_of(text, begin)
             size = SIZES[kind]
@@ -175,11 +175,11 @@ def cell_block(text, dim, n_points, types, nodes, odd):  # type: ignore[no-untyp
                 return -1, n
             types[row] = np.uint8(kind)
             at = -1
-            if DIMS[kind] == dim:
+            if DIMS[kind] == dim and _next_word(text, line) == begin:
                 at = _whole_number(text, begin)[1]
                 at = _nodes(text, at, size, n_points, nodes, k)
             if at < 0 or not _ends_row(text, at):
-                odd[n, 0], odd[n, 1], odd[n, 2] = row, begin, k
+                odd[n, 0], odd[n, 1], odd[n, 2] = row, line, k
                 n += 1
             row += 1
             k += size
@@ -211,10 +211,10 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
     points : (m, d) uint64
         Receives the bits of the coordinates.
     extra : (2,) int64
-        Of rows that are not left: receives the most numbers on one, and the first one whose last
-        coordinate is its own number with nothing after it. Both -1 at first.
+        Of rows that are not left: receives the most numbers on one, if more than is there, and
+        the first whose last coordinate is its own number with nothing after it, if before that.
     odd : (m, 2) int64
-        Receives row and first byte of each row that is left.
+        Receives row and first byte of its line of each row that is left.
 
     Returns
     -------
@@ -225,11 +225,11 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
     bits = np.zeros(1, np.uint64)
     value = bits.view(np.float64)
     while at < len(text):
-        begin = _first_word(text, at)
+        line, begin = at, _first_word(text, at)
         if is_numeric(text[begin]):
             if row == len(points):
                 return -1, n
-            at, words = begin, 0
+            at, words = (begin if _next_word(text, line) == begin else -1), 0
             while at >= 0 and text[at] != 10 and text[at] != 37:
                 at = decimal(text, at, bits, 0) if words < dim + 2 else -1
                 if words < dim:
@@ -237,12 +237,12 @@ def point_block(text, first, points, extra, odd):  # type: ignore[no-untyped-def
                 words += 1
                 at = _next_word(text, at) if at >= 0 else -1
             if at < 0 or words < dim:
-                odd[n, 0], odd[n, 1] = row, begin
+                odd[n, 0], odd[n, 1] = row, line
                 n += 1
             else:
                 extra[0] = max(extra[0], words)
-                if words == dim and extra[1] < 0 and value[0] == first + row:
-                    extra[1] = first + row
+                if words == dim and value[0] == first + row:
+                    extra[1] = min(extra[1], first + row)
             row += 1
         at = _next_line(text, max(at, begin))
     return row, n

@@ -73,7 +73,7 @@ def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None
 
 
 def _line_at(lines: Lines, piece: Piece, text: bytes, begin: int) -> tuple[Lines, int, bytes]:
-    """Return the number, and the text without comment, of the row that begins at this byte."""
+    """Return the number, and the text without comment, of the line that begins at this byte."""
     stop = text.index(b"\n", begin)
     return lines, piece.line + text.count(b"\n", 0, begin), text[begin:stop].partition(b"%")[0]
 
@@ -167,7 +167,7 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> Floa
 
     points = np.empty((number_of(rows), dim))
     # Of each piece: the most numbers on a row, and the first row that may have lost a coordinate.
-    found = np.full((len(rows), 2), -1)
+    found = np.full((len(rows), 2), [0, number_of(rows)])
     place = {piece.row: k for k, piece in enumerate(rows)}
 
     def parsed(piece: Piece) -> None:
@@ -184,13 +184,15 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> Floa
             numbers = _point(*_line_at(lines, piece, text, begin), dim)
             mine[row] = numbers[:dim]
             extra[0] = max(extra[0], len(numbers))
+            if len(numbers) == dim and numbers[-1] == piece.row + row:
+                extra[1] = min(extra[1], piece.row + row)
 
     _each(parsed, rows, progress)
     # Where other lines end with an index, a line that has just enough numbers and also ends with
     # its index has lost a coordinate.
-    lost = found[found[:, 1] >= 0, 1]
-    if found[:, 0].max() > dim and len(lost):
-        raise _wrong_count(lines, lines.row(rows, int(lost[0])), dim, dim)
+    lost = int(found[:, 1].min())
+    if found[:, 0].max() > dim and lost < number_of(rows):
+        raise _wrong_count(lines, lines.row(rows, lost), dim, dim)
     points.flags.writeable = False
     return points
 
