@@ -99,6 +99,17 @@ def test_reading(benchmark, cube, tmp_path):
     benchmark.extra_info["bytes_per_second"] = path.stat().st_size / benchmark.stats["min"]
 
 
+@pytest.mark.parametrize("anew", [False, True], ids=["deformed", "anew"])
+def test_writing(benchmark, cube, tmp_path, anew):
+    path = tmp_path / "cube.su2"
+    sv.write(path, cube)
+    mesh = cube if anew else sv.read(path)
+    moved = mesh.with_points(mesh.points * 1.0000001)
+    out = (tmp_path / "out.su2", moved)
+    benchmark.pedantic(sv.write, out, rounds=3, warmup_rounds=1)
+    benchmark.extra_info["bytes_per_second"] = out[0].stat().st_size / benchmark.stats["min"]
+
+
 @pytest.mark.parametrize("name", ["square", "polar", "passage", "hexahedron", "cylindrical"])
 def test_whole_run(benchmark, name, tmp_path):
     write_sample(name, tmp_path)
