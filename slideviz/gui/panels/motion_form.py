@@ -56,7 +56,8 @@ class MotionForm(QWidget):
             tip="How much larger the radius becomes, in percent: 3 is 3 % outwards.",
         )
         self.distance = NumberField(tip="How far outwards besides, in the mesh's length unit.")
-        self.about = Choice(ABOUT, "What stays in place while it turns or grows.")
+        first = {what: ABOUT[what] for what in ("centroid", "point")}
+        self.about = Choice(first, "What stays in place while it turns or grows.")
         self.point = VectorField(tip="The point that stays in place.")
         self.axis = VectorField(
             (0.0, 0.0, 1.0), a_direction, tip="Direction of the axis; its length does not matter."

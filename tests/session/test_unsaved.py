@@ -1,0 +1,63 @@
+"""Unsaved work: the question before it would be lost, and the star in the title."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from slideviz.mesh.quality import quality
+from slideviz.session import changes
+from slideviz.session.state import Frame, Run
+from slideviz.session.unsaved import Unsaved, title_of
+
+
+@pytest.fixture(scope="module")
+def session(passage):
+    """Runs 1 and 2 of the case as it was opened; the second is shown."""
+    frame = Frame(passage.mesh, quality(passage.mesh))
+    opened = changes.open_mesh(frame, None, (), passage.case)
+    runs = tuple(Run(number, opened.case, (frame,), "done") for number in (1, 2))
+    return replace(opened, runs=runs, shown=2, saved=opened.case)
+
+
+def saved(session, *numbers):
+    runs = (replace(run, saved=run.number in numbers) for run in session.runs)
+    return replace(session, runs=tuple(runs))
+
+
+def test_where_all_is_saved_nothing_is_asked(session):
+    unsaved = Unsaved.of(saved(session, 1, 2), busy=False)
+    assert not unsaved.what
+    assert not unsaved.can_save
+
+
+def test_a_mesh_is_asked_about_with_the_runs_that_are_not_shown(session):
+    unsaved = Unsaved.of(session, busy=False)
+    assert unsaved.can_save == ["mesh"]
+    assert unsaved.question("closing") == (
+        "Save the deformed mesh of run 2 before closing?\nThe mesh of run 1 is not saved either."
+    )
+    assert "\n" not in Unsaved.of(saved(session, 1), busy=False).question("closing")
+
+
+def test_the_steps_of_a_run_that_goes_on_cannot_be_saved(session):
+    unsaved = Unsaved.of(saved(session, 1), busy=True)
+    assert not unsaved.can_save
+    assert unsaved.question("closing") == "Run 2 goes on. Lose its steps?"
+    changed = Unsaved.of(saved(changes.set_case(session, steps=7), 1), busy=True)
+    assert changed.can_save == ["case"]
+    assert changed.question("closing").splitlines() == [
+        "Save roles, motions and method as a case before closing?",
+        "Run 2 goes on. Its steps are lost, for it goes on; cancel it to save what there is.",
+    ]
+
+
+def test_a_case_is_asked_about_by_the_name_of_its_file(session):
+    changed = changes.set_case(saved(session, 1, 2), steps=7)
+    named = replace(changed, case=replace(changed.case, source=Path("a.cfg")))
+    unsaved = Unsaved.of(named, busy=False)
+    assert unsaved.question("opening another mesh") == (
+        "Save the changes to a.cfg before opening another mesh?"
+    )
+    assert title_of(named) == "*a.cfg – slideviz"
+    assert title_of(replace(named, saved=named.case)) == "a.cfg – slideviz"
