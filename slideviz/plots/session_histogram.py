@@ -66,15 +66,24 @@ class Counts:
 
 
 def draw_histogram(
-    counts: Counts, session: Session, how: tuple[bool, bool], figure: Figure, style: Style
+    counts: Counts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
 ) -> None:
     """Draw the histogram of a session; nothing without a mesh.
 
-    ``how`` is whether counts are logarithmic, and whether all values there can be are shown.
+    Parameters
+    ----------
+    counts : Counts
+    session : Session
+    figure : Figure
+    style : Style
+    log : bool
+        Whether the axis of the counts is logarithmic.
+    whole : bool
+        Whether the other axis has all values that there can be, not only those of the cells.
     """
     if session.frame is None:
         return
-    what, (log, whole) = shown_measure(session), how
+    what = shown_measure(session)
     limits = counts.limits(session, whole)
     shown, run = counts.of(session, session.frame, limits), session.run_shown
     label = "undeformed" if session.view.frame == 0 or run is None else run.label

@@ -56,7 +56,7 @@ def test_few_runs_are_all_compared_and_unfinished_ones_not(many):
 def legend(session, **view):
     figure = Figure()
     session = changes.set_view(session, **view)
-    draw_histogram(Counts(), session, (True, False), figure, ON_LIGHT)
+    draw_histogram(Counts(), session, figure, ON_LIGHT, log=True, whole=False)
     return figure.axes[0].get_legend()
 
 

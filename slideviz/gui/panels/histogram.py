@@ -234,8 +234,9 @@ class HistogramPanel(Panel):
 
     def drawing(self) -> Draw:
         """Return the function that draws the histogram of the shown step."""
-        session, how = self.store.session, (self.log.isChecked(), self.whole.isChecked())
-        return partial(draw_histogram, self._counts, session, how)
+        log, whole = self.log.isChecked(), self.whole.isChecked()
+        session = self.store.session
+        return partial(draw_histogram, self._counts, session, log=log, whole=whole)
 
     # What the user does ----------------------------------------------------------------
 

@@ -119,15 +119,15 @@ class RunsPanel(Panel):
 
     def _double_clicked(self) -> None:
         """Show the run beside the one that was shown before, or end the comparison with it."""
-        number, (before, frame, beside) = self.tree.number, self.tree.seen_before
+        number, seen = self.tree.number, self.tree.seen_before
         if number is None:
             return
-        if before is None or before == number:
+        if seen.run is None or seen.run == number:
             self.store.change(changes.show_beside, None)
             return
-        self.store.change(changes.show_run, before)
-        self.store.change(changes.show_beside, None if beside == number else number)
-        self.store.change(changes.show_frame, frame)
+        self.store.change(changes.show_run, seen.run)
+        self.store.change(changes.show_beside, None if seen.beside == number else number)
+        self.store.change(changes.show_frame, seen.frame)
 
     def _menu_wanted(self, where: QPoint) -> None:
         item = self.tree.itemAt(where)

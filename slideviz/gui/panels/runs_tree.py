@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from qtpy.QtCore import QAbstractItemModel, QSize, Qt, Signal
 from qtpy.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPalette
@@ -105,6 +106,14 @@ def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QCol
     return option.palette.color(group, QPalette.ColorRole.HighlightedText if chosen else plain)
 
 
+class Seen(NamedTuple):
+    """What was seen when the mouse was pressed: the run, the step, and the run beside it."""
+
+    run: int | None = None
+    frame: int = 0
+    beside: int | None = None
+
+
 class RunTree(QTreeWidget):
     """A row for each run: numbers in columns, and below them a line over the whole width.
 
@@ -146,7 +155,7 @@ class RunTree(QTreeWidget):
         for column in (MIN, MEAN, INVERTED):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
             self.headerItem().setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
-        self.seen_before: tuple[int | None, int, int | None] = (None, 0, None)
+        self.seen_before = Seen()
         self.session: Callable[[], Session] = Session
 
     @property
@@ -182,7 +191,7 @@ class RunTree(QTreeWidget):
         # A double click begins with a click, which shows the run: what was shown before it is
         # what the run is to be compared with.
         now = self.session()
-        self.seen_before = now.shown, now.view.frame, now.view.beside
+        self.seen_before = Seen(now.shown, now.view.frame, now.view.beside)
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
