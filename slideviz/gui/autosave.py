@@ -82,7 +82,7 @@ class Autosave(QObject):
             self._runner.start(self._write, case)
 
     def replace(self, found: Found) -> None:
-        """Remove a session of an earlier start as soon as this one, which is the same, is safe."""
+        """Remove the session of an earlier start once this one, restored from it, is written."""
         self._replaces.append(found)
         self._written = ()
         self.save()

@@ -1,4 +1,4 @@
-"""The tabs of panels that share a place: each can be taken out of it, or closed."""
+"""The tabs of docks: a double click takes a dock out, a right click has its menu."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 

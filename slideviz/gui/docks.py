@@ -214,12 +214,12 @@ class Docks(QObject):
         return None
 
     def follow(self) -> None:
-        """Let the sides follow the window again if they are as wide as nobody has moved them."""
+        """Let the sides follow the width of the window again, where nobody has moved them."""
         shares = self._shares()
         self._widths = shares if self._as_wide_as(shares) else {}
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """Let the sides follow the width of the window, as long as nobody has moved them."""
+        """Let the sides follow the width of the window, where nobody has moved them."""
         resized = event.type() == QEvent.Type.Resize
         if resized and self._widths and self._as_wide_as(self._widths):
             QTimer.singleShot(0, self, self._share_width)

@@ -103,7 +103,7 @@ class Running(QObject):
             self.runner.cancel()
 
     def close(self) -> bool:
-        """End the job; nothing is signalled any more. Return whether its thread has ended."""
+        """End the job without a signal; return whether its thread has ended."""
         self._next = None
         return self.runner.close()
 

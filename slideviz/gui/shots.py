@@ -115,7 +115,7 @@ def open_window(place: Path) -> Iterator[MainWindow]:
 
 
 def photograph(window: MainWindow, path: Path) -> Path:
-    """Write what the screen shows where the window is, and return the path.
+    """Write a picture of the screen at the place of the window, and return the path.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def photograph(window: MainWindow, path: Path) -> Path:
 
 
 def shrink(path: Path) -> None:
-    """Write a PNG picture again with a palette: a third of the size, and it looks the same."""
+    """Reduce a PNG picture to a palette: a third of the size, and no difference is seen."""
     import numpy as np
     from PIL import Image
     from scipy.spatial import KDTree

@@ -197,7 +197,7 @@ def picture_filters(session: Session) -> str:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """Return a folder of that name that does not exist yet; a number is added where it does."""
+    """Return a new folder of a name; a number is added where it exists."""
     path, number = parent / name, 1
     while path.exists():
         number += 1

@@ -1,1 +1,1 @@
-"""The docks of the window, one subject each."""
+"""The panels in the docks of the window, one subject each."""

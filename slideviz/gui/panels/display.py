@@ -1,4 +1,4 @@
-"""The display panel: colours and their range, threshold, points, passages, what is drawn."""
+"""The display panel: colours and their range, threshold, points, passages, toggles."""
 
 # ruff: noqa: N802  (Qt's names)
 

@@ -1,4 +1,4 @@
-"""The histogram: how many cells have which quality, and a brush that shows only some of them."""
+"""The histogram panel: cells by quality, and a brush that sets the threshold."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 

@@ -145,7 +145,7 @@ class MethodPanel(Panel):
         bar.setValue(min(self.more.y(), bar.maximum()))
 
     def lead_to(self, _missing: Requirement) -> None:
-        """Put the cursor where something is put right."""
+        """Put the cursor into the field for a requirement."""
         if not self.watch.focus():
             self.form.fields["sliding"].setFocus()
 

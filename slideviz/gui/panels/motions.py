@@ -1,4 +1,4 @@
-"""The motion panel: the motions of the boundaries, in sequence, and the form for one of them."""
+"""The motion panel: the motions of the boundaries, in sequence, and the editor of one."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 
@@ -39,7 +39,7 @@ HEIGHT, LEAST_HEIGHT = 300, 210
 
 
 class MotionPanel(Panel):
-    """The list of the motions, and the form for the one that is chosen."""
+    """The list of the motions, and the editor of the selected one."""
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
@@ -181,7 +181,7 @@ class MotionPanel(Panel):
         self.editor.focus()
 
     def lead_to(self, missing: Requirement) -> None:
-        """Put the cursor where something is put right; what wants a motion gets one."""
+        """Put the cursor into the field for a requirement; a boundary without a motion gets one."""
         motions = self.store.session.case.motions
         if self.watch.focus():
             return

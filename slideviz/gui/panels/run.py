@@ -28,7 +28,7 @@ SETTINGS = "settings"
 
 
 class RunPanel(Panel):
-    """Buttons to run and cancel, progress, and what a run still needs, as a link to its panel.
+    """Buttons to run and cancel, progress, and the requirements of a run, with links to panels.
 
     Signals
     -------
@@ -74,7 +74,7 @@ class RunPanel(Panel):
         return button
 
     def sync(self, session: Session) -> None:
-        """Show whether a run can start, or its first requirement."""
+        """Show that a run can start, or the first requirement that is not met."""
         # Some checks look at the mesh: not again while only the view changes.
         key = (session.mesh, session.case, session.intersection, session.invalid)
         if key != self._key:
@@ -136,7 +136,7 @@ class RunPanel(Panel):
         self.text.setText(text)
 
     def set_busy(self, what: str) -> None:
-        """Show that a job runs (its name), or with an empty text that none does."""
+        """Show the name of the running job, or with an empty text that none runs."""
         self._busy = what
         self.cancel.setEnabled(True)
         self.bar.setRange(0, 1000)

@@ -136,5 +136,5 @@ class RunsPanel(Panel):
         self.menu(item.data(RUN, NUMBER)).popup(self.tree.viewport().mapToGlobal(where))
 
     def menu(self, number: int) -> QMenu:
-        """Return what can be done with a run."""
+        """Return the menu of a run."""
         return self.actions_.menu(number)

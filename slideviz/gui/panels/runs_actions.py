@@ -67,7 +67,7 @@ class RunActions:
             self.buttons[command.name].setEnabled(able)
 
     def menu(self, number: int) -> QMenu:
-        """Return what can be done with a run."""
+        """Return the menu of a run."""
         session, menu = self.store.session, QMenu(self.panel)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         run = session.run(number)

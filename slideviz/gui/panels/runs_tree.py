@@ -107,7 +107,7 @@ def text_colour(option: QStyleOptionViewItem, plain: QPalette.ColorRole) -> QCol
 
 
 class Seen(NamedTuple):
-    """What was seen when the mouse was pressed: the run, the step, and the run beside it."""
+    """The run, its step and the run beside it that were shown when the mouse was pressed."""
 
     run: int | None = None
     frame: int = 0

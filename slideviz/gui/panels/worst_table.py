@@ -1,4 +1,4 @@
-"""The table of the worst cells: its rows, their order, and the keys."""
+"""The table of the worst cells: model, order of the rows, keys."""
 
 # ruff: noqa: N802, D102  (Qt's names, and its documentation)
 

@@ -77,7 +77,7 @@ class JobRunner(QObject):
         self._stop.set()
 
     def close(self) -> bool:
-        """End the job; nothing is signalled any more. Return whether its thread has ended."""
+        """End the job without a signal; return whether its thread has ended."""
         self._stop.set()
         self._closed = True
         self.blockSignals(True)

@@ -31,7 +31,7 @@ from slideviz.sections.model import Section
 
 
 class RoundHandle(MouseHandle[tuple[Section, Place]]):
-    """A ball on a section about an axis that the mouse changes its size by, as its radius.
+    """A ball on a section about an axis, by which the mouse changes the size of the section.
 
     It lies on what is cut of the mesh, where that is seen, and in front of everything.
 

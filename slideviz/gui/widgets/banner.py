@@ -94,7 +94,7 @@ class Banner(QFrame):
         self.shown.emit(text)
 
     def tell_error(self, error: BaseException) -> None:
-        """Show what an error means; the trace is behind “Details” if it was not expected."""
+        """Show the message of an error; of an unexpected one, the trace is behind “Details”."""
         if isinstance(error, SlidevizError):
             self.tell(str(error), calm=False)
         else:

@@ -85,7 +85,7 @@ def boxed(layout: QLayout) -> QWidget:
 
 
 def grow_fields(form: QFormLayout, spacing: int = 4) -> None:
-    """Let the fields of a form be as wide as it, at a distance in pixels."""
+    """Let the fields of a form take its width, at a vertical distance in pixels."""
     form.setVerticalSpacing(spacing)
     form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
 
@@ -198,7 +198,7 @@ def _completed(box: Any, value: float, changed: Do | None, unit: str, tip: str) 
 
 
 def dialog_buttons(dialog: QDialog, *kinds: QDialogButtonBox.StandardButton) -> QDialogButtonBox:
-    """Return the buttons of a dialog: those that accept it and those that reject it do so."""
+    """Return the buttons of a dialog, connected to its ``accept`` and ``reject``."""
     buttons = QDialogButtonBox()
     for kind in kinds:
         buttons.addButton(kind)

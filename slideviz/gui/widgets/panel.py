@@ -27,7 +27,7 @@ class Panel(QWidget):
         self.store = store
 
     def follow(self, concerns: Callable[[Session, Session], bool] = lambda *_: True) -> None:
-        """Show the session now and after each change, given old and new, that concerns it."""
+        """Show the session now, and after each change for which ``concerns(old, new)`` holds."""
 
         def changed(old: Session, new: Session) -> None:
             if concerns(old, new):
@@ -44,4 +44,4 @@ class Panel(QWidget):
         """Draw what palette and icons do not reach in the colours of another theme."""
 
     def lead_to(self, missing: Requirement) -> None:
-        """Put the cursor where a requirement of a run is met."""
+        """Put the cursor into the field for a requirement of a run."""
