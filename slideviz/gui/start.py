@@ -25,9 +25,8 @@ from qtpy.QtWidgets import (
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import boxed, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.cards import SIZE, card
-from slideviz.gui.widgets.elided import ElidedLabel
 from slideviz.gui.widgets.icons import icon, logo
-from slideviz.gui.widgets.tips import rich_label, wrapped
+from slideviz.gui.widgets.labels import ElidedLabel, rich_label, wrapped
 
 WIDEST = 860
 """Pixels: longer lines would be hard to read."""

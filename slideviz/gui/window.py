@@ -41,9 +41,9 @@ from slideviz.gui.widgets.build import in_column
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import Faults
 from slideviz.gui.widgets.icons import redraw_icons
+from slideviz.gui.widgets.labels import plain_labels
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
-from slideviz.gui.widgets.tips import plain_labels
 from slideviz.mesh.io.file_checks import protected
 from slideviz.mesh.model import Mesh
 from slideviz.scene.scene import Scene

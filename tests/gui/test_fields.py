@@ -7,8 +7,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui.widgets import theme
-from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, short_text
+from slideviz.gui.widgets.fields import Choice, NumberField, short_text
 from slideviz.gui.widgets.vector_field import VectorField
 
 THIRD = 0.005596983152812345

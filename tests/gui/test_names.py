@@ -6,7 +6,7 @@ from qtpy.QtWidgets import QLabel, QMessageBox
 
 from slideviz.gui.start import StartPage
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.labels import wrapped
 
 NAME = '<b>wing</b><img src="a.png">'
 ask_replace = questions.ask_replace

@@ -197,8 +197,7 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
     monkeypatch.undo()
     from qtpy.QtWidgets import QDialog, QLabel
 
-    from slideviz.gui.widgets.choice import Choice
-    from slideviz.gui.widgets.fields import NumberBox
+    from slideviz.gui.widgets.fields import Choice, NumberBox
 
     seen = []
 

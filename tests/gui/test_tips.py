@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui import running
 from slideviz.gui.dialogs.help import MOUSE, shortcut_rows
 from slideviz.gui.widgets.fields import NumberField
-from slideviz.gui.widgets.tips import LETTERS, wrapped
+from slideviz.gui.widgets.labels import LETTERS, wrapped
 from slideviz.session import changes
 
 LONG = "the correction of a blade moves nodes of a shroud that is < 0.01 away " * 4

@@ -25,8 +25,8 @@ from slideviz.gui.widgets.build import dialog_buttons, hint_label, in_column, in
 from slideviz.gui.widgets.command import Now
 from slideviz.gui.widgets.faults import versions
 from slideviz.gui.widgets.icons import logo
+from slideviz.gui.widgets.labels import fixed_font
 from slideviz.gui.widgets.services import Services
-from slideviz.gui.widgets.tips import fixed_font
 
 LOG_LINES = 40
 CLOSE = QDialogButtonBox.StandardButton.Close

@@ -11,7 +11,7 @@ from slideviz.gui.responsiveness.settings import TABLE_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
-from slideviz.gui.widgets.tips import fixed_font
+from slideviz.gui.widgets.labels import fixed_font
 from slideviz.session.motion_table import Rows, table_text, write_table
 
 FILTERS = "Displacements (*.txt)"

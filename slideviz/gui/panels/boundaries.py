@@ -19,10 +19,10 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button
-from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import Choice
 from slideviz.gui.widgets.icons import role_icon
+from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store

@@ -12,9 +12,9 @@ from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
 from slideviz.gui.widgets.command import Command
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.changes import run_requirements
 from slideviz.session.jobs import Doing

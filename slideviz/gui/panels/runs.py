@@ -11,8 +11,8 @@ from slideviz.gui.panels.runs_actions import RunActions
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
 from slideviz.gui.widgets.build import hint_label, in_column
 from slideviz.gui.widgets.icons import icon
+from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.session import changes
 from slideviz.session.runs_table import QUALITY, best, described
 from slideviz.session.runs_words import brief, run_words

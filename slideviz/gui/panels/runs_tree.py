@@ -20,8 +20,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.gui.widgets.elided import ModelIndex
-from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.labels import ModelIndex, wrapped
 from slideviz.session.state import Session
 
 RUN, MIN, MEAN, INVERTED = range(4)

@@ -23,12 +23,11 @@ from slideviz.gui.widgets.build import (
     push_button,
     tool_button,
 )
-from slideviz.gui.widgets.elided import elide_items
 from slideviz.gui.widgets.icons import set_icon
+from slideviz.gui.widgets.labels import elide_items, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PLOT_FILTERS
 from slideviz.gui.widgets.services import Services
-from slideviz.gui.widgets.tips import wrapped
 from slideviz.scene.passages import Period
 from slideviz.sections.model import Section
 from slideviz.session import changes

@@ -9,7 +9,7 @@ from qtpy.QtCore import QAbstractTableModel, Qt, Signal
 from qtpy.QtGui import QBrush, QColor, QKeyEvent, QResizeEvent
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
-from slideviz.gui.widgets.elided import ModelIndex
+from slideviz.gui.widgets.labels import ModelIndex
 from slideviz.gui.widgets.theme import alarm
 from slideviz.mesh.model import FloatArray
 from slideviz.session.inspect import WorstCells

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton
 
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.widgets.build import tool_button
-from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.scene.scene import Scene
 
 

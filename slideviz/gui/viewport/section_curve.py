@@ -13,7 +13,7 @@ from slideviz.color_scheme import Look
 from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.widgets.build import in_column
-from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.gui.widgets.plot_canvas import PlotArea, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.plots.section_curve import Colours, CurveRow, draw_curves

@@ -11,7 +11,7 @@ from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.view_mouse import CellMouse
 from slideviz.gui.widgets.build import in_column
-from slideviz.gui.widgets.elided import ElidedLabel
+from slideviz.gui.widgets.labels import ElidedLabel
 from slideviz.gui.widgets.ruler import Ruler
 from slideviz.scene.flat_scene import FlatScene
 from slideviz.sections.model import Section

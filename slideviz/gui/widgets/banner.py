@@ -26,7 +26,7 @@ from slideviz.gui.widgets.build import (
     tool_button,
 )
 from slideviz.gui.widgets.faults import details_of
-from slideviz.gui.widgets.tips import rich_label
+from slideviz.gui.widgets.labels import rich_label
 
 MOST_LINES = 4
 """Of a message; the rest is behind “Details”."""

@@ -30,7 +30,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.icons import set_icon
-from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.labels import wrapped
 
 Part = QWidget | QLayout | int | None
 """What stands in a row or column: None takes the room that is left, a number is pixels of air."""

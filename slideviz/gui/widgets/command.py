@@ -10,7 +10,7 @@ from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu
 
 from slideviz.gui.widgets.icons import set_icon
-from slideviz.gui.widgets.tips import wrapped
+from slideviz.gui.widgets.labels import wrapped
 from slideviz.session.state import Session
 
 if TYPE_CHECKING:

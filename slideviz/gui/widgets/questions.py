@@ -16,8 +16,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
-from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberBox
+from slideviz.gui.widgets.fields import Choice, NumberBox
 from slideviz.mesh.model import Mesh
 from slideviz.session.formats import formats_for
 
