@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slideviz.cli.options import add_shared, read_case, require_mesh_file
 from slideviz.cli.progress import Bar
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
         epilog="exit codes: 0 compared (also when cells are inverted: the table says it); 1 no "
         "combination could be computed; 130 cancelled, what was finished is in the table",
     )
-    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    add_shared(call, "case")
     call.add_argument(
         "--methods",
         metavar="LIST",
@@ -52,18 +53,12 @@ def add_compare(calls: argparse._SubParsersAction) -> None:
     call.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_compared)"
     )
-    call.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a key of the case; may be repeated",
-    )
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
+    add_shared(call, "set")
+    add_shared(call, "zone")
     call.add_argument(
         "--no-pictures", action="store_true", help="table and plots only, no quality pictures"
     )
-    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_shared(call, "quiet")
     call.set_defaults(command=compare)
 
 
@@ -71,7 +66,6 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.options import read_case
     from slideviz.cli.places import Output, make_folder, require_places
     from slideviz.errors import CaseError
     from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
@@ -79,11 +73,10 @@ def compare(arguments: argparse.Namespace) -> int:
     from slideviz.study.wanted import announcement, refused
 
     case = read_case(arguments)
-    if case.mesh_file is None:
-        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
+    mesh_file = require_mesh_file(arguments, case)
     wanted = _wanted(arguments, case)
     folder = arguments.output or Path(f"{arguments.case.stem}_compared")
-    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
     require_places(arguments, *(Output(table, "compare", named=False) for table in tables))

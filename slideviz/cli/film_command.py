@@ -9,7 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_zoom, changed, read_case, size
+from slideviz.cli.options import (
+    add_changes,
+    add_shared,
+    add_zoom,
+    changed,
+    read_case,
+    require_mesh_file,
+    size,
+)
 from slideviz.terms import QUANTITIES
 
 if TYPE_CHECKING:
@@ -29,7 +37,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         help="deform a mesh and write the steps as MP4, GIF or numbered pictures",
         description="Deform a mesh as a case file says, and write the steps as a film.",
     )
-    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    add_shared(call, "case")
     call.add_argument(
         "-o",
         "--output",
@@ -70,8 +78,8 @@ def add_film(calls: argparse._SubParsersAction) -> None:
         help="show beside it a second run with this change, as SLIDING_MODE=none; repeated: one "
         "run with all of them",
     )
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_shared(call, "zone")
+    add_shared(call, "quiet")
     call.add_argument("--force", action="store_true", help="replace files that exist")
     call.set_defaults(command=film)
 
@@ -116,9 +124,8 @@ def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
     from slideviz.session.state import Frame, Run
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
-    if case.mesh_file is None:
-        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
-    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    mesh_file = require_mesh_file(arguments, case)
+    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     require_detail(arguments.zoom, mesh)
 
     def undeformed(one: Case) -> Frame:

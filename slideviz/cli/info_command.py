@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from slideviz.cli.options import add_shared
+
 
 def add_info(calls: argparse._SubParsersAction) -> None:
     """Add the command ``info`` to the parser."""
     call = calls.add_parser("info", help="what is in a mesh file")
     call.add_argument("mesh", type=Path)
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    call.add_argument("--json", type=Path, metavar="FILE", help="as JSON; - is the terminal")
+    add_shared(call, "zone")
+    add_shared(call, "json")
     call.set_defaults(command=info)
 
 

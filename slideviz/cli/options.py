@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,15 +55,36 @@ def words_of(found: tuple[Path, Mesh] | None) -> str:
     return f"{NONE}; {REMEDY}" if found is None else f"reference: {found[0]}"
 
 
+SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
+    "case": (("case",), {"type": Path, "help": "the case file (.cfg)"}),
+    "zone": (("--zone",), {"type": int, "metavar": "N", "help": "zone of the mesh file, from 1"}),
+    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "print nothing but errors"}),
+    "json": (
+        ("--json",),
+        {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"},
+    ),
+    "set": (
+        ("--set",),
+        {
+            "action": "append",
+            "default": [],
+            "metavar": "KEY=VALUE",
+            "help": "change a key of the case; may be repeated",
+        },
+    ),
+}
+"""Arguments that several commands have: their flags, and what ``add_argument`` takes."""
+
+
+def add_shared(call: argparse.ArgumentParser, name: str, **other: Any) -> None:
+    """Add an argument of `SHARED`, in some of what ``add_argument`` takes another one."""
+    flags, usual = SHARED[name]
+    call.add_argument(*flags, **usual | other)
+
+
 def add_changes(call: argparse.ArgumentParser) -> None:
     """Add the options ``--set`` and ``--steps``, which change the case for one run."""
-    call.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a key of the case for this run; may be repeated",
-    )
+    add_shared(call, "set", help="change a key of the case for this run; may be repeated")
     call.add_argument(
         "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
     )
@@ -78,6 +99,33 @@ def read_case(arguments: argparse.Namespace) -> Case:
     if getattr(arguments, "step_count", None) is not None:
         case = changed(case, [f"STEPS={arguments.step_count}"], "--steps, which is")
     case = case if arguments.zone is None else case.change(zone=arguments.zone)
+    note_case(arguments, case)
+    return case
+
+
+def require_mesh_file(arguments: argparse.Namespace, case: Case) -> Path:
+    """Return the mesh file of a case.
+
+    Raises
+    ------
+    CaseError
+        The case names none.
+    """
+    from slideviz.errors import CaseError
+
+    if case.mesh_file is None:
+        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
+    return case.mesh_file
+
+
+def given_case(arguments: argparse.Namespace) -> Case | None:
+    """Return the case of the option ``--case``, or None."""
+    from slideviz import Case
+    from slideviz.cli.places import note_case
+
+    if arguments.case is None:
+        return None
+    case = Case.read(arguments.case)
     note_case(arguments, case)
     return case
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_reference, reference_of, words_of
+from slideviz.cli.options import add_reference, add_shared, given_case, reference_of, words_of
 from slideviz.terms import METRICS
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         default="knupp",
         help="rbf-slide: hexahedra as that program rates them (default: knupp)",
     )
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    call.add_argument("--json", type=Path, metavar="FILE", help="as JSON; - is the terminal")
+    add_shared(call, "zone")
+    add_shared(call, "json")
     call.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="mesh with quality (.vtu), or .csv"
     )
@@ -34,10 +34,10 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
 
 def quality(arguments: argparse.Namespace) -> int:
     """Print the quality of a mesh, compared with the undeformed one if it is given."""
-    from slideviz import Case, read, write
     from slideviz import quality as rate
+    from slideviz import read, write
     from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.places import Output, note_case, require_places
+    from slideviz.cli.places import Output, require_places
     from slideviz.cli.report import (
         cell_data,
         histogram_lines,
@@ -48,9 +48,7 @@ def quality(arguments: argparse.Namespace) -> int:
     )
 
     is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
-    case = Case.read(arguments.case) if arguments.case else None
-    if case is not None:
-        note_case(arguments, case)
+    case = given_case(arguments)
     require_places(
         arguments,
         Output(arguments.output, "-o", is_mesh=not is_table),

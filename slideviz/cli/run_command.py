@@ -10,7 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.options import add_changes, add_zoom, read_case, size
+from slideviz.cli.options import (
+    add_changes,
+    add_shared,
+    add_zoom,
+    read_case,
+    require_mesh_file,
+    size,
+)
 from slideviz.terms import SLIDES
 
 if TYPE_CHECKING:
@@ -27,10 +34,10 @@ KEPT_BYTES = 1_000_000_000
 def add_run(calls: argparse._SubParsersAction) -> None:
     """Add the command ``run`` to the parser."""
     call = calls.add_parser("run", help="deform a mesh as a case file says")
-    call.add_argument("case", type=Path, help="the case file (.cfg)")
+    add_shared(call, "case")
     call.add_argument("-o", "--output", type=Path, metavar="MESH", help="deformed mesh to write")
     add_changes(call)
-    call.add_argument("--json", type=Path, metavar="FILE", help="report as JSON; - is the terminal")
+    add_shared(call, "json", help="report as JSON; - is the terminal")
     call.add_argument(
         "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
     )
@@ -38,8 +45,8 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     call.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
     call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
     add_zoom(call)
-    call.add_argument("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    call.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    add_shared(call, "zone")
+    add_shared(call, "quiet")
     call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
     call.set_defaults(command=run)
 
@@ -50,19 +57,17 @@ def run(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import tell_lost
     from slideviz.cli.report import cell_data, run_report, save_history, save_json
-    from slideviz.errors import CaseError
     from slideviz.scene.moved import require_detail
 
     begin = time.perf_counter()
     case = read_case(arguments)
-    if case.mesh_file is None:
-        raise CaseError(f"{arguments.case}: MESH_FILENAME is missing; it names the mesh to deform")
+    mesh_file = require_mesh_file(arguments, case)
     output = arguments.output or case.mesh_out or _default_output(case)
     kind = _format_of(output, case)
     qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
     _require_places(arguments, case, output, qualities)
     seconds = {"read": -time.perf_counter()}
-    mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     tell_lost(output, mesh, kind)
     if arguments.picture:
         require_detail(arguments.zoom, mesh)

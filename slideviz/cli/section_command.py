@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from slideviz.case.section_shapes import SECTION_SHAPES, names
-from slideviz.cli.options import NONE, add_reference, reference_of, words_of
+from slideviz.cli.options import NONE, add_reference, add_shared, given_case, reference_of, words_of
 from slideviz.cli.section_options import limits, neighbours, pixels, reader
 from slideviz.terms import COLOUR_MAPS, METRICS, QUANTITIES
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
+    from slideviz.plots.section_picture import Shown
     from slideviz.sections.model import Section
 
 CUT_HELP = "cut them (default in 3D); in 2D: the curve of their numbers along the line"
@@ -81,17 +82,15 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add("--no-title", action="store_false", dest="title", help="leave out the title")
     add("--no-axes", action="store_false", dest="axes", help="leave out axes and their numbers")
     add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
-    add("--zone", type=int, metavar="N", help="zone of the mesh file, from 1")
-    add("--json", type=Path, metavar="FILE", help="numbers of the cut as JSON; - is the terminal")
+    add_shared(call, "zone")
+    add_shared(call, "json", help="numbers of the cut as JSON; - is the terminal")
     call.set_defaults(command=section, wrong_usage=call.error)
 
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
-    from slideviz import Case, quality, read
-    from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.places import Output, note_case, require_places
-    from slideviz.cli.report import save_json
+    from slideviz import quality, read
+    from slideviz.cli.places import Output, require_places
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint
@@ -102,14 +101,11 @@ def section(arguments: argparse.Namespace) -> int:
         section_picture,
     )
     from slideviz.sections.cut import Cutter
-    from slideviz.sections.polygons import joined
     from slideviz.session.passages import show_passages
 
     _check_usage(arguments)
     require_picture_name(arguments.output)
-    case = Case.read(arguments.case) if arguments.case else None
-    if case is not None:
-        note_case(arguments, case)
+    case = given_case(arguments)
     require_places(arguments, Output(arguments.output, "-o"), Output(arguments.json, "--json"))
     mesh = read(arguments.mesh, zone=arguments.zone)
     known = reference_of(arguments, mesh, case)
@@ -120,37 +116,56 @@ def section(arguments: argparse.Namespace) -> int:
     chosen, matrices = _section_and_passages(arguments, mesh, base, case)
     cutter = Cutter.of(mesh)
     pieces = show_passages(cutter, mesh.points, chosen, matrices)
-    # Of the mesh itself, where it is cut: its copies have the same cells.
-    ids = pieces[0].cell_ids if len(pieces[0]) else joined(list(pieces.values())).cell_ids
-    if not len(ids):
+    note = "" if base is not None or painted.label == "skew" else NONE
+    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, matrices), note=note)
+    if not shown.drawn:
         why = chosen.shape.miss(chosen, mesh.points[cutter.used])
         raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
     if arguments.range:
-        painted = painted.within(*arguments.range)
+        shown = replace(shown, paint=painted.within(*arguments.range))
     elif painted.label == "displacement":
-        painted = painted.up_to(ids)
-    name = Path(mesh.name).name
-    note = "" if base is not None or painted.label == "skew" else NONE
-    size, trimmed = arguments.size or SectionStyle.size, arguments.size is None
-    style = SectionStyle(size, trimmed, arguments.edges, arguments.in_space, name)
-    style = replace(style, title=arguments.title, axes=arguments.axes)
-    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, matrices), note=note)
+        shown = replace(shown, paint=painted.up_to(shown.ids))
+    style = SectionStyle(
+        size=arguments.size or SectionStyle.size,
+        trimmed=arguments.size is None,
+        edges=arguments.edges,
+        in_space=arguments.in_space,
+        name=Path(mesh.name).name,
+        title=arguments.title,
+        axes=arguments.axes,
+    )
     section_picture([shown], chosen, arguments.output, style)
-    summary = painted.summary(ids)
+    return _report(arguments, mesh, chosen, shown, known)
+
+
+def _report(
+    arguments: argparse.Namespace,
+    mesh: Mesh,
+    chosen: Section,
+    shown: Shown,
+    known: tuple[Path, Mesh] | None,
+) -> int:
+    """Write or print the numbers of the cut, and return the exit code."""
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.report import save_json
+
+    summary = shown.paint.summary(shown.ids)
     report: dict[str, Any] = {
         "mesh": mesh.name,
         "section": _as_json(chosen),
-        "color": painted.label,
+        "color": shown.paint.label,
         "reference": str(known[0]) if known else None,
+        "passages": len(shown.pieces),
+        "picture": str(arguments.output),
+        **summary,
     }
-    report |= {"passages": len(pieces), "picture": str(arguments.output), **summary}
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")
     else:
-        print(f"{name}: {chosen.describe(mesh.dim)}")
-        print(f"  {painted.sentence(ids)}, worst is cell {summary['worst_cell']}")
-        if note or known:
+        print(f"{Path(mesh.name).name}: {chosen.describe(mesh.dim)}")
+        print(f"  {shown.paint.sentence(shown.ids)}, worst is cell {summary['worst_cell']}")
+        if shown.note or known:
             print(f"  {words_of(known)}")
         print(f"  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE

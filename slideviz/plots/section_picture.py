@@ -9,15 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import PAPER
 from slideviz.errors import CaseError
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import IntArray
 from slideviz.plots.around import draw_around, window
 from slideviz.plots.bar import BELOW, GAP, below, beside, color_bar
 from slideviz.plots.cells import THICKEST, color_scale, draw_cells
 from slideviz.plots.section_curve import Colours, CurveRow, curve_of, draw_curves, position_label
+from slideviz.plots.section_layout import (
+    BAR,
+    ENDS,
+    HIGHER,
+    LETTERS,
+    SIDES,
+    TITLE,
+    aired,
+    arranged,
+    draw_triad,
+    laid_flat,
+    number_axes,
+)
 from slideviz.plots.section_paint import Paint
-from slideviz.plots.section_space import camera, in_space
 from slideviz.plots.style import PRINT
 from slideviz.plots.written import empty_figure, fitted, lay_out, trim, write_figure
 from slideviz.sections.model import Section
@@ -27,24 +38,8 @@ from slideviz.terms import QUANTITIES
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
-TITLE, LETTERS = 10.0, 9.0
-"""Points of the letters of the title, and of all others."""
-_LETTER_WIDTH = 0.075
-"""Inches that a letter of a label takes."""
 _LONGEST = 36
 """Letters of a name at the head of a title."""
-
-_SIDES, _ENDS, _BAR = 0.7, 1.0, 0.7
-"""Inches, about, that numbers and labels take beside the axes, these and titles above and below
-them, and the colour bar on its side; by them it is decided what stands where."""
-_HIGHER = {True: 1.4, False: 2.0}
-"""The picture of two may be so many times as high as that of one, where they are beside or above
-each other."""
-_NARROWEST = 2.2
-"""Inches that two sections beside each other need for their titles."""
-_THIN, _MARGIN = 25.0, 0.02
-"""Sections longer than so many times their height get air around them; all get a little, as a part
-of their length."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +188,7 @@ def draw_section(shown: Sequence[Shown], section: Section, style: SectionStyle) 
         what = section.describe(2 if in_plane else 3)
         words = ", ".join(part for part in (shown[0].name * alone, what) if part)
         named = [f"{one.name}, {one.numbers}" for one in shown] if lines else []
-        _head(figure, (style.name, words), [shown[0].numbers] if alone else named)
+        _head(figure, style.name, words, rest=[shown[0].numbers] if alone else named)
     if lines:
         _curves(figure, shown, section)
     else:
@@ -201,9 +196,8 @@ def draw_section(shown: Sequence[Shown], section: Section, style: SectionStyle) 
     return figure
 
 
-def _head(figure: Any, first: tuple[str, str], rest: Sequence[str]) -> None:
+def _head(figure: Any, name: str, words: str, *, rest: Sequence[str]) -> None:
     """Write the title of a figure; a long name at the head of it makes way for the rest."""
-    name, words = first
     if len(name) > _LONGEST:
         name = f"{name[: _LONGEST // 2]}…{name[-_LONGEST // 2 :]}"
     said = "\n".join([f"{name}: {words}" if name else words, *rest])
@@ -234,11 +228,11 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
     width, height = figure.get_size_inches()
     for one in shown:
         if one.around is not None:
-            box = window(box, one.around, (width - _SIDES - _BAR) / max(height - _ENDS, 0.1))
+            box = window(box, one.around, (width - SIDES - BAR) / max(height - ENDS, 0.1))
     low, high = aired(*box)
     upright, scale = arranged(high - low, (width, height), len(shown))
     if len(shown) > 1:
-        figure.set_size_inches(width, _HIGHER[upright] * height)
+        figure.set_size_inches(width, HIGHER[upright] * height)
         lay_out(figure, "constrained" if upright else "compressed")
     grid = (1, len(shown)) if upright else (len(shown), 1)
     every = figure.subplots(*grid, sharex=True, sharey=True, squeeze=False).ravel()
@@ -246,7 +240,7 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
         axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if len(shown) > 1:
             said = f"{one.name}\n{one.numbers}" if style.title else one.name
-            room = (width - _SIDES - _BAR) / 2.0 if upright else width - _SIDES
+            room = (width - SIDES - BAR) / 2.0 if upright else width - SIDES
             words, size = fitted(said, room, LETTERS)
             axes.set_title(words, fontsize=size)
     paint = shown[0].paint
@@ -263,7 +257,7 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
     color_bar(place, colors, *of, inverted=any(folded), upright=upright)
     figure.draw_without_rendering()
     for axes in every:
-        _dress(axes, labels)
+        number_axes(axes, labels)
     if style.trimmed:
         trim(figure, [every] if upright else [[axes] for axes in every])
     figure.draw_without_rendering()
@@ -274,57 +268,7 @@ def _cells(figure: Any, shown: Sequence[Shown], section: Section, style: Section
             values = one.paint.shown(flat.cells)
             draw_cells(axes, flat, values, colors, edges=THICKEST * style.edges, lit=style.in_space)
     if style.in_space:
-        _triad(figure, shown[0].drawn, section)
-
-
-def arranged(size: FloatArray, inches: tuple[float, float], count: int) -> tuple[bool, float]:
-    """Return whether sections of a size (2,) stand beside each other, and the scale that they have.
-
-    The colour bar of those is at their right; of others, one above the other, it is below. Of one
-    section it stands where the section is larger.
-    """
-    width, height = inches
-    high = {upright: height * (_HIGHER[upright] if count > 1 else 1.0) for upright in (True, False)}
-    rooms = {
-        True: ((width - _SIDES - _BAR) / count, high[True] - _ENDS),
-        False: (width - _SIDES, (high[False] - _BAR) / count - _ENDS),
-    }
-    scale = {key: float((np.maximum(room, 0.1) / size).min()) for key, room in rooms.items()}
-    fits = count == 1 or rooms[True][0] >= _NARROWEST
-    upright = fits and 1.05 * scale[True] >= scale[False]
-    return upright, scale[upright]
-
-
-def aired(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the box with a margin, and not thinner than one part in ``_THIN``."""
-    size = high - low
-    longest = float(size.max()) or 1.0
-    wanted = np.maximum(size + 2 * _MARGIN * longest, longest / _THIN)
-    extra = (wanted - size) / 2.0
-    return low - extra, high + extra
-
-
-def _dress(axes: Any, labels: tuple[Label, Label] | None) -> None:
-    """Give axes that are laid out labels and numbers, as there is room for them."""
-    from matplotlib.ticker import MaxNLocator
-
-    if labels is None:
-        axes.set_axis_off()
-        return
-    axes.tick_params(labelsize=LETTERS - 1, width=0.6, length=3)
-    axes.spines[:].set_linewidth(0.6)
-    sizes = axes.bbox.size / axes.figure.dpi
-    # One number says nothing of the scale: two, where there is room for them.
-    for axis, label, inches, step, two in zip(
-        (axes.xaxis, axes.yaxis), labels, sizes, (0.65, 0.4), (1.3, 0.3), strict=True
-    ):
-        fits = len(label.full) * _LETTER_WIDTH <= inches
-        axis.set_label_text(label.full if fits else label.short, fontsize=LETTERS)
-        fewer = {"prune": "upper"} if inches < two / 3.0 else {}
-        most, least = int(np.clip(inches / step, 1 if fewer else 2, 9)), 2 if inches >= two else 1
-        steps = [1, 2, 2.5, 5, 10]
-        axis.set_major_locator(MaxNLocator(most, steps=steps, min_n_ticks=least, **fewer))
-    axes.label_outer()
+        draw_triad(figure, next(iter(shown[0].drawn.values())), section)
 
 
 def _laid_beside(
@@ -345,49 +289,3 @@ def _laid_beside(
             flat = flat.take(np.argsort(one.paint.inverted[flat.cells], kind="stable"))
         flats.append(flat)
     return flats, labels
-
-
-def laid_flat(
-    pieces: Mapping[int, Polygons], section: Section, space: bool, beside: float | None = None
-) -> tuple[Polygons, tuple[Label, Label] | None]:
-    """Return the pieces as they lie on paper, the nearest last, and what the axes are called.
-
-    In ``space`` the axes have no names. The mesh itself lies where its middle is nearest to that
-    of another, ``beside``.
-    """
-    if space:
-        return in_space(list(pieces.values()), section), None
-    if not any(piece.points[:, 2].any() for piece in pieces.values()):
-        # A 2D mesh, or a plane that lies flat already.
-        return joined(list(pieces.values())), (Label("x", "x"), Label("y", "y"))
-    shape = section.shape
-    own = shape.middle(section, pieces[min(pieces, key=abs)]) if beside is None else beside
-    middles: dict[int, float | None] = {}
-    found: dict[int, Polygons] = {}
-    for numbers in (
-        sorted(number for number in pieces if number >= 0),
-        sorted((number for number in pieces if number < 0), reverse=True),
-    ):
-        # Each passage beside the one before, from the mesh itself outwards.
-        near = middles[min(found)] if found else own
-        for number in numbers:
-            found[number] = shape.flatten(section, pieces[number], near, own)
-            near = middles[number] = shape.middle(section, pieces[number], near)
-    flat = joined([found[number] for number in sorted(found)])
-    return flat.by_depth(), shape.flat_labels(section)
-
-
-def _triad(figure: Any, pieces: Mapping[int, Polygons], section: Section) -> None:
-    """Draw the directions of x, y and z in the lower left corner."""
-    from matplotlib.lines import Line2D
-
-    size, centre = figure.get_size_inches(), np.array([0.55, 0.5])
-    for word, towards in zip(
-        "xyz", camera(next(iter(pieces.values())), section)[:2].T, strict=True
-    ):
-        ends = np.stack([centre, centre + 0.3 * towards]) / size
-        figure.add_artist(Line2D(*ends.T, color=PAPER.text, linewidth=1.0))
-        # An axis that points at the camera has no length, but its letter needs room all the same.
-        beside = towards / max(float(np.linalg.norm(towards)), 1e-12)
-        at = ends[1] + 0.12 * beside / size
-        figure.text(*at, word, fontsize=LETTERS, ha="center", va="center")
