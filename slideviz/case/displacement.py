@@ -97,7 +97,7 @@ def parse_displacements(
         text = _COMMENT.sub("", text)
     lines = text.translate(_SEPARATORS).split("\n")
     table = _table(path, lines, shape[1])
-    problems = _table_problems(table, lines, nodes, (shape[0], of))
+    problems = _table_problems(table, lines, nodes, count=shape[0], of=of)
     if problems:
         raise CaseError(listed(path, problems))
     given, first = np.unique(table[:, 0].astype(np.int64), return_index=True)
@@ -161,10 +161,9 @@ def _columns(dim: int) -> str:
 
 
 def _table_problems(
-    table: FloatArray, lines: list[str], nodes: IntArray, mesh: tuple[int, str]
+    table: FloatArray, lines: list[str], nodes: IntArray, *, count: int, of: str
 ) -> list[Problem]:
     """Return the lines whose node is none of ``nodes``, or was displaced differently before."""
-    count, of = mesh
     index = table[:, 0]
     broken = index != np.floor(index)
     outside = ~broken & ((index < 0) | (index >= count))

@@ -85,14 +85,14 @@ def film(
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
     path = Path(file)
-    figure = film_options(reel.pixels(path), both=session.view.beside is not None)
-    if figure.both:
-        require_pair(figure.size)
+    options = film_options(reel.pixels(path), both=session.view.beside is not None)
+    if options.both:
+        require_pair(options.size)
     with OffscreenRenderer.of_runs(session, zoom) as renderer:
-        runs = renderer.shown(session, figure)
-        titles = _titles_of_runs(runs, figure, renderer.shows_detail, reel.between > 0)
+        runs = renderer.shown(session, options)
+        titles = _titles_of_runs(runs, options, renderer.shows_detail, reel.between > 0)
         yield from images_drawn(
-            filming(renderer, figure, path, reel, titles=titles, overwrite=overwrite)
+            filming(renderer, options, path, reel, titles=titles, overwrite=overwrite)
         )
 
 
@@ -103,7 +103,7 @@ def film_options(size: tuple[int, int], both: bool = False) -> PictureOptions:
 
 def filming(
     renderer: OffscreenRenderer,
-    figure: PictureOptions,
+    options: PictureOptions,
     file: Path,
     reel: Reel,
     *,
@@ -116,7 +116,7 @@ def filming(
     ----------
     renderer : OffscreenRenderer
         Knows the session, whose steps are shown, and the camera.
-    figure : PictureOptions
+    options : PictureOptions
         What an image has.
     file : Path
         A name ending with .mp4 or .gif; a folder, or a pattern such as ``step_%03d.png``.
@@ -132,12 +132,12 @@ def filming(
     SlidevizError
         There are no steps, the film cannot be made like that, or the file cannot be written.
     """
-    runs = renderer.shown(renderer.session, figure)
+    runs = renderer.shown(renderer.session, options)
     for one in runs:
         require_steps(one.frames, file, reel, overwrite)
-    write = titles or _titles(runs[0], figure)
+    write = titles or _titles(runs[0], options)
     count = max(len(one.frames) for one in runs)
-    yield from posing(renderer, figure)
+    yield from posing(renderer, options)
 
     def draw(position: float) -> Generator[object, Any, Pixels]:
         shots = []
@@ -148,24 +148,24 @@ def filming(
                 at = round(position * part, 9 if reel.between else 0)
             shots.append((yield Beside(partial(shot_at, one.frames, at))))
         shown = [_showing(one, shot.frame) for one, shot in zip(runs, shots, strict=True)]
-        return (yield from renderer.drawing(shown, figure, write(shots)))
+        return (yield from renderer.drawing(shown, options, write(shots)))
 
     yield from exposing(count, file, reel, draw)
 
 
-def posing(renderer: OffscreenRenderer, figure: PictureOptions) -> Generator[object, Any, None]:
+def posing(renderer: OffscreenRenderer, options: PictureOptions) -> Generator[object, Any, None]:
     """Aim the camera of a renderer for a film: the step that needs most room is seen whole."""
     yield from renderer.arranging()
     frames = renderer.session.frames
     widest = yield Beside(lambda _: max(range(len(frames)), key=lambda k: frames[k].mesh.extent))
-    renderer.pose(figure, widest)
+    renderer.pose(options, widest)
     yield None
 
 
 def require_pair(size: tuple[int, int]) -> None:
     """Raise SlidevizError where a film is too narrow for two runs beside each other."""
-    figure = film_options(size, both=True)
-    room = panes(figure, figure.gap)[0].size[0]
+    options = film_options(size, both=True)
+    room = panes(options, options.gap)[0].size[0]
     if room < _NARROWEST:
         least = size[0] + 2 * (_NARROWEST - room)
         raise SlidevizError(
@@ -209,9 +209,9 @@ def _showing(session: Session, frame: Frame) -> Session:
     return replace(session, runs=runs, view=view)
 
 
-def _titles(session: Session, figure: PictureOptions) -> Titles:
+def _titles(session: Session, options: PictureOptions) -> Titles:
     """Return what writes run, step and quality above the images."""
-    letters = figure.size[0] / (LETTER_WIDTH * figure.scale)
+    letters = options.size[0] / (LETTER_WIDTH * options.scale)
     longest = LONGEST.format(len(session.frames) - 1)
 
     def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
@@ -222,7 +222,7 @@ def _titles(session: Session, figure: PictureOptions) -> Titles:
 
 
 def _titles_of_runs(
-    runs: Sequence[Session], figure: PictureOptions, detail: bool, between: bool
+    runs: Sequence[Session], options: PictureOptions, detail: bool, between: bool
 ) -> Titles:
     """Return what writes step and quality above the images, and what two runs are called."""
     pair, what = len(runs) == 2, runs[0].view.colour_by
@@ -241,7 +241,7 @@ def _titles_of_runs(
         for frame in one.frames
     ]
     longest = max((line for text in every for line in text.splitlines()), key=len)
-    letters = letters_across(panes(figure, figure.gap)[0] if pair else figure)
+    letters = letters_across(panes(options, options.gap)[0] if pair else options)
 
     def write(shots: Sequence[Shot]) -> tuple[Sequence[str], float]:
         texts = [

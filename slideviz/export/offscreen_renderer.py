@@ -28,7 +28,8 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.scene.moved import Overview, Zoom, lengths
-from slideviz.session.changes import seen_beside, show_frame
+from slideviz.session.changes import show_frame
+from slideviz.session.panes import shown_views
 from slideviz.session.pieces import appearing, whole
 from slideviz.session.state import Session
 
@@ -137,12 +138,9 @@ class OffscreenRenderer:
     @property
     def beside(self) -> Session | None:
         """Return the session of the second view, or None."""
-        other = self.session.view.beside
-        if other is None or (other and self.session.run(other) is None):
-            return None
-        return seen_beside(self.session)
+        return next((one for one in shown_views(self.session) if one is not self.session), None)
 
-    def image(self, figure: PictureOptions) -> Pixels:
+    def image(self, options: PictureOptions) -> Pixels:
         """Return the picture, (height, width, 3), or 4 when it is transparent.
 
         Raises
@@ -150,10 +148,10 @@ class OffscreenRenderer:
         SlidevizError
             The size cannot be drawn.
         """
-        return whole(self.picturing(figure))
+        return whole(self.picturing(options))
 
     def picturing(
-        self, figure: PictureOptions, aim: bool = True, frame: int | None = None
+        self, options: PictureOptions, aim: bool = True, frame: int | None = None
     ) -> Generator[None, None, Pixels]:
         """Return the picture as `image` does, and yield between the pieces of the work.
 
@@ -161,29 +159,28 @@ class OffscreenRenderer:
 
         Parameters
         ----------
-        figure : PictureOptions
+        options : PictureOptions
         aim : bool
             Whether to aim the camera; else it stays where it was for the last picture.
         frame : int, optional
             Another step than the session shows.
         """
         shown = self.session if frame is None else show_frame(self.session, frame)
-        check_size(figure.size)
+        check_size(options.size)
         yield from self.arranging()
-        sessions = self.shown(shown, figure)
+        sessions = self.shown(shown, options)
         if aim:
-            self._aim(sessions[0], figure)
-        return (yield from self.drawing(sessions, figure, headings(sessions, figure)))
+            self._aim(sessions[0], options)
+        return (yield from self.drawing(sessions, options, headings(sessions, options)))
 
-    def shown(self, session: Session, figure: PictureOptions) -> tuple[Session, ...]:
+    def shown(self, session: Session, options: PictureOptions) -> tuple[Session, ...]:
         """Return the sessions in a picture, from left to right: one, or two runs."""
-        other = self.beside if figure.both else None
-        return (session,) if other is None else ordered(session, other)
+        return shown_views(session) if options.both else (session,)
 
     def drawing(
         self,
         sessions: Sequence[Session],
-        figure: PictureOptions,
+        options: PictureOptions,
         titles: tuple[Sequence[str], float],
     ) -> Generator[None, None, Pixels]:
         """Return the picture of one session or two with titles, and yield between the pieces.
@@ -191,28 +188,28 @@ class OffscreenRenderer:
         The camera stays where it is: in both a length is as long. Titles come with the size of
         their letters, where 1 is that of others.
         """
-        words, part = titles
+        words, size = titles
         if len(sessions) == 1:
-            return (yield from self._pane(sessions[0], figure, (words[0], part)))
-        first, second = panes(figure, figure.gap)
-        left = yield from self._pane(sessions[0], first, (words[0], part))
-        right = yield from self._pane(sessions[1], second, (words[1], part))
-        between = np.repeat(left[:, -1:], figure.gap, axis=1)
+            return (yield from self._pane(sessions[0], options, words[0], size))
+        first, second = panes(options, options.gap)
+        left = yield from self._pane(sessions[0], first, words[0], size)
+        right = yield from self._pane(sessions[1], second, words[1], size)
+        between = np.repeat(left[:, -1:], options.gap, axis=1)
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
-    def pose(self, figure: PictureOptions, frame: int | None = None) -> Scene:
+    def pose(self, options: PictureOptions, frame: int | None = None) -> Scene:
         """Return the scene, its camera and colours as for a picture; for a film like it."""
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.arranging():
             pass
-        self._aim(shown, figure)
+        self._aim(shown, options)
         scene: Scene = self._scene
         return scene
 
-    def window(self, figure: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
+    def window(self, options: PictureOptions) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the ranges of x and of y in a picture of a 2D mesh."""
-        self.pose(figure)
-        camera, (width, height) = self._plotter.camera, figure.size
+        self.pose(options)
+        camera, (width, height) = self._plotter.camera, options.size
         unit = 2.0 * camera.parallel_scale / height
         found = []
         for centre, length, shift in zip(
@@ -222,7 +219,7 @@ class OffscreenRenderer:
             found.append((float(low), float(low + length * unit)))
         return found[0], found[1]
 
-    def write(self, figure: PictureOptions, file: Path) -> None:
+    def write(self, options: PictureOptions, file: Path) -> None:
         """Write the picture as a PNG file, whole or not at all.
 
         Raises
@@ -235,85 +232,68 @@ class OffscreenRenderer:
 
         check_png(file)
         data = BytesIO()
-        known = {} if figure.dpi is None else {"dpi": (figure.dpi, figure.dpi)}
-        Image.fromarray(self.image(figure)).save(data, format="PNG", **known)
+        known = {} if options.dpi is None else {"dpi": (options.dpi, options.dpi)}
+        Image.fromarray(self.image(options)).save(data, format="PNG", **known)
         with atomic_write(file) as out:
             out.write(data.getvalue())
 
     def _pane(
-        self,
-        session: Session,
-        figure: PictureOptions,
-        title: tuple[str, float],
+        self, session: Session, options: PictureOptions, words: str, size: float
     ) -> Generator[None, None, Pixels]:
-        self._prepare(session, figure)
+        """Return the picture of one session with a title; ``size`` is that of its letters."""
+        self._prepare(session, options)
         yield
-        plotter, (words, part) = self._plotter, title
+        plotter = self._plotter
         plotter.remove_actor("title", reset_camera=False, render=False)
         if words:
-            room = figure.title_room * figure.scale
+            room = options.title_room * options.scale
             # Those of a film are smaller than its other letters: it has more to say.
-            letters = TITLE * part * figure.scale / (LETTERS if figure.film else 1.0)
+            letters = TITLE * size * options.scale / (LETTERS if options.film else 1.0)
             write_title(plotter, words, self._scene.look, letters, room)
-        name_mark(plotter, self._scene, figure.scale)
-        return image_of(plotter, figure.background == "transparent")
+        name_mark(plotter, self._scene, options.scale)
+        return image_of(plotter, options.background == "transparent")
 
-    def _prepare(self, session: Session, figure: PictureOptions) -> None:
+    def _prepare(self, session: Session, options: PictureOptions) -> None:
         """Show a session in the size of a picture; the camera stays."""
         plotter, scene = self._plotter, self._scene
-        resize(plotter, figure.size)
-        scene.stage.font_scale = figure.scale
-        scene.stage.has_legend = figure.legend
-        scene.stage.has_plate = figure.background != "transparent"
-        scene.update(figure.showing(session))
-        if figure.background == "transparent":
+        resize(plotter, options.size)
+        scene.stage.font_scale = options.scale
+        scene.stage.has_legend = options.legend
+        scene.stage.has_plate = options.background != "transparent"
+        scene.update(options.showing(session))
+        if options.background == "transparent":
             plotter.set_background("white")  # a gradient would stay opaque
-        self._keep_room(figure)
+        self._keep_room(options)
 
-    def _keep_room(self, figure: PictureOptions) -> None:
+    def _keep_room(self, options: PictureOptions) -> None:
         """Keep the rooms of legend and title free of the mesh."""
-        right = self._scene.stage.strip() / figure.size[0]
-        self._plotter.camera.SetWindowCenter(right, figure.top)
+        right = self._scene.stage.strip() / options.size[0]
+        self._plotter.camera.SetWindowCenter(right, options.top)
         self._plotter.renderer.ResetCameraClippingRange()
 
-    def _aim(self, session: Session, figure: PictureOptions) -> None:
+    def _aim(self, session: Session, options: PictureOptions) -> None:
         """Look from where the view looks, in its colours, at what a picture shows."""
         scene, camera, like = self._scene, self._plotter.camera, self.like
-        if figure.both and self.beside is not None:
-            figure = panes(figure, figure.gap)[0]
-        scene.set_look(PAPER if like is None or figure.background != "shown" else like.look)
-        self._prepare(session, figure)
+        if len(self.shown(session, options)) == 2:
+            options = panes(options, options.gap)[0]
+        scene.set_look(PAPER if like is None or options.background != "shown" else like.look)
+        self._prepare(session, options)
         if like is not None:
             scene.take_camera(like)
         if self.overview is not None:
-            scene.look_along(self.overview, self._seen(figure))
-        elif figure.fill:
+            scene.look_along(self.overview, self._seen(options))
+        elif options.fill:
             scene.fit()
         elif like is not None:
-            _keep_width(scene, like)
+            scene.camera.show_width_of(like.camera)
         # Below the title; a detail has the width that was asked for.
         if camera.parallel_projection and not self.shows_detail:
-            camera.parallel_scale = camera.parallel_scale / (1.0 - figure.top)
-        self._keep_room(figure)
+            camera.parallel_scale = camera.parallel_scale / (1.0 - options.top)
+        self._keep_room(options)
 
-    def _seen(self, figure: PictureOptions) -> Iterator[Mesh]:
+    def _seen(self, options: PictureOptions) -> Iterator[Mesh]:
         """Yield the states of the mesh that an overview must show whole."""
         for run in self.session.runs:
             yield from (frame.mesh for frame in run.frames)
-        if figure.film and self.session.mesh is not None:
+        if options.film and self.session.mesh is not None:
             yield self.session.mesh
-
-
-def ordered(first: Session, second: Session) -> tuple[Session, Session]:
-    """Return the sessions of two views, the left one first."""
-    return (second, first) if first.view.swapped else (first, second)
-
-
-def _keep_width(scene: Scene, like: Scene) -> None:
-    """Show as much of the width as another view does, in a picture that is less wide."""
-    free = []
-    for one in (scene, like):
-        width, height = one.plotter.window_size
-        free.append(max(width - one.stage.strip(), 1.0) / max(height, 1))
-    if scene.plotter.camera.parallel_projection and free[0] < free[1]:
-        scene.plotter.camera.parallel_scale *= free[1] / free[0]

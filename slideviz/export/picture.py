@@ -72,14 +72,14 @@ def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixel
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
     session = of_runs(Frame(base, frames[0].quality), runs)
     with OffscreenRenderer.of_runs(session) as renderer:
-        figure = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
-        scene = renderer.pose(figure)
+        options = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
+        scene = renderer.pose(options)
 
-        def draw(run: Run, figure: PictureOptions) -> Pixels:
+        def draw(run: Run, options: PictureOptions) -> Pixels:
             shown = replace(session, shown=run.number)
-            return whole(renderer.drawing([shown], figure, ([""], 1.0)))
+            return whole(renderer.drawing([shown], options, ([""], 1.0)))
 
-        inked = int((draw(runs[0], figure) < WHITE).any(axis=2).sum())
+        inked = int((draw(runs[0], options) < WHITE).any(axis=2).sum())
         # Edges of small cells would hide their colours.
-        figure = replace(figure, edges=inked >= scene.polygons * _SMALL**2)
-        return [draw(run, figure) for run in runs]
+        options = replace(options, edges=inked >= scene.polygons * _SMALL**2)
+        return [draw(run, options) for run in runs]

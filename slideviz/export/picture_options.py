@@ -125,62 +125,62 @@ class PictureOptions:
         return replace(session, view=replace(view, selected=(), marked=marked))
 
 
-def panes(figure: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:
+def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:
     """Return the options of the two halves of a picture of two runs.
 
     The legend is at the right of the second; both have the same room for the mesh.
     """
-    width, height = figure.size
-    strip = STRIP * figure.scale if figure.legend else 0.0
+    width, height = options.size
+    strip = STRIP * options.scale if options.legend else 0.0
     first = max(round((width - strip - gap) / 2.0), 1)
     sizes = (first, height), (max(width - first - gap, 1), height)
     # Letters go by the height, which is that of the whole.
-    lines = 2 if figure.title else 1
+    lines = 2 if options.title else 1
     left, right = (
-        replace(figure, size=size, both=False, named=True, lines=lines) for size in sizes
+        replace(options, size=size, both=False, named=True, lines=lines) for size in sizes
     )
     return replace(left, legend=False), right
 
 
-def title_of(session: Session, figure: PictureOptions) -> str:
+def title_of(session: Session, options: PictureOptions) -> str:
     """Return the words above a picture: run, step and quality; less where it is narrow."""
     frame: Frame | None = session.frame
     assert frame is not None
     steps = len(session.frames) - 1
-    at, letters = min(session.view.frame, steps), figure.size[0] / (LETTER_WIDTH * figure.scale)
-    longest = LONGEST.format(steps) if figure.film else ""
+    at, letters = min(session.view.frame, steps), options.size[0] / (LETTER_WIDTH * options.scale)
+    longest = LONGEST.format(steps) if options.film else ""
     return title_words(session, frame, place_words(at, steps), letters, longest)
 
 
-def titles_of(pair: Sequence[Session], figure: PictureOptions) -> tuple[list[str], float]:
+def titles_of(pair: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
     """Return the words above two pictures beside each other, and how large their letters are.
 
-    ``figure`` is the narrower of both; 1 is the size of other titles.
+    ``options`` is the narrower of both; 1 is the size of other titles.
     """
-    return fitting(pair_titles(pair, figure.title), letters_across(figure))
+    return fitting(pair_titles(pair, options.title), letters_across(options))
 
 
-def headings(shown: Sequence[Session], figure: PictureOptions) -> tuple[list[str], float]:
+def headings(shown: Sequence[Session], options: PictureOptions) -> tuple[list[str], float]:
     """Return the words above a picture of one session or two, and how large their letters are."""
     if len(shown) == 2:
-        return titles_of(shown, panes(figure, figure.gap)[0])
-    if not figure.headed:
+        return titles_of(shown, panes(options, options.gap)[0])
+    if not options.headed:
         return [""], 1.0
-    if figure.heading:
-        return fitting([figure.heading], letters_across(figure))
-    return [title_of(shown[0], figure)], 1.0
+    if options.heading:
+        return fitting([options.heading], letters_across(options))
+    return [title_of(shown[0], options)], 1.0
 
 
-def letters_across(figure: PictureOptions) -> float:
+def letters_across(options: PictureOptions) -> float:
     """Return the number of letters that a line of the title has room for."""
-    letters = LETTER_WIDTH * figure.scale / (LETTERS if figure.film else 1.0)
-    return (1.0 - 2.0 * CAPTION_AT) * figure.size[0] / letters
+    letters = LETTER_WIDTH * options.scale / (LETTERS if options.film else 1.0)
+    return (1.0 - 2.0 * CAPTION_AT) * options.size[0] / letters
 
 
-def words_of_size(figure: PictureOptions) -> str:
+def words_of_size(options: PictureOptions) -> str:
     """Return the size of a picture on paper, or in pixels, in words."""
-    width, height = figure.size
-    if figure.dpi is None:
+    width, height = options.size
+    if options.dpi is None:
         return f"{width} × {height} pixels"
-    across, high = (2.54 * length / figure.dpi for length in figure.size)
+    across, high = (2.54 * length / options.dpi for length in options.size)
     return f"{across:.1f} × {high:.1f} cm on paper, {width} × {height} pixels"

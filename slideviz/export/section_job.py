@@ -21,8 +21,8 @@ from slideviz.scene.passages import Period, matrices
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import CellsInRange
-from slideviz.session.changes import UNDEFORMED, seen_beside
 from slideviz.session.jobs import Doing, Report, Stopped, require_going
+from slideviz.session.panes import shown_views
 from slideviz.session.passages import show_passages
 from slideviz.session.runs_words import run_words
 from slideviz.session.state import Session
@@ -88,15 +88,6 @@ def save_section(
         shown = [replace(shown[0], name=state_words(session), place="")]
     section_picture(shown, section, path, style)
     return path
-
-
-def shown_views(session: Session) -> tuple[Session, ...]:
-    """Return the sessions of the views, the left one first."""
-    other = session.view.beside
-    if other is None or (other != UNDEFORMED and session.run(other) is None):
-        return (session,)
-    second = seen_beside(session)
-    return (second, session) if session.view.swapped else (session, second)
 
 
 def _shown(session: Session, name: str, section: Section) -> Shown:

@@ -11,8 +11,8 @@ import numpy as np
 from slideviz.color_scheme import PAPER
 from slideviz.errors import SlidevizError
 from slideviz.export.offscreen import CAPTION_AT, TITLE
-from slideviz.export.offscreen_renderer import OffscreenRenderer, ordered
-from slideviz.export.picture_options import GAP, PictureOptions, panes, title_of, titles_of
+from slideviz.export.offscreen_renderer import OffscreenRenderer
+from slideviz.export.picture_options import PictureOptions, headings, panes
 from slideviz.export.titles import draw_mark
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.plots.bar import color_bar
@@ -39,14 +39,14 @@ _ORDER = {RIM: 1.3, BAND: 1.4, NAME: 1.5}
 """Above the cells of the mesh, which are at 1, and below its boundaries, which are at 2."""
 
 
-def write_vector(renderer: OffscreenRenderer, figure: PictureOptions, file: Path) -> None:
+def write_vector(renderer: OffscreenRenderer, options: PictureOptions, file: Path) -> None:
     """Write the picture of a 2D mesh as SVG or PDF, whole or not at all.
 
     Parameters
     ----------
     renderer : OffscreenRenderer
         Knows the session and from where to where the view reaches.
-    figure : PictureOptions
+    options : PictureOptions
         What the picture has; its background is white or transparent.
     file : Path
         Ends with .svg or .pdf.
@@ -57,8 +57,8 @@ def write_vector(renderer: OffscreenRenderer, figure: PictureOptions, file: Path
         The mesh is 3D or has too many cells, or the file cannot be written.
     """
     require_vector(renderer.session, file)
-    drawn = draw_vector(renderer, figure)
-    write_figure(drawn, file, drawn.dpi, SlidevizError, figure.background == "transparent")
+    drawn = draw_vector(renderer, options)
+    write_figure(drawn, file, drawn.dpi, SlidevizError, options.background == "transparent")
 
 
 def require_vector(session: Session, file: Path) -> None:
@@ -75,35 +75,30 @@ def require_vector(session: Session, file: Path) -> None:
         )
 
 
-def draw_vector(renderer: OffscreenRenderer, figure: PictureOptions) -> Any:
+def draw_vector(renderer: OffscreenRenderer, options: PictureOptions) -> Any:
     """Return the matplotlib figure of a 2D mesh as the renderer sees it."""
-    dpi = figure.dpi or _SCREEN_DPI
-    width, height = figure.size
-    sheet = empty_figure((width / dpi, height / dpi), dpi)
-    other = renderer.beside if figure.both else None
-    parts = [(renderer.session, figure, 0)]
-    titles: tuple[list[str], float] = [""], 1.0
-    if figure.headed:
-        titles = [title_of(renderer.session, figure)], 1.0
-    if other is not None:
-        gap = round(GAP * figure.scale)
-        left, right = panes(figure, gap)
-        pair = ordered(renderer.session, other)
-        parts = [(pair[0], left, 0), (pair[1], right, left.size[0] + gap)]
-        titles = titles_of(pair, left)
+    dpi = options.dpi or _SCREEN_DPI
+    width, height = options.size
+    figure = empty_figure((width / dpi, height / dpi), dpi)
+    sessions = renderer.shown(renderer.session, options)
+    titles, size = headings(sessions, options)
+    parts = [(options, 0)]
+    if len(sessions) == 2:
+        left, right = panes(options, options.gap)
+        parts = [(left, 0), (right, left.size[0] + options.gap)]
     # The same length of the mesh for each pixel in both.
-    (x, _), y = renderer.window(parts[0][1])
+    (x, _), y = renderer.window(parts[0][0])
     unit = (y[1] - y[0]) / height
-    for (session, part, start), title in zip(parts, titles[0], strict=True):
-        axes = sheet.add_axes((start / width, 0.0, part.size[0] / width, 1.0))
+    for session, (part, start), title in zip(sessions, parts, titles, strict=True):
+        axes = figure.add_axes((start / width, 0.0, part.size[0] / width, 1.0))
         axes.set_axis_off()
         axes.set(xlim=(x, x + part.size[0] * unit), ylim=y)
-        _draw_mesh(axes, session, part, 72.0 / dpi * figure.scale)
-        if part.headed:
-            _title(sheet, part, (title, titles[1]), (start + CAPTION_AT * part.size[0]) / width)
-    if figure.legend:
-        _legend(sheet, renderer.session, figure)
-    return sheet
+        _draw_mesh(axes, session, part, 72.0 / dpi * options.scale)
+        left_end = (start + CAPTION_AT * part.size[0]) / width
+        _title(figure, title, part, size=size, left=left_end)
+    if options.legend:
+        _legend(figure, renderer.session, options)
+    return figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +109,12 @@ class _Paint:
     colors: Any
     edge: float
 
-    def draw(self, axes: Any, cells: Polygons, **options: Any) -> None:
+    def draw(self, axes: Any, cells: Polygons, **style: Any) -> None:
         """Draw cells."""
         if self.values is None:
-            options["facecolors"] = PAPER.cell
+            style["facecolors"] = PAPER.cell
         values = None if self.values is None else self.values[cells.cells]
-        draw_cells(axes, cells, values, self.colors, edges=self.edge, **options)
+        draw_cells(axes, cells, values, self.colors, edges=self.edge, **style)
 
     def lines(self, cut: Polygons) -> dict[str, Any]:
         """Return the colours of the lines that a section cuts of cells."""
@@ -129,7 +124,7 @@ class _Paint:
         return {"array": self.values[cut.cells], "cmap": found.cmap, "norm": found.norm}
 
 
-def _draw_mesh(axes: Any, session: Session, figure: PictureOptions, point: float) -> None:
+def _draw_mesh(axes: Any, session: Session, options: PictureOptions, point: float) -> None:
     """Draw cells, sections and boundaries; ``point`` is the size of a pixel at normal size."""
     from matplotlib.collections import LineCollection
 
@@ -137,7 +132,7 @@ def _draw_mesh(axes: Any, session: Session, figure: PictureOptions, point: float
     assert frame is not None
     assert session.mesh is not None
     mesh, cutter = frame.mesh, Cutter.of(frame.mesh)
-    edge, only = _EDGE * point * figure.edges, None
+    edge, only = _EDGE * point * options.edges, None
     paint = _Paint(None, None, edge)
     if view.colour_by != "role":
         values = frame.shown_values(view.colour_by, session.mesh)
@@ -169,7 +164,7 @@ def _draw_mesh(axes: Any, session: Session, figure: PictureOptions, point: float
         if name not in view.hidden:
             style = {"colors": ROLES[session.role(name)].colour, "linewidths": _LINE * point}
             axes.add_collection(LineCollection(list(_lines(mesh, name)), **style))
-    if figure.marked:
+    if options.marked:
         draw_mark(axes, session, point)
 
 
@@ -179,20 +174,20 @@ def _lines(mesh: Mesh, name: str) -> FloatArray:
     return np.concatenate([part for part in parts if part.shape[1] == 2] or [np.empty((0, 2, 2))])
 
 
-def _title(sheet: Any, figure: PictureOptions, title: tuple[str, float], left: float) -> None:
-    words, part = title
-    high = 1.0 - 0.5 * figure.title_room * figure.scale / figure.size[1]
-    size = part * TITLE * figure.scale * 72.0 / sheet.dpi
-    sheet.text(left, high, words, ha="left", va="center", fontsize=size, color=PAPER.text)
+def _title(figure: Any, words: str, options: PictureOptions, *, size: float, left: float) -> None:
+    """Write a title from ``left`` on, a part of the width; ``size`` 1 is that of other titles."""
+    high = 1.0 - 0.5 * options.title_room * options.scale / options.size[1]
+    points = size * TITLE * options.scale * 72.0 / figure.dpi
+    figure.text(left, high, words, ha="left", va="center", fontsize=points, color=PAPER.text)
 
 
-def _legend(sheet: Any, session: Session, figure: PictureOptions) -> None:
+def _legend(figure: Any, session: Session, options: PictureOptions) -> None:
     """Draw the roles in use, or the colour bar, in the strip at the right, on a plate."""
     from matplotlib.patches import Patch, Rectangle
 
-    width, scale = figure.size[0], figure.scale
-    letters = _LETTERS * scale * 72.0 / sheet.dpi
-    clear = figure.background == "transparent"
+    width, scale = options.size[0], options.scale
+    letters = _LETTERS * scale * 72.0 / figure.dpi
+    clear = options.background == "transparent"
     if session.view.colour_by == "role":
         assert session.mesh is not None
         used = {session.role(name) for name in session.mesh.marker_names}
@@ -203,12 +198,12 @@ def _legend(sheet: Any, session: Session, figure: PictureOptions) -> None:
         ]
         look = {"frameon": not clear, "framealpha": OPACITY, "edgecolor": "none"}
         look |= {"handlelength": 0.8, "handleheight": 0.8, "handletextpad": 0.5}
-        sheet.legend(handles=roles, loc="upper right", fontsize=letters, **look)
+        figure.legend(handles=roles, loc="upper right", fontsize=letters, **look)
         return
     inverted = session.frame is not None and session.frame.quality.inverted > 0
     # Above the plate, which is above the mesh.
     left, wide = 1.0 - (STRIP - 14) * scale / width, 20 * scale / width
-    place = sheet.add_axes((left, 0.16, wide, 0.62), zorder=1)
+    place = figure.add_axes((left, 0.16, wide, 0.62), zorder=1)
     colors = color_scale(session.view.colour_map, session.colour_range)
     bar = color_bar(place, colors, "", letters, inverted=inverted, upright=True)
     bar.outline.set_visible(False)
@@ -217,7 +212,7 @@ def _legend(sheet: Any, session: Session, figure: PictureOptions) -> None:
     place.set_title(name, fontsize=letters, loc="left", color=PAPER.text)
     if not clear:
         box = place.get_tightbbox().padded(6.0 * scale)
-        box = box.transformed(sheet.transFigure.inverted())
-        plate = Rectangle((box.x0, box.y0), 1.0 - box.x0, box.height, transform=sheet.transFigure)
+        box = box.transformed(figure.transFigure.inverted())
+        plate = Rectangle((box.x0, box.y0), 1.0 - box.x0, box.height, transform=figure.transFigure)
         plate.set(facecolor=PAPER.background, alpha=OPACITY, linewidth=0, zorder=0.5, gid="plate")
-        sheet.add_artist(plate)
+        figure.add_artist(plate)

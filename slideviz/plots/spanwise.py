@@ -93,7 +93,14 @@ def along_radius(
         The axis has length zero.
     """
     local = in_axis_frame(mesh.points, axis, origin)
-    return _profile(mesh, values, np.hypot(local[:, 0], local[:, 1]), ("r", layers, label))
+    return _profile(
+        mesh,
+        values,
+        np.hypot(local[:, 0], local[:, 1]),
+        coordinate="r",
+        layers=layers,
+        label=label,
+    )
 
 
 def along(
@@ -118,20 +125,27 @@ def along(
         raise SlidevizError(
             f"direction {direction!r} has no length in this {mesh.dim}D mesh; choose another"
         )
-    return _profile(mesh, values, mesh.points @ axis / length, (name, layers, label))
+    return _profile(
+        mesh, values, mesh.points @ axis / length, coordinate=name, layers=layers, label=label
+    )
 
 
 def _profile(
-    mesh: Mesh, values: FloatArray, height: FloatArray, words: tuple[str, int | None, str]
+    mesh: Mesh,
+    values: FloatArray,
+    height: FloatArray,
+    *,
+    coordinate: str,
+    layers: int | None,
+    label: str,
 ) -> Profile:
-    coordinate, wanted, label = words
     cells = mesh.cells
     if len(values) != len(cells):
         raise SlidevizError(
             f"{len(values)} values for {len(cells)} cells; give one value for each cell"
         )
-    if wanted is not None and wanted < 1:
-        raise SlidevizError(f"{wanted} layers; at least 1 is needed")
+    if layers is not None and layers < 1:
+        raise SlidevizError(f"{layers} layers; at least 1 is needed")
     used = height[cells.nodes]
     low, high = float(used.min()), float(used.max())
     if not high > low:
@@ -139,7 +153,7 @@ def _profile(
     at, first = height[cells.connectivity], cells.offsets[:-1]
     middle = np.add.reduceat(at, first) / np.diff(cells.offsets)
     usual = np.median(np.maximum.reduceat(at, first) - np.minimum.reduceat(at, first))
-    layers = wanted or round(min(max((high - low) / max(usual, 1e-300), 1.0), MOST_LAYERS))
+    layers = layers or round(min(max((high - low) / max(usual, 1e-300), 1.0), MOST_LAYERS))
     layer = np.clip(((middle - low) / (high - low) * layers).astype(np.int64), 0, layers - 1)
     count = np.bincount(layer, minlength=layers)
     minimum = np.full(layers, np.inf)

@@ -76,7 +76,7 @@ def drag(
 
 
 def dragged_size(
-    seen: Seen, section: Section, place: Place, way: tuple[FloatArray, FloatArray]
+    seen: Seen, section: Section, place: Place, *, start: FloatArray, now: FloatArray
 ) -> float:
     """Return the size of a section after a drag of one of its places.
 
@@ -87,10 +87,9 @@ def dragged_size(
         As it was at the start.
     place : (float, float)
         What the mouse holds.
-    way : (2,), (2,) float64
+    start, now : (2,) float64
         From where to where the mouse went, in pixels.
     """
-    start, now = way
     size, ends = section.size, (_LEAST * section.size, shape_of(section).size.high * (1.0 - _LEAST))
     at, slope, steep = drag(seen, section, place, size)
     target = at + now - start

@@ -183,6 +183,15 @@ class Camera:
         self.shift()
         self.stage.plotter.renderer.ResetCameraClippingRange()
 
+    def show_width_of(self, other: Camera) -> None:
+        """Show as much of the width as another camera does, in a view that may be less wide."""
+        free = []
+        for stage in (self.stage, other.stage):
+            width, height = stage.plotter.window_size
+            free.append(max(width - stage.strip(), 1.0) / max(height, 1))
+        if self._camera.parallel_projection and free[0] < free[1]:
+            self._camera.parallel_scale *= free[1] / free[0]
+
     def sees_all(self, slack: float = SLACK) -> bool:
         """Tell whether the boxes around all data sets to be seen are within the view.
 

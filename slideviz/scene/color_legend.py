@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista as pv
@@ -14,6 +14,9 @@ from slideviz.color_scheme import Look
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
 from slideviz.terms import ROLES, ColourByTerm, Role
+
+if TYPE_CHECKING:
+    from slideviz.scene.stage import Stage
 
 OPACITY = 0.82
 """How much of a mesh a plate covers."""
@@ -101,52 +104,49 @@ def set_letters(text: Any, look: Look, size: float) -> None:
     text.SetShadow(False)
 
 
-def add_role_legend(plotter: Any, roles: Sequence[Role], look: Look, font_scale: float) -> None:
+ROLE, NODES = "\u25a0", "\u25cf"
+"""The signs of lines about roles and about nodes."""
+_SIGNS = {ROLE: ("legend:", STRIP - 28, 14), NODES: ("legend:nodes:", STRIP - 25, 12)}
+"""The begin of the names of their actors, the left edge of words and their size, in pixels."""
+
+
+def add_role_legend(stage: Stage, roles: Sequence[Role]) -> None:
     """Write the roles in use into the upper right corner, each with its colour."""
-    for row, role in enumerate(roles):
-        top, term = 14 + 24 * (row + 1), ROLES[role]
-        _line(plotter, ("\u25a0", term.colour, term.label), (top, STRIP - 28, 14), look, font_scale)
+    for row, role in enumerate(roles, start=1):
+        _line(stage, ROLE, ROLES[role].colour, ROLES[role].label, down=14 + 24 * row)
 
 
-def add_point_legend(
-    plotter: Any, words: Sequence[tuple[str, str]], top: float, style: tuple[Look, float]
-) -> float:
+def add_point_legend(stage: Stage, top: float) -> float:
     """Write what points mean below ``top`` pixels; return where the last line ends."""
-    for row, (word, colour) in enumerate(words):
-        _line(plotter, ("\u25cf", colour, word), (top + 21 * (row + 1), STRIP - 25, 12), *style)
-    return top + 21 * len(words)
+    for row, (word, colour) in enumerate(stage.point_words, start=1):
+        _line(stage, NODES, colour, word, down=top + 21 * row)
+    return top + 21 * len(stage.point_words)
 
 
-def _line(
-    plotter: Any,
-    said: tuple[str, str, str],
-    place: tuple[float, float, float],
-    look: Look,
-    font_scale: float,
-) -> None:
-    """Write a sign in its colour and a word, so far below the top and left of the right edge."""
+def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> None:
+    """Write a sign in its colour and a word, so far below the top."""
     import pyvista as pv
     from vtkmodules.vtkRenderingCore import vtkCoordinate
 
-    (sign, colour, word), (down, right, size) = said, place
+    # A role and the nodes of a type may have the same word.
+    prefix, right, size = _SIGNS[sign]
     # Counted from a corner, the place is right in a view of any size.
     corner = vtkCoordinate()
     corner.SetCoordinateSystemToNormalizedViewport()
     corner.SetValue(1.0, 1.0)
-    for what, said_in, edge, letters in (
+    for what, shade, edge, letters in (
         (sign, colour, STRIP - 8, 1.4 * size),
-        (word, look.text, right, size),
+        (word, stage.look.text, right, size),
     ):
         text = pv.Text(what)
         text.GetPositionCoordinate().SetReferenceCoordinate(corner)
         text.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        text.GetPositionCoordinate().SetValue(-edge * font_scale, -down * font_scale)
-        set_letters(text.prop, look, letters * font_scale)
-        text.prop.color = said_in
+        text.GetPositionCoordinate().SetValue(-edge * stage.font_scale, -down * stage.font_scale)
+        set_letters(text.prop, stage.look, letters * stage.font_scale)
+        text.prop.color = shade
         text.prop.SetVerticalJustificationToCentered()
-        # A role and the nodes of a type may have the same word.
-        name = f"legend:{word}:{what}" if sign == "\u25a0" else f"legend:nodes:{word}:{what}"
-        plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
+        name = f"{prefix}{word}:{what}"
+        stage.plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
 
 
 def clear_legend(plotter: Any) -> None:
@@ -158,12 +158,10 @@ def clear_legend(plotter: Any) -> None:
         plotter.remove_scalar_bar(name, render=False)
 
 
-def add_colour_bar(
-    plotter: Any, mapper: Any, what: ColourByTerm, inverted: bool, style: tuple[Look, float]
-) -> None:
+def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool) -> None:
     """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
-    (look, font_scale), title, unit = style, what.label, what.unit
-    bar = plotter.add_scalar_bar(
+    look, font_scale, title, unit = stage.look, stage.font_scale, what.label, what.unit
+    bar = stage.plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
         vertical=True,

@@ -66,20 +66,18 @@ class LegendLayer:
     def _make(self, session: Session) -> None:
         stage, mesh, what = self.stage, session.mesh, session.view.colour_by
         assert mesh is not None
-        style = (stage.look, stage.font_scale)
         self._placed = ()
         # First: what comes after it lies above it.
         self._plate = Plate(stage.plotter, PLATE, stage.look) if stage.has_plate else None
         if what == "role":
             used = {session.role(name) for name in mesh.marker_names}
             roles = [role for role in ROLES if role in used]
-            add_role_legend(stage.plotter, roles, stage.look, stage.font_scale)
-            top = 24.0 * len(roles) + 16
-            self._end = add_point_legend(stage.plotter, stage.point_words, top, style)
+            add_role_legend(stage, roles)
+            self._end = add_point_legend(stage, 24.0 * len(roles) + 16)
             return
         term = COLOUR_BY[what]
-        add_colour_bar(stage.plotter, self._mapper, term, has_inverted(session), style)
-        end = add_point_legend(stage.plotter, stage.point_words, 4.0, style)
+        add_colour_bar(stage, self._mapper, term, has_inverted(session))
+        end = add_point_legend(stage, 4.0)
         self._bar, self._end = (term.label, end + (34 if stage.point_words else 0)), end
 
     def _place(self) -> None:

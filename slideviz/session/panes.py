@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from slideviz.session.changes import UNDEFORMED, set_view, show_beside, show_frame, show_run
+from slideviz.session.changes import (
+    UNDEFORMED,
+    seen_beside,
+    set_view,
+    show_beside,
+    show_frame,
+    show_run,
+)
 from slideviz.session.runs_words import brief, run_words
 from slideviz.session.state import Run, Session
 
@@ -24,6 +31,15 @@ def panes(session: Session) -> tuple[int | None, int | None]:
     """Return the numbers of the runs to the left and to the right; None: no view."""
     first, second = session.shown, session.view.beside
     return (second, first) if session.view.swapped and second is not None else (first, second)
+
+
+def shown_views(session: Session) -> tuple[Session, ...]:
+    """Return the sessions of the views, the left one first."""
+    other = session.view.beside
+    if other is None or (other != UNDEFORMED and session.run(other) is None):
+        return (session,)
+    second = seen_beside(session)
+    return (second, session) if session.view.swapped else (session, second)
 
 
 def show_in(session: Session, pane: int, number: int) -> Session:

@@ -91,8 +91,12 @@ def test_the_ball_follows_the_mouse(seen):
         start, end = (seen(point)[0] for point in ends)
         # Wherever in the ball the mouse has it.
         held = np.array([3.0, -2.0])
-        assert dragged_size(seen, section, place, (start + held, end + held)) == pytest.approx(1.1)
-        assert dragged_size(seen, section, place, (start, start - 1e6 * (end - start))) > 0.0
+        assert dragged_size(
+            seen, section, place, start=start + held, now=end + held
+        ) == pytest.approx(1.1)
+        assert (
+            dragged_size(seen, section, place, start=start, now=start - 1e6 * (end - start)) > 0.0
+        )
 
 
 def test_along_the_radius_upwards_is_outwards():
@@ -102,5 +106,5 @@ def test_along_the_radius_upwards_is_outwards():
     at, way, steep = drag(parallel, section, place, 0.7)
     assert steep
     assert way == pytest.approx((0.0, 100.0))
-    way = at, at + np.array([5.0, 20.0])
-    assert dragged_size(parallel, section, place, way) == pytest.approx(0.9)
+    now = at + np.array([5.0, 20.0])
+    assert dragged_size(parallel, section, place, start=at, now=now) == pytest.approx(0.9)

@@ -295,10 +295,12 @@ def test_the_ball_follows_the_mouse_around_the_apex():
     ends = (CUT.shape.surface(CUT, np.array([place]), angle) for angle in (ANGLE, 41.0))
     start, end = (parallel(point)[0] for point in ends)
     held = np.array([3.0, -2.0])
-    assert dragged_size(parallel, CUT, place, (start + held, end + held)) == pytest.approx(41.0)
+    assert dragged_size(parallel, CUT, place, start=start + held, now=end + held) == pytest.approx(
+        41.0
+    )
     far = 1e6 * (end - start)
-    assert 0.0 < dragged_size(parallel, CUT, place, (start, start - far)) < 1.0
-    assert 80.0 < dragged_size(parallel, CUT, place, (start, start + far)) < 90.0
+    assert 0.0 < dragged_size(parallel, CUT, place, start=start, now=start - far) < 1.0
+    assert 80.0 < dragged_size(parallel, CUT, place, start=start, now=start + far) < 90.0
 
 
 def test_in_2d_it_says_what_it_needs():

@@ -235,8 +235,7 @@ class HistogramPanel(Panel):
     def drawing(self) -> Draw:
         """Return the function that draws the histogram of the shown step."""
         log, whole = self.log.isChecked(), self.whole.isChecked()
-        session = self.store.session
-        return partial(draw_histogram, self._counts, session, log=log, whole=whole)
+        return partial(draw_histogram, self._counts, self.store.session, log=log, whole=whole)
 
     # What the user does ----------------------------------------------------------------
 

@@ -117,7 +117,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
     def pulled(self, grasp: tuple[Section, Place], start: FloatArray, end: FloatArray) -> Section:
         """Return the section with another size."""
         section, place = grasp
-        size = dragged_size(self.seen, section, place, (start, end))
+        size = dragged_size(self.seen, section, place, start=start, now=end)
         return section.sized(rounded(size, section.size))
 
 
