@@ -13,7 +13,7 @@ from slideviz.color_scheme import INTERSECTION_COLOUR
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
@@ -32,7 +32,7 @@ ARRIVED = 0.01
 """Part of its displacement by which a boundary may miss its ghost and still cover it."""
 
 
-class GhostLayer:
+class GhostLayer(Layer):
     """Transparent boundaries: undeformed ones, and moved ones before anything is computed."""
 
     def __init__(self, stage: Stage) -> None:
@@ -53,10 +53,6 @@ class GhostLayer:
         """Forget the mesh."""
         self.moved, self._surfaces, self._actors, self._shapes = {}, {}, {}, {}
         self._session = Session()
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: ghosts need not be seen whole."""
-        return []
 
     def set_moved(self, moved: Mapping[str, FloatArray]) -> None:
         """Draw where boundaries will go: points (u, d) of the nodes of each."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import pyvista as pv
 
-from slideviz.mesh.surfaces import Surface
 from slideviz.scene.color_legend import (
     OPACITY,
     Plate,
@@ -19,14 +17,14 @@ from slideviz.scene.color_legend import (
     place_bar,
     set_letters,
 )
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import COLOUR_BY, ROLES
 
 PLATE = "plate:legend"
 
 
-class LegendLayer:
+class LegendLayer(Layer):
     """The legend of roles or the colour bar, in a strip at the right."""
 
     def __init__(self, stage: Stage) -> None:
@@ -40,17 +38,10 @@ class LegendLayer:
         self._end = 0.0
         self._placed: tuple[int, ...] = ()
 
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
-
     def clear(self) -> None:
         """Forget the mesh."""
         clear_legend(self.stage.plotter)
         self._drawn, self._bar, self._plate = (), None, None
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the legend has a place of its own."""
-        return []
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session; a legend of other words is made anew."""
@@ -118,7 +109,7 @@ COLOURS = ("#c8452f", "#4c9a2a", "#3b7dd8")
 """Those of x, y and z, seen on light and dark alike."""
 
 
-class TriadLayer:
+class TriadLayer(Layer):
     """Three arrows that turn with the camera, with the letters x, y and z."""
 
     def __init__(self, stage: Stage) -> None:
@@ -126,18 +117,11 @@ class TriadLayer:
         self._axes: Any = None
         self._drawn: tuple[object, ...] = ()
 
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
-
     def clear(self) -> None:
         """Hide the arrows, which are no actors of the scene."""
         if self._axes is not None:
             self.stage.plotter.hide_axes()
         self._drawn = ()
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the arrows have a corner of the view."""
-        return []
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,10 @@ import pyvista as pv
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Mesh
-from slideviz.mesh.surfaces import Surface, lifted
+from slideviz.mesh.surfaces import lifted
 from slideviz.scene import actors
 from slideviz.scene.actors import VALUES, part_shape
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.session.inspect import nodes_of
 from slideviz.session.state import Session
 
@@ -23,7 +22,7 @@ IN_FRONT = -66_000.0
 """Units of depth that bring lines and points in front of all else; the whole range is 65536."""
 
 
-class MarkLayer:
+class MarkLayer(Layer):
     """The selected cell: its edges, its sides in the colour of its value, and a dot.
 
     The dot shows where it is when the cell is smaller than a pixel. Where the cell is inside a
@@ -39,19 +38,12 @@ class MarkLayer:
         self.stage = stage
         self.clear()
 
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; nothing yet."""
-
     def clear(self) -> None:
         """Forget the mesh."""
         self.cell: int | None = None
         self._drawn: dict[str, Any] = {}
         # Kept here: a data set that only VTK holds may come back from a mapper without points.
         self._shapes: dict[str, Any] = {}
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the cell is a part of the mesh."""
-        return []
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""

@@ -12,7 +12,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn, see_through
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
@@ -36,7 +36,7 @@ def recoloured(old: Session | None, new: Session) -> bool:
     )
 
 
-class CellLayer:
+class CellLayer(Layer):
     """The cells of a 2D mesh; of a 3D mesh the outside of a part, or of all without markers.
 
     Attributes
@@ -106,7 +106,7 @@ class CellLayer:
         self.stage.edges(self.actor.prop, "edges" in new.view.drawn and not inside, not by_value)
 
 
-class BoundaryLayer:
+class BoundaryLayer(Layer):
     """The boundaries, an actor each, with a band around selected ones.
 
     Attributes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import chain
 from typing import Any
 
@@ -12,9 +11,8 @@ import pyvista as pv
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.surfaces import Surface
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session.passages import find_period, moved, passages, passages_around
 from slideviz.session.state import Session
@@ -80,7 +78,7 @@ def outermost(points: FloatArray) -> FloatArray:
     return np.asarray(points[np.unique((ways @ points.T).argmax(axis=1))])
 
 
-class PassageLayer:
+class PassageLayer(Layer):
     """The neighbouring passages: boundaries, cells of a 2D mesh, and cells of the threshold.
 
     The actors of all neighbours share the data of the scene's own shapes, one mapper and one
@@ -106,9 +104,6 @@ class PassageLayer:
         self._mappers: dict[str, Any] = {}
         self._props: dict[str, Any] = {}
         self._actors: dict[str, list[Any]] = {}
-
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh."""
 
     def clear(self) -> None:
         """Forget the mesh."""

@@ -10,7 +10,7 @@ import pyvista as pv
 
 from slideviz.mesh.model import IntArray
 from slideviz.mesh.surfaces import Surface, lifted
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.session.node_types import NOTHING, NodeTypes, TypedNodes
 from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES
@@ -22,7 +22,7 @@ _COLOUR = "point_colour"
 _RGB = np.array([pv.Color(term.colour).int_rgb for term in NODE_TYPES.values()], np.uint8)
 
 
-class PointLayer:
+class PointLayer(Layer):
     """Nodes drawn as small balls."""
 
     def __init__(self, stage: Stage) -> None:
@@ -44,10 +44,6 @@ class PointLayer:
         self._surfaces, self._actor, self._shape = (), None, None
         self._drawn, self._key = NOTHING, ()
         self.stage.point_words = ()
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries with these nodes are seen whole already."""
-        return []
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,11 +10,10 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.surfaces import Surface
 from slideviz.scene.mesh import recoloured
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
@@ -49,7 +48,7 @@ class SectionDrawn:
         return self.shown.actor
 
 
-class SectionLayer:
+class SectionLayer(Layer):
     """The cuts of the view's sections through the mesh and its neighbouring passages.
 
     Attributes
@@ -67,9 +66,6 @@ class SectionLayer:
         self._lines = CutLines(stage)
         self.clear()
 
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; its sections come with the state of the session."""
-
     def clear(self) -> None:
         """Forget the mesh."""
         self.drawn: dict[str, SectionDrawn] = {}
@@ -78,10 +74,6 @@ class SectionLayer:
         self._lines.clear()
         self._lines_of: tuple[object, ...] = ()
         self._box: tuple[tuple[object, ...], Box] | None = None
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries around the sections are seen whole already."""
-        return []
 
     def pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of the mesh itself, each with the cells of its polygons."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
 from slideviz.mesh.model import FloatArray, Mesh
@@ -14,10 +14,11 @@ from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Session
 
 
-class Layer(Protocol):
+class Layer:
     """A part of the scene that draws one kind of thing.
 
-    Its actors have names of their own, ``kind:name``, and are changed in place.
+    Its actors have names of their own, ``kind:name``, and are changed in place. A layer has those
+    of these methods in which it differs from what they do here.
     """
 
     def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
@@ -30,7 +31,8 @@ class Layer(Protocol):
         """Forget the mesh, whose actors are gone already."""
 
     def shapes(self) -> list[Any]:
-        """Return the data sets that `Camera.fit` shows."""
+        """Return the data sets that `Camera.fit` shows; none where others are around them."""
+        return []
 
 
 class Stage:

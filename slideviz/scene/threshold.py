@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from slideviz.mesh.model import IntArray
-from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, part_shape, see_through
 from slideviz.scene.mesh import CellLayer, looks_inside, recoloured
-from slideviz.scene.stage import Stage
+from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.threshold import cells_in_range
 from slideviz.session.state import Session
 
 NAME = "chosen"
 
 
-class ThresholdLayer:
+class ThresholdLayer(Layer):
     """The cells within the threshold of the view.
 
     In 2D the other cells keep a faint area without lines; in 3D the sides between chosen cells
@@ -44,19 +42,12 @@ class ThresholdLayer:
         self.others = others
         self.clear()
 
-    def open(self, session: Session, surfaces: Sequence[Surface]) -> None:
-        """Draw another mesh; nothing yet."""
-
     def clear(self) -> None:
         """Forget the mesh."""
         self.cells: IntArray | None = None
         self.shape: Any = None
         self.actor: Any = None
         self._faded = False
-
-    def shapes(self) -> list[Any]:
-        """Return nothing: the boundaries around the cells are seen whole already."""
-        return []
 
     @property
     def owner(self) -> IntArray:
