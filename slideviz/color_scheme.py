@@ -19,7 +19,7 @@ INTERSECTION_COLOUR = "#e8112d"
 
 @dataclass(frozen=True)
 class Look:
-    """Colours of a view that belong together.
+    """A color scheme: colours of a view that belong together.
 
     Attributes
     ----------

@@ -84,7 +84,7 @@ Role = Literal["moving", "fixed", "sliding", "periodic", "internal"]
 
 @dataclass(frozen=True)
 class RoleTerm(Term):
-    """A role; ``key`` is the one of a case file that lists the boundaries which have it."""
+    """A role; ``key`` is the key of a case file that lists the boundaries with this role."""
 
     key: str = ""
 
@@ -170,7 +170,7 @@ METHODS: dict[Method, MethodTerm] = {
 
 @dataclass(frozen=True)
 class KernelTerm(Term):
-    """A radial function: its reach is ``compact`` or global; it may need a linear polynomial."""
+    """A radial function with a ``compact`` or a global reach, with a ``polynomial`` or not."""
 
     compact: bool = True
     polynomial: bool = False

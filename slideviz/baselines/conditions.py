@@ -18,7 +18,7 @@ from slideviz.rbf.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The mesh as an elastic body: what stays the same over the steps.
+    """The mesh as an elastic body, the same over all steps.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A row of the table of keys, and the ways to put its value into a case and to get it back."""
+"""A row of the table of keys, and makers of the usual rows."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ Motion = Translate | Rotate | Scale | Radial | FromFile
 
 
 def named(target: Target) -> tuple[str, ...]:
-    """Return the markers that a target names; none where it is all that move."""
+    """Return the markers that a target names; none where the target is all that move."""
     return (target,) * bool(target) if isinstance(target, str) else target
 
 
@@ -203,7 +203,7 @@ class Case:
         return tuple(name for name, given in self.roles.items() if given == role)
 
     def inputs(self) -> dict[Path, str]:
-        """Return the files that are read for it, and what they are in words."""
+        """Return the files that the case is read from or names, and their roles in words."""
         found = {} if self.mesh_file is None else {self.mesh_file: "the input mesh"}
         if self.source is not None:
             found[self.source] = "the case file"

@@ -77,7 +77,7 @@ class Kind:
     span: tuple[int, int] = (0, LARGEST_WHOLE)
 
     def problem(self, text: str) -> str:
-        """Return why a text is no value of the kind; empty where it is one."""
+        """Return why a text is no value of the kind; empty where the text is one."""
         try:
             self.read(text)
         except CaseError as problem:

@@ -1,4 +1,4 @@
-"""Keys of a case file that say how the window showed it; runs without a window ignore them.
+"""Keys of a case file for the view of the window; runs without a window ignore them.
 
 They are kept in ``Case.view`` as values by key; `slideviz.session.keep` puts them into a view.
 """

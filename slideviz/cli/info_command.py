@@ -1,4 +1,4 @@
-"""``slideviz info``: what is in a mesh file."""
+"""``slideviz info``: the content of a mesh file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 
 def info(arguments: argparse.Namespace) -> int:
-    """Print what is in a mesh file."""
+    """Print the content of a mesh file."""
     from slideviz import quality, read
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, require_places

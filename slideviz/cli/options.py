@@ -1,4 +1,4 @@
-"""Options that several commands share, and what their values mean."""
+"""Arguments that several commands share, and the values that they stand for."""
 
 from __future__ import annotations
 

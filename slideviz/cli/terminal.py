@@ -20,7 +20,7 @@ _SIMPLER = str.maketrans({"█": "#", "▏": "|", "…": "...", "’": "'", "“
 
 
 class Terminal:
-    r"""A stream that shows control characters as ``\x1b``, and what cannot be encoded likewise.
+    r"""A stream that shows control characters as ``\x1b``, and others it cannot encode likewise.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Terminal:
             self._stream.write(_encodable(text, self._stream.encoding or "utf-8"))
 
     def flush(self) -> None:
-        """Send what was written."""
+        """Send all text that was written."""
         with self._reporting_failure():
             self._stream.flush()
 

@@ -134,7 +134,7 @@ def _mp4(file: Path, take: Take) -> Iterator[Add]:
 
 @contextmanager
 def closed(pipe: IO[bytes]) -> Iterator[None]:
-    """Close a pipe at the end; what is still in it is lost where nobody reads it any more."""
+    """Close a pipe at the end; unread data is lost where nobody reads any more."""
     try:
         yield
     finally:

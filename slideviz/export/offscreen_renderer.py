@@ -141,7 +141,7 @@ class OffscreenRenderer:
         return next((one for one in shown_views(self.session) if one is not self.session), None)
 
     def image(self, options: PictureOptions) -> Pixels:
-        """Return the picture, (height, width, 3), or 4 when it is transparent.
+        """Return the picture, (height, width, 3), or 4 with a transparent background.
 
         Raises
         ------
@@ -198,7 +198,7 @@ class OffscreenRenderer:
         return np.ascontiguousarray(np.concatenate([left, between, right], axis=1))
 
     def pose(self, options: PictureOptions, frame: int | None = None) -> Scene:
-        """Return the scene, its camera and colours as for a picture; for a film like it."""
+        """Return the scene with camera and colours as for a picture, or for a film."""
         shown = self.session if frame is None else show_frame(self.session, frame)
         for _ in self.arranging():
             pass

@@ -1,4 +1,4 @@
-"""Pictures of what runs did to a mesh, as the command line wants them."""
+"""Pictures of the results of runs, for the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The layout of a section on paper: flat or in space, where what stands, numbers along axes."""
+"""The layout of a section on paper: flat or in space, places of several, numbers along axes."""
 
 from __future__ import annotations
 

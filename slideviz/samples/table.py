@@ -55,7 +55,7 @@ class Streamed:
 
 @dataclass(frozen=True)
 class SampleKind:
-    """A kind of sample: what makes it, and the words for it.
+    """A kind of sample: its maker, and the words for it.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ FILL = 0.94
 
 
 class FlatScene:
-    """One section of a session laid flat, with its neighbours; both axes to the same scale.
+    """One section of a session laid flat, with other passages; both axes to the same scale.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
 
 
 def outermost(points: FloatArray) -> FloatArray:
-    """Return of points (n, 3) those that are furthest in some of `DIRECTIONS` directions.
+    """Return the points of (n, 3) that are furthest in some of `DIRECTIONS` directions.
 
     Seen from any side they fill the room of all, but for a few hundredths.
     """

@@ -1,4 +1,4 @@
-"""What shapes about an axis share: straight lines turned about it, so they lie flat.
+"""The common part of shapes about an axis: straight lines turned about it, so they lie flat.
 
 Such a shape is known by one of its lines: how far it is from the axis, and how it leans. The angle
 around the axis is unrolled, and torn where there is most room.

@@ -53,7 +53,7 @@ class Cone(AboutAxis):
         return np.where(height * cos + radius * sin < 0.0, np.hypot(radius, height), gap)
 
     def quadric(self, section: Section) -> tuple[FloatArray, float]:
-        """Return that radius and height from the apex are in one ratio on it.
+        """Return the weights w (3,) and c of the cone: radius and height are in one ratio.
 
         So they are on its other half, behind the apex; but along no line has the distance from
         this half more than one minimum, and its sign says which root is this half's.

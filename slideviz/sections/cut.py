@@ -50,11 +50,11 @@ class Cutter:
 
     @property
     def used(self) -> IntArray:
-        """Return the nodes of the cells, sorted, each once: what a section can reach."""
+        """Return the nodes of the cells, sorted, each once, which a section can reach."""
         return self._cells.nodes
 
     def cut(self, points: FloatArray, section: Section) -> Polygons:
-        """Return where the section cuts the cells; none where it misses them.
+        """Return the polygons in which the section cuts the cells; none where all are missed.
 
         Parameters
         ----------

@@ -93,7 +93,7 @@ class Circle(InPlane):
 
 
 class Cylinder(AboutAxis):
-    """The cylinder; see `slideviz.sections.shape.Shape` for what its functions return."""
+    """The cylinder; see `slideviz.sections.shape.Shape` for the results of its functions."""
 
     terms = SECTION_SHAPES["cylinder"]
     in_plane = Circle()
@@ -176,7 +176,7 @@ class Cylinder(AboutAxis):
         return 0.0
 
     def lever(self, section: Section, along: float) -> float:
-        """Return 1: it goes as far as the radius grows."""
+        """Return 1: a place goes as far as the radius grows."""
         return 1.0
 
     def girth(self, section: Section, along: float) -> float:

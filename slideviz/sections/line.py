@@ -77,7 +77,7 @@ def along(section: Section) -> FloatArray | None:
 
 
 class Line(InPlane):
-    """A plane in 2D; see `slideviz.sections.shape.InPlane` for what its functions return."""
+    """A plane in 2D; see `slideviz.sections.shape.InPlane` for the results of its functions."""
 
     def can_cut(self, section: Section) -> bool:
         """Return yes; one along the mesh cuts nothing, but is a plane."""

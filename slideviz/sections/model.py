@@ -168,5 +168,5 @@ class Section:
         return words or self.shape.describe(self)
 
     def brief(self, dim: int = 3) -> str:
-        """Return the section in few words, for a list that has what `describe` says beside it."""
+        """Return the section in few words, for a list with `describe` beside them."""
         return self.describe(dim) if dim == 2 else self.shape.brief(self)

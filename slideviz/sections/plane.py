@@ -62,7 +62,7 @@ def plane_axes(section: Section) -> Axes:
 
 
 class Plane(Shape):
-    """The plane; see `slideviz.sections.shape.Shape` for what its functions return."""
+    """The plane; see `slideviz.sections.shape.Shape` for the results of its functions."""
 
     terms = SECTION_SHAPES["plane"]
     in_plane = LINE

@@ -37,7 +37,7 @@ def axis_of(session: Session) -> Around | None:
 
 
 def coordinates(positions: FloatArray, around: Around | None) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the names of coordinates, and those of some places.
+    """Return the names of the coordinates and their values at some places.
 
     Parameters
     ----------

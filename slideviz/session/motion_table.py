@@ -1,4 +1,4 @@
-"""A table of displacements as text: checked while it is typed, rows for all nodes, written."""
+"""A table of displacements as text: checked while it is typed, completed, written."""
 
 from __future__ import annotations
 

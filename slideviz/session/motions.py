@@ -34,7 +34,7 @@ def centroid(mesh: Mesh, names: Iterable[str]) -> tuple[float, ...]:
 
 
 def radial(axis: Axis, point: tuple[float, ...]) -> tuple[float, float, float] | None:
-    """Return the direction from an axis to a point, across the axis; None where it is on it."""
+    """Return the direction from an axis to a point, across the axis; None for points on it."""
     direction, origin = (np.array(values) for values in axis)
     arm = np.array((*point, 0.0)[:3]) - origin
     arm = arm - direction * (arm @ direction) / (direction @ direction)

@@ -176,7 +176,7 @@ class Session:
     newest: int = 0
 
     def inputs(self) -> dict[Path, str]:
-        """Return the files that the session was read from, and what they are in words."""
+        """Return the files that the session was read from, and their roles in words."""
         found = self.case.inputs()
         return found if self.path is None else found | {self.path: "the mesh that is open"}
 
@@ -257,7 +257,7 @@ class Session:
         return max((float(shift) for shift in shifts), default=0.0)
 
     def role(self, marker: str) -> Role:
-        """Return the role of a boundary; those nobody named are fixed."""
+        """Return the role of a boundary; boundaries without one are fixed."""
         return self.case.roles.get(marker, "fixed")
 
 

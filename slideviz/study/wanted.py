@@ -1,4 +1,4 @@
-"""The combinations of a comparison, those that the case or mesh rules out, and words for both."""
+"""The combinations of a comparison, those ruled out by case or mesh, and words for both."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TITLES: Names = (lambda method: COMPARED_METHODS[method][0], lambda mode: MODES[
 def combinations(
     methods: Sequence[str], modes: Sequence[PeriodicMode], steps: Sequence[int]
 ) -> tuple[Combination, ...]:
-    """Return all combinations; those that share work follow each other."""
+    """Return all combinations, with those that share work after each other."""
     return tuple(Combination(*row) for row in product(methods, modes, steps))
 
 
@@ -90,7 +90,7 @@ def announcement(
     cannot: Mapping[Combination, str],
     more: Mapping[str, Sequence[str]],
 ) -> str:
-    """Return lines about what a comparison is going to do.
+    """Return lines about the work of a comparison, before it begins.
 
     Parameters
     ----------

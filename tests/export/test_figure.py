@@ -195,6 +195,15 @@ def test_titles_of_two_runs_have_one_form_and_all_that_sets_them_apart(session, 
     assert drawn(again)[0] > 0, "both lines are in the picture"
 
 
+def test_a_picture_of_another_step_has_it_in_both_views(session, renderer):
+    renderer.session = two_runs(session, sliding="ds")
+    for step in range(3):
+        shown = renderer.shown(changes.show_frame(renderer.session, step), PLAIN)
+        assert [one.view.frame for one in shown] == [step, step]
+    (alone,) = renderer.shown(renderer.session, replace(PLAIN, both=False))
+    assert alone is renderer.session
+
+
 def test_titles_that_are_too_long_get_smaller_then_shorter():
     assert fitting(["ab\ncd", "efg"], 10.0) == (["ab\ncd", "efg"], 1.0)
     titles, part = fitting(["a" * 20, "b\nc"], 16.0)
