@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from slideviz.cli.options import add_shared
+
 
 def add_convert(calls: argparse._SubParsersAction) -> None:
     """Add the command ``convert`` to the parser."""
     call = calls.add_parser("convert", help="write a mesh in another format")
     call.add_argument("mesh", type=Path, help="the mesh to read")
     call.add_argument("output", type=Path, help="the mesh to write; its ending names the format")
-    call.add_argument("--zone", type=int, metavar="N", help="one zone, from 1 (default: all)")
+    add_shared(call, "zone", help="one zone, from 1 (default: all)")
     call.set_defaults(command=convert)
 
 
