@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import atexit
 import os
 import signal
 import sys
@@ -55,6 +56,14 @@ def _heed_signals() -> None:
     signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     for number in heeded:
         signal.signal(number, lambda *_: None)
+    # Of all that is done at the end this comes last, as nothing was registered before.
+    atexit.register(_ignore, heeded)
+
+
+def _ignore(numbers: list[signal.Signals]) -> None:
+    """Ignore signals while Python ends: it would let them kill a command that is done."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _wait(read: int) -> None:

@@ -175,6 +175,21 @@ def test_only_drafts_of_dead_processes_of_this_machine_are_removed(tmp_path):
         assert {path.name for path in drafts(tmp_path)} == {*others, mine.name}
 
 
+@pytest.mark.parametrize("number", SAID)
+def test_a_signal_while_python_ends_changes_no_code(number):
+    """A command that is done has its own code, also while its modules are taken down."""
+    code = (
+        "import os, sys; from slideviz import __main__ as m; m._heed_signals()\n"
+        "class Last:\n"
+        "    def __del__(self, kill=os.kill, pid=os.getpid(), write=os.write):\n"
+        f"        kill(pid, {int(number)}); write(1, b'alive')\n"
+        "last = Last()\n"
+        "sys.exit(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "alive", "")
+
+
 def test_an_ignored_signal_stays_ignored(square):
     """As of a command that a script put into the background, or that nohup started."""
     code = (
