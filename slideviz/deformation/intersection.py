@@ -9,9 +9,12 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
+from slideviz.mesh.caching import njit
 from slideviz.mesh.crossing import Crossing, first_crossing, swept_crossing
+from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import axis_basis, in_axis_frame, pair_up
+from slideviz.mesh.threads import PART, in_parts
 from slideviz.mesh.topology import components, facet_vectors, unit
 
 LOOKED_AT = 5
@@ -194,9 +197,7 @@ def winding(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
     """
     if facets.shape[1] == 2:
         return np.array([_plane(points[facets] - p) for p in at])
-    halves = np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
-    corners = points[halves[halves[:, 1] != halves[:, 2]]]
-    return np.array([_space(corners - p) for p in at])
+    return np.array([_space(points, facets, p) for p in at])
 
 
 def _plane(arms: FloatArray) -> float:
@@ -205,11 +206,35 @@ def _plane(arms: FloatArray) -> float:
     return float(np.arctan2(a * d - b * c, a * c + b * d).sum() / (2.0 * np.pi))
 
 
-def _space(arms: FloatArray) -> float:
-    """Return the winding of triangles with these corners (f, 3, 3) around 0."""
-    a, b, c = arms.transpose(1, 0, 2)
-    u, v, w = np.sqrt((arms * arms).sum(axis=2)).T
-    ab, bc, ca = ((p * q).sum(axis=1) for p, q in ((a, b), (b, c), (c, a)))
-    volume = (a * np.cross(b, c)).sum(axis=1)
-    half = np.arctan2(volume, u * v * w + ab * w + bc * u + ca * v)
-    return float(half.sum() / (2.0 * np.pi))
+def _space(points: FloatArray, facets: IntArray, p: FloatArray) -> float:
+    """Return the winding of facets (f, 4) around a point; sums of parts are added in order."""
+    sums = np.zeros(-(-len(facets) // PART))
+
+    def add(part: slice) -> None:
+        sums[part.start // PART] = _solid_angles(points, facets[part], p)
+
+    in_parts(add, len(facets))
+    return float(sums.sum() / (4.0 * np.pi))
+
+
+@njit(inline="always", nogil=True, cache=True)
+def _arm(points, node, p):  # type: ignore[no-untyped-def]
+    return points[node, 0] - p[0], points[node, 1] - p[1], points[node, 2] - p[2]
+
+
+@njit(nogil=True, cache=True)
+def _solid_angles(points, facets, p):  # type: ignore[no-untyped-def]
+    """Return the sum of the solid angles of facets (f, 4), each two triangles, seen from ``p``."""
+    total = 0.0
+    for f in range(len(facets)):
+        for k in range(1, 3):
+            if facets[f, k] == facets[f, k + 1]:
+                continue
+            a = _arm(points, facets[f, 0], p)
+            b = _arm(points, facets[f, k], p)
+            c = _arm(points, facets[f, k + 1], p)
+            ab, bc, ca = dot3(a, b), dot3(b, c), dot3(c, a)
+            u, v, w = np.sqrt(dot3(a, a)), np.sqrt(dot3(b, b)), np.sqrt(dot3(c, c))
+            volume = dot3(a, cross3(b, c))
+            total += 2.0 * np.arctan2(volume, u * v * w + ab * w + bc * u + ca * v)
+    return total

@@ -75,12 +75,14 @@ def _edge(at, start, stop, c):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **OPTIONS)
-def _cross(a, b):  # type: ignore[no-untyped-def]
+def cross3(a, b):  # type: ignore[no-untyped-def]
+    """Return the cross product of two triples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(inline="always", **OPTIONS)
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def dot3(a, b):  # type: ignore[no-untyped-def]
+    """Return the scalar product of two triples, added up in order."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -105,8 +107,8 @@ def _corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
         else:
             h = table[k, 3]
             for c in range(count):
-                normal = _cross(_edge(at, o, i, c), _edge(at, o, j, c))
-                alpha[k, c] = _dot(normal, _edge(at, o, h, c))
+                normal = cross3(_edge(at, o, i, c), _edge(at, o, j, c))
+                alpha[k, c] = dot3(normal, _edge(at, o, h, c))
 
 
 @njit(**OPTIONS)
@@ -127,14 +129,14 @@ def _spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
         h = table[k, 3]
         for c in range(count):
             x, y, z = _edge(at, o, i, c), _edge(at, o, j, c), _edge(at, o, h, c)
-            xx, yy, zz = _dot(x, x), _dot(y, y), _dot(z, z)
+            xx, yy, zz = dot3(x, x), dot3(y, y), dot3(z, z)
             if vtk == 10:
                 squares = 1.5 * (xx + yy + zz)
-                spread[k, c] = squares - _dot(x, y) - _dot(y, z) - _dot(z, x)
+                spread[k, c] = squares - dot3(x, y) - dot3(y, z) - dot3(z, x)
             elif vtk == 14:
                 half = _half_sum(x, y)
                 axis = z[0] - half[0], z[1] - half[1], z[2] - half[2]
-                spread[k, c] = xx + yy + 2 * _dot(axis, axis)
+                spread[k, c] = xx + yy + 2 * dot3(axis, axis)
             else:
                 spread[k, c] = np.sqrt(xx * yy * zz)
 
@@ -145,13 +147,13 @@ def _prism(at, count, found):  # type: ignore[no-untyped-def]
     for c in range(count):
         a, b = _edge(at, 0, 1, c), _edge(at, 0, 2, c)
         p, q = _edge(at, 3, 4, c), _edge(at, 3, 5, c)
-        low, top = _cross(a, b), _cross(p, q)
-        middle = _half_sum(_cross(a, q), _cross(p, b))
+        low, top = cross3(a, b), cross3(p, q)
+        middle = _half_sum(cross3(a, q), cross3(p, b))
         for i in range(3):
             height = _edge(at, i, i + 3, c)
-            found[0, i, c] = _dot(low, height)
-            found[1, i, c] = _dot(middle, height)
-            found[2, i, c] = _dot(top, height)
+            found[0, i, c] = dot3(low, height)
+            found[1, i, c] = dot3(middle, height)
+            found[2, i, c] = dot3(top, height)
 
 
 # Node of a hexahedron by its parameters (i, j, k), each 0 or 1.
@@ -169,16 +171,16 @@ def _hexahedron(at, count, found):  # type: ignore[no-untyped-def]
                 u1 = _edge(at, _NODE[0, j, 1], _NODE[1, j, 1], c)
                 v0 = _edge(at, _NODE[i, 0, 0], _NODE[i, 1, 0], c)
                 v1 = _edge(at, _NODE[i, 0, 1], _NODE[i, 1, 1], c)
-                low, top = _cross(u0, v0), _cross(u1, v1)
-                middle = _half_sum(_cross(u0, v1), _cross(u1, v0))
+                low, top = cross3(u0, v0), cross3(u1, v1)
+                middle = _half_sum(cross3(u0, v1), cross3(u1, v0))
                 for p in range(2):
                     for q in range(2):
                         # 1 / binomial(2, a) for the sum of two linear Bernstein factors, each way.
                         weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
                         w = _edge(at, _NODE[p, q, 0], _NODE[p, q, 1], c)
-                        found[i + p, j + q, 0, c] += weight * _dot(low, w)
-                        found[i + p, j + q, 1, c] += weight * _dot(middle, w)
-                        found[i + p, j + q, 2, c] += weight * _dot(top, w)
+                        found[i + p, j + q, 0, c] += weight * dot3(low, w)
+                        found[i + p, j + q, 1, c] += weight * dot3(middle, w)
+                        found[i + p, j + q, 2, c] += weight * dot3(top, w)
 
 
 @njit(**OPTIONS)

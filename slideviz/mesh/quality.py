@@ -196,7 +196,7 @@ def quality(
             size[here], skew[here], status[here] = found
             values[here] = np.sqrt(found[0]) * found[1]
 
-        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), going_on)
+        in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
     return Quality(
         values=frozen_array(values, np.float64),
         size=frozen_array(size, np.float64),

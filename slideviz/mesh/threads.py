@@ -10,12 +10,12 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-PART = 8192
+PART = 16384
 """Rows of a part."""
 
 
 def in_parts(
-    work: Callable[[slice], object], count: int, going_on: Callable[[], object] = lambda: None
+    work: Callable[[slice], object], count: int, tick: Callable[[float], object] = lambda _: None
 ) -> None:
     """Call ``work`` with slices that cut ``count`` rows into parts, on all cores.
 
@@ -23,16 +23,16 @@ def in_parts(
     ----------
     work : callable
         Each call writes to places of its own.
-    going_on : callable
-        Called by the calling thread before each of its parts; what it raises ends the work, as
-        does what ``work`` raises.
+    tick : callable
+        Called by the calling thread, before each of its parts, with the fraction begun. What it
+        raises ends the work, as does what ``work`` raises.
     """
     parts = iter([slice(first, min(first + PART, count)) for first in range(0, count, PART)])
 
-    def rest(tell: Callable[[], object]) -> None:
+    def rest(tell: Callable[[float], object]) -> None:
         try:
             for part in parts:
-                tell()
+                tell(part.start / count)
                 work(part)
         except BaseException:
             for _ in parts:  # no thread finds another
@@ -41,10 +41,10 @@ def in_parts(
 
     helpers = min(len(os.sched_getaffinity(0)), -(-count // PART)) - 1
     if helpers <= 0:
-        rest(going_on)
+        rest(tick)
         return
     with ThreadPoolExecutor(helpers) as pool:
-        others = [pool.submit(rest, lambda: None) for _ in range(helpers)]
-        rest(going_on)
+        others = [pool.submit(rest, lambda _: None) for _ in range(helpers)]
+        rest(tick)
     for other in others:
         other.result()

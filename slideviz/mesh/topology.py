@@ -18,9 +18,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import MeshError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, sorted_nodes
+from slideviz.mesh.threads import in_parts
 from slideviz.mesh.unique_rows import row_groups
 
 FEATURE_ANGLE_DEG = 40.0
@@ -132,12 +134,13 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
     on_boundary[facets.ravel()] = True
     sides, cells = [], []
     for vtk, (ids, nodes) in mesh.cells.by_type.items():
-        near = on_boundary[nodes]
-        some = np.flatnonzero(near.sum(axis=1) >= mesh.dim)
+        some = np.flatnonzero(_touch(nodes, on_boundary, mesh.dim))
+        table = nodes[some]
+        near = on_boundary[table]
         for local in ELEMENTS[vtk].facets:
-            keep = some[near[some][:, local].all(axis=1)]
-            sides.append(_padded(nodes[keep][:, local], facets.shape[1]))
-            cells.append(ids[keep])
+            keep = near[:, local].all(axis=1)
+            sides.append(_padded(table[keep][:, local], facets.shape[1]))
+            cells.append(ids[some[keep]])
     table = np.sort(np.concatenate([facets, *sides]), axis=1)
     # A padded triangle (a, b, c, c) and a quadrilateral differ after sorting only if the
     # repeated node is the same one on both sides: make it the largest.
@@ -155,6 +158,22 @@ def _find_owners(mesh: Mesh, facets: IntArray, marker_of: IntArray) -> IntArray:
             "remove it from the marker or add the missing cell"
         )
     return owner
+
+
+def _touch(nodes: IntArray, chosen: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """Tell which cells, nodes (m, n), have so many chosen nodes at least, (m,)."""
+    found = np.empty(len(nodes), bool)
+    in_parts(lambda part: _mark(nodes[part], chosen, least, found[part]), len(nodes))
+    return found
+
+
+@njit(nogil=True, cache=True)
+def _mark(nodes, chosen, least, found):  # type: ignore[no-untyped-def]
+    for row in range(len(nodes)):
+        count = 0
+        for node in nodes[row]:
+            count += chosen[node]
+        found[row] = count >= least
 
 
 def _canonical_triangles(table: IntArray) -> IntArray:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, unit
 
@@ -182,19 +183,22 @@ def _slide_rows(around: _Around, active: np.ndarray) -> tuple[IntArray, IntArray
     chosen = _one_sided(around, chosen)
     node = around.node[chosen]
     cluster = np.zeros(len(chosen), np.int64)
-    full = []
     starts = np.flatnonzero(np.r_[True, node[1:] != node[:-1]])
-    for start, stop in zip(starts, np.r_[starts[1:], len(node)], strict=True):
-        if stop - start == 1:
-            continue
-        local = chosen[start:stop]
-        labels = _cluster(around, local)
-        rank = _rank(around.normals[local], labels)
-        # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
-        cluster[start:stop] = labels if rank > 1 else 0
-        if rank >= around.normals.shape[1]:
-            full.append(node[start])
-    return np.stack([chosen, cluster], axis=1), np.array(full, np.int64)
+    size = np.diff(np.r_[starts, len(node)])
+    several = np.flatnonzero(np.repeat(size > 1, size))
+    if not len(several):
+        return np.stack([chosen, cluster], axis=1), np.empty(0, np.int64)
+    size = size[size > 1]
+    group, local = np.repeat(np.arange(len(size)), size), chosen[several]
+    normals = around.normals[local]
+    roles = np.unique(around.role[local].astype(str), return_inverse=True)[1]
+    label = np.empty(len(local), np.int64)
+    _join(size, normals, roles, around.own[local], around.smooth, around.merge, label)
+    rank = _ranks(normals, group, label)
+    # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
+    cluster[several] = np.where(rank[group] > 1, label, 0)
+    first = np.cumsum(size) - size
+    return np.stack([chosen, cluster], axis=1), node[several][first[rank >= normals.shape[1]]]
 
 
 def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
@@ -219,37 +223,71 @@ def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
     return chosen[~drop]
 
 
-def _cluster(around: _Around, local: IntArray) -> IntArray:
-    """Return labels (m,) that join fans of one role whose normals differ by a small angle.
+@njit(nogil=True, cache=True)
+def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
+    """Write labels (m,) that join fans of one node and role whose normals differ by a small angle.
 
     Also over others between them, so that the order of the fans does not matter. Fans in one
-    plane are one whatever their roles: no edge is between them.
+    plane are one whatever their roles: no edge is between them. Labels are 0, 1, ... at each node.
+
+    Parameters
+    ----------
+    size : (g,)
+        The number of fans of each node, which are together.
+    normals, role, own : (m, d), (m,), (m,)
+        Of each fan; its role as a number, and its own node where images are counted for one.
+    smooth, merge
+        As in `_Around`.
     """
-    roles, own = around.role[local], around.own[local]
-    along = around.normals[local] @ around.normals[local].T
-    alike = roles[:, None] == roles
-    here = own[:, None] == own
-    # Of an image, a fan goes on in the one that is most like it, and no other.
-    there = np.where(alike & ~here, along, -2.0)
-    best = np.zeros_like(here)
-    for image in np.unique(own):
-        column = np.where(own == image, there, -2.0)
-        best[np.arange(len(own)), column.argmax(axis=1)] |= column.max(axis=1) > around.smooth
-    joined = (alike & here & (along > around.merge)) | (best & best.T) | (along > IN_PLANE)
-    labels = np.arange(len(local))
-    for i, j in np.argwhere(np.tril(joined, -1)):
-        labels[labels == labels[i]] = labels[j]
-    return np.unique(labels, return_inverse=True)[1]
+    start = 0
+    for count in size:
+        best = np.zeros((count, count), np.bool_)
+        along = np.zeros((count, count))
+        for i in range(count):
+            for j in range(count):
+                for axis in range(normals.shape[1]):
+                    along[i, j] += normals[start + i, axis] * normals[start + j, axis]
+        mine, side = role[start : start + count], own[start : start + count]
+        # Of an image, a fan goes on in the one that is most like it, and no other.
+        for i in range(count):
+            for k in range(count):
+                most = -1
+                for j in range(count):
+                    if side[j] == side[k] and side[j] != side[i] and mine[j] == mine[i]:
+                        most = j if most < 0 or along[i, j] > along[i, most] else most
+                if most >= 0 and along[i, most] > smooth:
+                    best[i, most] = True
+        labels = label[start : start + count]
+        labels[:] = np.arange(count)
+        for i in range(count):
+            for j in range(i):
+                one = mine[i] == mine[j] and side[i] == side[j] and along[i, j] > merge
+                if one or (best[i, j] and best[j, i]) or along[i, j] > IN_PLANE:
+                    old = labels[i]
+                    for k in range(count):
+                        labels[k] = labels[j] if labels[k] == old else labels[k]
+        names = np.zeros(count, np.int64)
+        names[labels] = 1
+        names = np.cumsum(names) - 1
+        labels[:] = names[labels]
+        start += count
 
 
-def _rank(normals: FloatArray, labels: IntArray) -> int:
-    """Return the rank of the clusters' normals; opposite ones (a thin tip) count as full."""
+def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
+    """Return the rank of each node's clusters, (g,); opposite ones (a thin tip) count as full.
+
+    Parameters
+    ----------
+    normals, group, label : (m, d), (m,), (m,)
+        The normals of fans, the number of their node, and of their cluster there.
+    """
     dim = normals.shape[1]
-    means = unit(np.stack([normals[labels == k].sum(axis=0) for k in range(labels.max() + 1)]))
-    products = means @ means.T
-    if products.min() < -1.0 + 1e-4:
-        return dim
-    return int(np.sum(np.linalg.svd(means, compute_uv=False) > RANK_TOLERANCE))
+    means = np.zeros((int(group[-1]) + 1, int(label.max()) + 1, dim))
+    np.add.at(means, (group, label), normals)
+    means = unit(means)
+    opposite = (means @ means.swapaxes(1, 2)).min(axis=(1, 2)) < -1.0 + 1e-4
+    found = np.sum(np.linalg.svd(means, compute_uv=False) > RANK_TOLERANCE, axis=1)
+    return np.where(opposite, dim, found)
 
 
 def _collect(

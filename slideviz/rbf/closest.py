@@ -15,9 +15,40 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.compiled import one_at_a_time
 
 LEAF = 4
+RUN = 16
 TIE = 1e-12
 """Squares of distances that differ by less than this part are equal but for rounding."""
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
+
+
+@njit(**_OPTIONS)
+def _sort(keys, items, spare, other):  # type: ignore[no-untyped-def]
+    """Sort ``items`` (n,) by ``keys`` (n,), equal ones stay in order; the others are lost.
+
+    Ten times faster than NumPy's argument sort is within a compiled loop.
+    """
+    count = len(keys)
+    for a in range(0, count, RUN):
+        for i in range(a + 1, min(a + RUN, count)):
+            key, item, j = keys[i], items[i], i
+            while j > a and keys[j - 1] > key:
+                keys[j], items[j] = keys[j - 1], items[j - 1]
+                j -= 1
+            keys[j], items[j] = key, item
+    width = RUN
+    while width < count:
+        for a in range(0, count, 2 * width):
+            half, b = min(a + width, count), min(a + 2 * width, count)
+            i, j = a, half
+            for k in range(a, b):
+                if j >= b or (i < half and keys[i] <= keys[j]):
+                    spare[k], other[k] = keys[i], items[i]
+                    i += 1
+                else:
+                    spare[k], other[k] = keys[j], items[j]
+                    j += 1
+        keys[:], items[:] = spare, other
+        width *= 2
 
 
 @njit(**_OPTIONS)
@@ -31,6 +62,7 @@ def _build(low, high, order, bounds):  # type: ignore[no-untyped-def]
     starts = np.zeros(nodes, np.int64)
     stops = np.zeros(nodes, np.int64)
     stops[0] = len(order)
+    middle, spare, other = np.empty(len(order)), np.empty(len(order)), np.empty_like(order)
     for k in range(nodes):
         a, b = starts[k], stops[k]
         for axis in range(3):
@@ -42,9 +74,9 @@ def _build(low, high, order, bounds):  # type: ignore[no-untyped-def]
         if 2 * k + 2 >= nodes:
             continue
         longest = np.argmax(bounds[k, 3:] - bounds[k, :3])
-        part = order[a:b].copy()
-        middle = low[part, longest] + high[part, longest]
-        order[a:b] = part[np.argsort(middle, kind="mergesort")]
+        for i in range(a, b):
+            middle[i] = low[order[i], longest] + high[order[i], longest]
+        _sort(middle[a:b], order[a:b], spare[a:b], other[a:b])
         half = a + (b - a + 1) // 2
         starts[2 * k + 1], stops[2 * k + 1] = a, half
         starts[2 * k + 2], stops[2 * k + 2] = half, b

@@ -67,13 +67,12 @@ def evaluate(
     """
     rotational, kind = basis.period > 0, KERNELS[basis.kernel].code
     rows = 4 if rotational or kind or len(targets) == 4 else 3
-    x, c = _rows(targets, rows), _rows(controls, rows)
-    w = _rows(weights.T, 3)
-    total, scale = x.shape[1], 1.0 / basis.radius
-    out = np.empty((3, total))
+    c, w = _rows(controls, rows), _rows(weights.T, 3)
+    total, scale = targets.shape[1], 1.0 / basis.radius
+    out = np.empty((total, weights.shape[1]))
     size = max(1, CHUNK // max(1, c.shape[1]))
     for start in range(0, total, size):
-        part = np.ascontiguousarray(x[:, start : start + size])
+        part = _rows(targets[:, start : start + size], rows)
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
             if kind:
@@ -84,9 +83,9 @@ def evaluate(
                 compiled.sum_four(part, c, w, scale, result)
             else:
                 compiled.sum_three(part, c, w, scale, result)
-        out[:, start : start + size] = result
+        out[start : start + size] = result[: weights.shape[1]].T
         tick(min(1.0, (start + size) / total))
-    return np.ascontiguousarray(out[: weights.shape[1]].T)
+    return out
 
 
 def matrix(

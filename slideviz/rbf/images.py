@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, column_bounds
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
@@ -56,8 +56,11 @@ def find_images(
     paired = np.zeros(count, bool)
     paired[links] = True
     near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
-    gap, at = cKDTree(coords[nodes]).query(coords[nodes] + frame.shift())
-    twins = np.stack([nodes, nodes[at]], axis=1)[gap <= near]
+    # Nearly all have none one period away, and a search without bound takes long to find that out.
+    tree, moved = cKDTree(coords[nodes]), coords[nodes] + frame.shift()
+    gap, at = (np.asarray(part) for part in tree.query(moved, distance_upper_bound=2.0 * near))
+    found = np.flatnonzero(gap <= near)
+    twins = np.stack([nodes[found], nodes[at[found]]], axis=1)
     links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])
     linked, ends = np.unique(links, return_inverse=True)
     label = components(len(linked), *ends.reshape(links.shape).T)
@@ -165,8 +168,8 @@ def largest_misfit(
     found = misfits(frame, coords, points, images)
     worst = int(np.argmax(found))
     origin = 0.0 if frame.origin is None else float(np.abs(frame.origin).max())
-    extent = float(np.ptp(points, axis=0).max())
-    allowed = ROUNDING * extent + FAR * (float(np.abs(points).max()) + origin)
+    low, high = column_bounds(points)
+    allowed = ROUNDING * float((high - low).max()) + FAR * (max(-low.min(), high.max()) + origin)
     if not found[worst] <= allowed:
         one, two = images[worst]
         where = ", ".join(f"{value:.6g}" for value in points[two])

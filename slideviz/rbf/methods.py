@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
@@ -35,8 +36,6 @@ of the weights brings back."""
 GAMMA = 25.0
 NEGLIGIBLE = 1e-14
 """Errors below this part of the support radius are rounding, and are not spread."""
-
-CHUNK = 50_000
 
 TIE = 1e-4
 """Boundary nodes farther than the nearest one by less than this part of its distance count too:
@@ -136,7 +135,7 @@ def _fit(problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> Fit
     return GreedyFit(problem, watch, history)
 
 
-def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray) -> FloatArray:
+def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray | slice) -> FloatArray:
     """Return the interpolated displacements (m, d) of nodes."""
     with watch.phase("evaluate") as tick:
         return fit.found.at(problem, nodes, tick)
@@ -159,7 +158,7 @@ def _finish(
     problem: Problem, watch: Watch, fit: Fit, nodes: IntArray, values: FloatArray
 ) -> Solution:
     """Evaluate at all nodes; boundary nodes are set exactly, and what they lack is spread."""
-    displacement = _at(problem, watch, fit, np.arange(problem.features.shape[1]))
+    displacement = _at(problem, watch, fit, slice(None))
     errors = values - displacement[nodes]
     total, lag = problem.behind(nodes) + errors, None
     if problem.reduction is not None:
@@ -215,33 +214,32 @@ def correct(
     if largest <= NEGLIGIBLE * problem.basis.radius:
         return
     radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest
-    points = problem.cartesian(problem.coords)
     # Nodes that coincide, or are images of each other, count once.
     once = np.unique(problem.same_as[nodes], return_index=True)[1]
-    sources, lacking = points[nodes[once]], errors[once]
+    at, lacking = problem.coords[nodes[once]], errors[once]
+    sources = problem.cartesian(at)
     if np.any(problem.shift):
-        at = problem.coords[nodes[once]]
         images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
         sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
     tree = cKDTree(sources)
-    free = np.ones(len(points), bool)
+    free = np.ones(len(displacement), bool)
     free[nodes] = False
-    targets = np.flatnonzero(free)
-    for start in range(0, len(targets), CHUNK):
-        part = targets[start : start + CHUNK]
-        workers = -1 if len(part) == CHUNK else 1
-        near = tree.query(points[part], k=2, distance_upper_bound=radius, workers=workers)
+
+    def correct_part(part: slice) -> None:
+        targets = part.start + np.flatnonzero(free[part])
+        points = problem.cartesian(problem.coords[targets])
+        near = tree.query(points, k=2, distance_upper_bound=radius)
         distance, index = (np.asarray(found) for found in near)
-        hit = np.isfinite(distance[:, 0])
-        part, distance, index = part[hit], distance[hit], index[hit, 0]
+        hit = np.flatnonzero(np.isfinite(distance[:, 0]))
+        distance, taken = distance[hit], lacking[index[hit, 0]]
         q = distance[:, 0] / radius
         share = (1.0 - q) ** 4 * (4.0 * q + 1.0)
-        taken = lacking[index]
         tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])
         if len(tied):
-            taken[tied] = _means(tree, lacking, points[part[tied]], distance[tied, 0])
-        displacement[part] += share[:, None] * taken
-        tick(min(1.0, (start + CHUNK) / len(targets)))
+            taken[tied] = _means(tree, lacking, points[hit[tied]], distance[tied, 0])
+        displacement[targets[hit]] += share[:, None] * taken
+
+    in_parts(correct_part, len(displacement), tick)
 
 
 def _means(

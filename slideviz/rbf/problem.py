@@ -209,16 +209,14 @@ class Interpolant:
     weights: FloatArray
     tail: FloatArray | None = None
 
-    def at(self, problem: Problem, nodes: IntArray, tick: Tick = no_tick) -> FloatArray:
+    def at(self, problem: Problem, nodes: IntArray | slice, tick: Tick = no_tick) -> FloatArray:
         """Return the displacements (m, d) of nodes in the frame."""
-        features = problem.features
+        basis, targets = problem.basis, problem.features[:, nodes]
         if not len(self.nodes):
-            return np.zeros((len(nodes), problem.values.shape[1]))
-        found = evaluate(
-            problem.basis, features[:, nodes], features[:, self.nodes], self.weights, tick
-        )
+            return np.zeros((targets.shape[1], problem.values.shape[1]))
+        found = evaluate(basis, targets, problem.features[:, self.nodes], self.weights, tick)
         if self.tail is not None:
-            found += linear_terms(problem.basis, features[:, nodes]) @ self.tail
+            found += linear_terms(basis, targets) @ self.tail
         return found
 
     def plus(self, other: Interpolant) -> Interpolant:

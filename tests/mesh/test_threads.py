@@ -41,7 +41,7 @@ def test_what_is_raised_ends_the_work(monkeypatch, cores):
         in_parts(fail, 1000)
     assert len(done) <= cores
 
-    def stop():
+    def stop(fraction):
         raise KeyboardInterrupt
 
     done.clear()
