@@ -190,15 +190,14 @@ def _slide_rows(around: _Around, active: np.ndarray) -> tuple[IntArray, IntArray
         return np.stack([chosen, cluster], axis=1), np.empty(0, np.int64)
     size = size[size > 1]
     group, local = np.repeat(np.arange(len(size)), size), chosen[several]
-    normals = around.normals[local]
-    roles = np.unique(around.role[local].astype(str), return_inverse=True)[1]
-    label = np.empty(len(local), np.int64)
-    _join(size, normals, roles, around.own[local], around.smooth, around.merge, label)
-    rank = _ranks(normals, group, label)
+    label = _clusters(around, local, size)
+    rank = _ranks(around.normals[local], group, label)
     # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
     cluster[several] = np.where(rank[group] > 1, label, 0)
     first = np.cumsum(size) - size
-    return np.stack([chosen, cluster], axis=1), node[several][first[rank >= normals.shape[1]]]
+    return np.stack([chosen, cluster], axis=1), node[several][
+        first[rank >= around.normals.shape[1]]
+    ]
 
 
 def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
@@ -223,22 +222,29 @@ def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
     return chosen[~drop]
 
 
-@njit(nogil=True, cache=True)
-def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
-    """Write labels (m,) that join fans of one node and role whose normals differ by a small angle.
+def _clusters(around: _Around, local: IntArray, size: IntArray) -> IntArray:
+    """Return labels (m,) that join fans of one node and role whose normals differ by a small angle.
 
     Also over others between them, so that the order of the fans does not matter. Fans in one
     plane are one whatever their roles: no edge is between them. Labels are 0, 1, ... at each node.
 
     Parameters
     ----------
+    local : (m,)
+        The fans, those of a node together.
     size : (g,)
-        The number of fans of each node, which are together.
-    normals, role, own : (m, d), (m,), (m,)
-        Of each fan; its role as a number, and its own node where images are counted for one.
-    smooth, merge
-        As in `_Around`.
+        The number of fans of each node.
     """
+    label = np.empty(len(local), np.int64)
+    role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
+    normals, own = around.normals[local], around.own[local]
+    _join(size, normals, role, own, around.smooth, around.merge, label)
+    return label
+
+
+@njit(nogil=True, cache=True)
+def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
+    """Write what `_clusters` returns into ``label`` (m,); of each fan role and own node (m,)."""
     start = 0
     for count in size:
         best = np.zeros((count, count), np.bool_)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Scale, Translate
-from slideviz.rbf.classify import _Around, _cluster
+from slideviz.rbf.classify import _Around, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct
@@ -159,7 +159,7 @@ def test_fans_are_joined_over_others_between_them_in_any_order():
     merge, one = np.cos(np.radians(10.0)), np.zeros(4, np.int64)
     around = _Around(one, one, roles, normals, merge, merge)
     for order in permutations(range(4)):
-        labels = _cluster(around, np.array(order))
+        labels = _clusters(around, np.array(order), np.array([4]))
         assert sorted(np.bincount(labels)) == [1, 3]
 
 
