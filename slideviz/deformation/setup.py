@@ -10,10 +10,6 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from slideviz.baselines.conditions import Body
-from slideviz.baselines.elastic import deform_elastic
-from slideviz.baselines.idw import Weights, deform_idw
-from slideviz.baselines.shapes import blocks
 from slideviz.case.check import idle_settings
 from slideviz.case.model import Case
 from slideviz.case.motion import require_valid
@@ -223,9 +219,15 @@ def _method(
 ) -> Callable[[Problem, Watch], Solution]:
     """Return what METHOD and SLIDING_MODE choose."""
     if case.method == "idw":
+        from slideviz.baselines.idw import Weights, deform_idw
+
         power = case.idw_power or float(mesh.dim)
         return partial(deform_idw, weights=Weights(power, case.idw_fixed_weight))
     if case.method == "elastic":
+        from slideviz.baselines.conditions import Body
+        from slideviz.baselines.elastic import deform_elastic
+        from slideviz.baselines.shapes import blocks
+
         return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
     return SLIDING_METHODS[case.sliding]
 

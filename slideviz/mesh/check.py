@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.threads import in_parts
 
 LARGEST = 1e50
 """Coordinates that are computed with are not larger: products of several must stay numbers."""
@@ -52,27 +54,18 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
 
 def _first_repeated(cells: Cells) -> tuple[int, int] | None:
     """Return the first element that has a node twice, and that node."""
-    found = []
+    found: list[tuple[int, int]] = []
     for ids, nodes in cells.by_type.values():
-        row, node = _twice(nodes)
-        if row >= 0:
-            found.append((int(ids[row]), int(node)))
+
+        def look(part: slice, ids: IntArray, nodes: IntArray) -> None:
+            ordered = np.sort(nodes[part], axis=1)
+            same: NDArray[np.bool_] = ordered[:, 1:] == ordered[:, :-1]
+            if same.any():
+                k = int(np.argmax(same.any(axis=1)))
+                found.append((int(ids[part][k]), int(ordered[k, int(np.argmax(same[k]))])))
+
+        in_parts(partial(look, ids=ids, nodes=nodes), len(ids))
     return min(found, default=None)
-
-
-@njit(nogil=True, cache=True)
-def _twice(nodes):  # type: ignore[no-untyped-def]
-    """Return the first row of nodes (m, n) that has a node twice, and the smallest such; or -1."""
-    for row in range(len(nodes)):
-        least = -1
-        for i in range(nodes.shape[1]):
-            for j in range(i):
-                node = nodes[row, i]
-                if node == nodes[row, j] and (least < 0 or node < least):
-                    least = node
-        if least >= 0:
-            return row, least
-    return -1, -1
 
 
 def unused_nodes(mesh: Mesh) -> IntArray:
