@@ -36,7 +36,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.errors import CaseError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import ordered_sum
 
 __all__ = [
@@ -132,7 +132,7 @@ def _as_one(motion: Motion, points: Mapping[str, FloatArray], on: Mapping[str, I
 def same(vectors: FloatArray, mesh: Mesh) -> float:
     """Return by how much two displacements of one node may differ, given all of them (k, d)."""
     largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-    rounding = ROUNDING * float(np.abs(mesh.points).max())
+    rounding = ROUNDING * largest_coordinate(mesh.points)
     return min(AGREE * mesh.extent, ALIKE * largest) + rounding
 
 

@@ -12,7 +12,7 @@ from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.deformation.classes import find_classes
 from slideviz.deformation.intersection import intersection_message, jump_message
 from slideviz.errors import CaseError, DeformError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.mesh.topology import Boundary, Fans, fan_normals
 from slideviz.rbf.axis import corners as corners_of
@@ -95,7 +95,7 @@ def prescribed(
     values = np.zeros(mesh.points.shape)
     values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
     largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
-    allowed = alike * largest + ROUNDING * float(np.abs(mesh.points).max())
+    allowed = alike * largest + ROUNDING * largest_coordinate(mesh.points)
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):

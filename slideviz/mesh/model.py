@@ -38,6 +38,12 @@ def column_bounds(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.array([c.min() for c in points.T]), np.array([c.max() for c in points.T])
 
 
+def largest_coordinate(points: FloatArray) -> float:
+    """Return the largest absolute value of the coordinates (n, d)."""
+    low, high = column_bounds(points)
+    return float(max(-low.min(), high.max()))
+
+
 def sorted_nodes(nodes: IntArray) -> IntArray:
     """Return the nodes that stand in an array of any shape, sorted, each once: (u,)."""
     used = np.zeros(nodes.max(initial=-1) + 1, bool)

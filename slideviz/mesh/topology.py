@@ -14,8 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import MeshError
 from slideviz.mesh.caching import njit
@@ -294,11 +292,13 @@ def find_fans(
     fan = components(len(node), a, b)
     # By position, so that the fans of a node, and the normals of a fan, are added up in one order
     # however facets are numbered.
-    order = np.lexsort(points[boundary.facets].mean(axis=1)[facet].T)
+    place = np.argsort(np.lexsort(points[boundary.facets].mean(axis=1).T))
+    order = np.argsort(place[facet], kind="stable")
     facet, node, fan = facet[order], node[order], fan[order]
-    _, first, fan = np.unique(fan, return_index=True, return_inverse=True)
+    total = int(fan.max(initial=-1)) + 1
+    first = np.empty(total, np.int64)
+    first[fan[::-1]] = np.arange(len(fan))[::-1]
     fan = np.argsort(np.argsort(first))[fan]
-    total = len(first)
     fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
     fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
     return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
@@ -352,5 +352,34 @@ def components(count: int, a: IntArray, b: IntArray) -> IntArray:
     a, b : (m,)
         The pairs that are connected.
     """
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    label = np.arange(count)
+    _unite(np.asarray(a, np.int64), np.asarray(b, np.int64), label)
+    return label
+
+
+@njit(nogil=True, cache=True)
+def _unite(a, b, label):  # type: ignore[no-untyped-def]
+    """Write the number of the part of each thing into ``label`` (count,), now 0, 1, 2 and so on.
+
+    Parts are trees whose root is their first thing (R. E. Tarjan, Efficiency of a good but not
+    linear set union algorithm, 1975), and are numbered in the order of these.
+    """
+    for k in range(len(a)):
+        one, two = _root(label, a[k]), _root(label, b[k])
+        label[max(one, two)] = min(one, two)
+    count = 0
+    for i in range(len(label)):
+        if label[i] == i:
+            label[i] = count
+            count += 1
+        else:
+            label[i] = label[label[i]]  # of a thing before it, which has its number already
+
+
+@njit(nogil=True, cache=True)
+def _root(label, i):  # type: ignore[no-untyped-def]
+    """Return the root of the tree that ``i`` is in, and halve the way there."""
+    while label[i] != i:
+        label[i] = label[label[i]]
+        i = label[i]
+    return i

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.errors import DeformError
-from slideviz.mesh.model import FloatArray, IntArray, column_bounds
+from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
@@ -169,7 +169,7 @@ def largest_misfit(
     worst = int(np.argmax(found))
     origin = 0.0 if frame.origin is None else float(np.abs(frame.origin).max())
     low, high = column_bounds(points)
-    allowed = ROUNDING * float((high - low).max()) + FAR * (max(-low.min(), high.max()) + origin)
+    allowed = ROUNDING * float((high - low).max()) + FAR * (largest_coordinate(points) + origin)
     if not found[worst] <= allowed:
         one, two = images[worst]
         where = ", ".join(f"{value:.6g}" for value in points[two])

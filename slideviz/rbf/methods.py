@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial import cKDTree
 
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
@@ -100,7 +100,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     gap = np.abs(slid - free).max(axis=1, initial=0.0)
     if not problem.curved and gap.max(initial=0.0) <= AGREE * problem.basis.radius:
         # A straight edge of a curved surface: its nodes leave it a little along the normals.
-        off = gap[:, None] > ROUNDING * np.abs(problem.coords).max()
+        off = gap[:, None] > ROUNDING * largest_coordinate(problem.coords)
         slid = np.where(off, slid, free)
         return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, slid]))
     values = np.concatenate([problem.values, slid])

@@ -22,6 +22,9 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.terms import ROLES
+
+ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}
 
 Place = Callable[[IntArray], FloatArray]
 
@@ -123,14 +126,22 @@ def find_tracks(
 
 def _across(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:
     """Return pairs (j, 2) of facets that share a joint when periodic images are one node."""
-    role = np.array([roles.get(name, "fixed") for name in boundary.names])[boundary.marker]
     glued = np.zeros(len(stands), bool)
     glued[stands[stands != np.arange(len(stands))]] = True
-    facets = np.flatnonzero((role != "periodic") & glued[stands[boundary.facets]].any(axis=1))
+    across = glued[stands[boundary.facets]].any(axis=1)
+    across &= _role_numbers(boundary, roles) != ROLE_NUMBER["periodic"]
+    facets, count = np.flatnonzero(across), len(across)
     pairs, nodes = find_joints(stands[boundary.facets[facets]], boundary.dim)
     pairs = np.sort(facets[pairs[glued[nodes].all(axis=1)]], axis=1)
-    beside = np.sort(boundary.joints, axis=1) @ [len(role), 1]
-    return pairs[~np.isin(pairs @ [len(role), 1], beside)]
+    beside = boundary.joints[across[boundary.joints].all(axis=1)]
+    beside = np.sort(beside, axis=1) @ [count, 1]
+    return pairs[~np.isin(pairs @ [count, 1], beside)]
+
+
+def _role_numbers(boundary: Boundary, roles: Mapping[str, str]) -> IntArray:
+    """Return the number of each facet's role, (f,)."""
+    given = [ROLE_NUMBER[roles.get(name, "fixed")] for name in boundary.names]
+    return np.array(given, np.int64)[boundary.marker]
 
 
 def _surface_labels(
@@ -150,7 +161,7 @@ def _surface_labels(
     normal = unit(vectors)
     a, b = boundary.joints.T
     along = np.einsum("jd,jd->j", normal[a], normal[b])
-    role = np.array([roles.get(name, "fixed") for name in boundary.names])[boundary.marker]
+    role = _role_numbers(boundary, roles)
     same = boundary.marker[a] == boundary.marker[b]
     smooth = np.where(
         same,
@@ -222,18 +233,21 @@ def _edge_chains(
     mine = stands[classes.cluster_node] == classes.cluster_node
     mine = mine[classes.row_cluster]
     cluster[classes.row_fan[mine]] = classes.row_cluster[mine]
-    key = np.sort(fans.facet * (fans.node.max(initial=0) + 1) + fans.node)
-    order = np.argsort(fans.facet * (fans.node.max(initial=0) + 1) + fans.node)
     is_edge = np.zeros(fans.node.max(initial=0) + 1, bool)
     is_edge[classes.edge] = True
+    order = np.flatnonzero(is_edge[fans.node])
+    key = fans.facet[order] * len(is_edge) + fans.node[order]
+    order, key = order[np.argsort(key)], np.sort(key)
     keep = np.zeros(len(boundary.joints), bool)
     for column in range(boundary.joint_nodes.shape[1]):
-        node = boundary.joint_nodes[:, column]
+        near = np.flatnonzero(is_edge[boundary.joint_nodes[:, column]])
+        node = boundary.joint_nodes[near, column]
         rows = [
-            order[np.searchsorted(key, side * len(is_edge) + node)] for side in boundary.joints.T
+            order[np.searchsorted(key, side * len(is_edge) + node)]
+            for side in boundary.joints[near].T
         ]
         first, second = (cluster[fans.fan[row]] for row in rows)
-        keep |= is_edge[node] & (first >= 0) & (second >= 0) & (first != second)
+        keep[near] |= (first >= 0) & (second >= 0) & (first != second)
     ends = boundary.joint_nodes[keep]
     # Link segments at edge nodes only: number each end by its node, or by itself elsewhere.
     count = len(is_edge)
