@@ -120,8 +120,9 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
         with watch.phase("project"):
             slid = problem.project(level, free)
         nodes, values = np.concatenate([nodes, level]), np.concatenate([values, slid])
-    everywhere = np.arange(len(problem.coords))
-    displacement = _at(problem, watch, nodes, values, everywhere, weights)
+    field = _field(problem, nodes, values, weights)
+    with watch.phase("evaluate") as tick:
+        displacement = field.at(problem.features, problem.coords, tick)
     errors = np.linalg.norm(displacement[nodes] - values, axis=1)
     displacement[nodes] = values
     return Solution(
@@ -130,7 +131,40 @@ def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:
         float(errors.max(initial=0.0)),
         np.empty(0, np.int64),
         float("nan"),
+        field=field,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedField:
+    """Means of the displacements of sources, weighted with their inverse distance.
+
+    Attributes
+    ----------
+    basis : Basis
+    sources : (k, n) float64
+        Features.
+    values, weights : (n, d), (n,) float64
+    power : float
+    """
+
+    basis: Basis
+    sources: FloatArray
+    values: FloatArray
+    weights: FloatArray
+    power: float
+
+    def at(self, features: FloatArray, _: FloatArray, /, tick: Tick = no_tick) -> FloatArray:
+        """Return the displacement (m, d) at features (k, m)."""
+        return weighted_means(
+            self.basis,
+            features,
+            self.sources,
+            self.values,
+            self.weights,
+            power=self.power,
+            tick=tick,
+        )
 
 
 def _at(
@@ -142,19 +176,17 @@ def _at(
     weights: Weights,
 ) -> FloatArray:
     """Return the displacements (m, d) of nodes from those of the known ones."""
+    field = _field(problem, known, values, weights)
+    with watch.phase("evaluate") as tick:
+        return field.at(problem.features[:, targets], problem.coords[targets], tick)
+
+
+def _field(
+    problem: Problem, known: IntArray, values: FloatArray, weights: Weights
+) -> WeightedField:
     nodes, values = merge(problem, known, values)
     own = np.where(np.any(values != 0, axis=1), 1.0, weights.fixed_weight)
-    features = problem.features
-    with watch.phase("evaluate") as tick:
-        return weighted_means(
-            problem.basis,
-            features[:, targets],
-            features[:, nodes],
-            values,
-            own,
-            power=weights.power,
-            tick=tick,
-        )
+    return WeightedField(problem.basis, problem.features[:, nodes], values, own, weights.power)
 
 
 @njit(inline="always", **OPTIONS)

@@ -204,13 +204,21 @@ def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, Target], Displacement
             names = " or ".join(repr(name) for name in named(motion.marker))
             of = f"marker {names}" if names else "a moving marker"
             try:
-                read = read_displacements(motion.path, nodes, mesh.points.shape, of)
+                read = _read_file(motion.path, mesh, nodes, of)
             except CaseError as problem:
                 problems.append(str(problem))
             else:
                 files[motion.path, motion.marker] = read
     raise_all(tuple(problems))
     return files
+
+
+def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
+    """Return the displacements of nodes, which a file calls by their numbers in the whole mesh."""
+    if mesh.part is None:
+        return read_displacements(path, nodes, mesh.points.shape, of)
+    whole = mesh.part.n_points, mesh.dim
+    return replace(read_displacements(path, mesh.part.points[nodes], whole, of), nodes=nodes)
 
 
 def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:

@@ -8,8 +8,6 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from slideviz.case.model import Case
 from slideviz.case.reduction_keys import get_reduction
 from slideviz.deformation.solver import Step, folded_at
@@ -40,8 +38,12 @@ def run_report(
     *,
     quality: Quality,
     undeformed: Quality,
+    folded: Mapping[int, tuple[int, int]],
 ) -> dict[str, Any]:
-    """Return the JSON object of ``run --json``; ``quality`` is that of the last step."""
+    """Return the JSON object of ``run --json``; ``quality`` is that of the last step.
+
+    ``folded`` has type and first step of the inverted cells with the lowest numbers.
+    """
     last = steps[-1]
     spent = dict.fromkeys(PHASES, 0.0) | dict(seconds)
     for step in steps:
@@ -59,10 +61,8 @@ def run_report(
         "quality": {
             **quality.summary(),
             "metric": quality.metric,
-            "inverted_cells": inverted_cells(quality),
-            "inverted_at_step": folded_at(
-                steps, mesh, np.array(inverted_cells(quality), np.int64)
-            ).tolist(),
+            "inverted_cells": list(folded),
+            "inverted_at_step": [step for _, step in folded.values()],
             "undeformed": {"min": undeformed.min, "mean": undeformed.mean},
         },
         "tried": [_fields(trial, TRIAL_KEYS) for trial in last.tried],
@@ -88,6 +88,13 @@ def run_report(
             for cycle in step.history
         ],
     }
+
+
+def folded_cells(steps: Sequence[Step], mesh: Mesh, quality: Quality) -> dict[int, tuple[int, int]]:
+    """Return type and first step of the first ``LISTED`` inverted cells, by number."""
+    cells = quality.inverted_cells(LISTED)
+    types, when = mesh.cells.types[cells].tolist(), folded_at(steps, mesh, cells).tolist()
+    return dict(zip(cells.tolist(), zip(types, when, strict=True), strict=True))
 
 
 def _fields(value: object, keys: Iterable[str]) -> dict[str, Any]:

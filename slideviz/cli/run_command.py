@@ -21,12 +21,15 @@ from slideviz.cli.options import (
 from slideviz.terms import SLIDES
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from slideviz.case.model import Case
     from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
     from slideviz.terms import FileFormat
 
+_CELLS, _ROWS = "quality of each cell", 1 << 18
 KEPT_BYTES = 1_000_000_000
 """Meshes of steps are kept up to this size, to tell when cells were inverted."""
 
@@ -46,6 +49,14 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
     add_zoom(call)
     add_shared(call, "zone")
+    call.add_argument(
+        "--stream",
+        action="store_true",
+        help="for meshes larger than memory (.su2b): only the boundary is in memory",
+    )
+    call.add_argument(
+        "--resume", action="store_true", help="go on where a streamed run was stopped"
+    )
     add_shared(call, "quiet")
     call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
     call.set_defaults(command=run)
@@ -54,9 +65,8 @@ def add_run(calls: argparse._SubParsersAction) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write mesh, report, steps and picture."""
     from slideviz import quality, read, write
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import tell_lost
-    from slideviz.cli.report import cell_data, run_report, save_history, save_json
+    from slideviz.cli.report import cell_data, folded_cells, run_report
     from slideviz.scene.moved import require_detail
 
     begin = time.perf_counter()
@@ -66,6 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     kind = _format_of(output, case)
     qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
     _require_places(arguments, case, output, qualities)
+    if arguments.stream or arguments.resume:
+        return _run_streamed(arguments, case, begin, output, qualities)
     seconds = {"read": -time.perf_counter()}
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     tell_lost(output, mesh, kind)
@@ -94,21 +106,79 @@ def run(arguments: argparse.Namespace) -> int:
         session = of_runs(Frame(mesh, before), [Run(1, case, (named,), "done")])
         picture(session, arguments.picture, arguments.picture_size or SIZE, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
-    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before)
+    folded = folded_cells(steps, mesh, found)
+    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
+    files = {"mesh": output, _CELLS: qualities}
+    return _tell(arguments, report, files, found, before, folded)
+
+
+def _run_streamed(
+    arguments: argparse.Namespace, case: Case, begin: float, output: Path, qualities: Path | None
+) -> int:
+    """Deform a mesh from file to file, with the same report as ``run``."""
+    from slideviz.cli.progress import Bar
+    from slideviz.cli.report import LISTED, run_report
+    from slideviz.deformation.streaming import stream
+    from slideviz.errors import CaseError
+
+    for option, value in (("--picture", arguments.picture), ("--steps-dir", arguments.steps_dir)):
+        if value:
+            raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
+    if (_format_of(output, case) or output.suffix.lower().removeprefix(".")) != "su2b":
+        raise CaseError(f"{output}: a streamed run writes SU2 binary meshes; end its name in .su2b")
+    with Bar(not arguments.quiet) as bar:
+        done = stream(
+            case,
+            output,
+            tell=bar,
+            resume=arguments.resume,
+            replaces=case.mesh_file if arguments.force else None,
+            listed=LISTED,
+        )
+    seconds = dict(done.seconds)
+    if qualities:
+        seconds["write"] = -time.perf_counter()
+        _write_qualities(qualities, done.quality)
+        seconds["write"] += time.perf_counter()
+    seconds["total"] = time.perf_counter() - begin
+    report = run_report(
+        case,
+        done.skin,
+        done.steps,
+        seconds,
+        quality=done.quality,
+        undeformed=done.undeformed,
+        folded=done.folded,
+    )
+    files = {"mesh": output, _CELLS: qualities}
+    return _tell(arguments, report, files, done.quality, done.undeformed, done.folded)
+
+
+def _tell(
+    arguments: argparse.Namespace,
+    report: dict,
+    files: dict[str, Path | None],
+    found: Quality,
+    before: Quality,
+    folded: Mapping[int, tuple[int, int]],
+) -> int:
+    """Write and print the report of a run, and return the exit code."""
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.report import save_history, save_json
+
     if arguments.history:
         save_history(arguments.history, report)
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")
     elif not arguments.quiet:
-        files = {"mesh": output, "quality of each cell": qualities}
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         _print_run(report, found, before, files)
-    for warning in last.warnings:
+    for warning in report["warnings"]:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
     if found.inverted:
-        print(f"slideviz: {_inverted_sentence(last.mesh, found, report)}", file=sys.stderr)
+        print(f"slideviz: {_inverted_sentence(found, report, folded)}", file=sys.stderr)
         return INVERTED
     return DONE
 
@@ -193,7 +263,9 @@ def _write_qualities(path: Path, found: Quality) -> None:
     from slideviz.mesh.io.atomic import atomic_write
 
     with atomic_write(path, CaseError) as file:
-        file.write(("\n".join(map(repr, found.values.tolist())) + "\n").encode())
+        for first in range(0, len(found), _ROWS):
+            part = found.values[first : first + _ROWS].tolist()
+            file.write(("\n".join(map(repr, part)) + "\n").encode())
 
 
 def _print_run(
@@ -222,14 +294,13 @@ def _print_run(
             print(f"{name}: {path}")
 
 
-def _inverted_sentence(mesh: Mesh, found: Quality, report: dict) -> str:
+def _inverted_sentence(found: Quality, report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
     """Return which cells are inverted, and what helps."""
-    from slideviz.cli.report import inverted_cells, type_name
+    from slideviz.mesh.elements import ELEMENTS
 
-    cells = inverted_cells(found)
-    when = report["quality"]["inverted_at_step"]
     named = ", ".join(
-        f"{i} ({type_name(mesh, i)}, step {k})" for i, k in zip(cells[:5], when, strict=False)
+        f"{cell} ({ELEMENTS[vtk].name}, step {step})"
+        for cell, (vtk, step) in list(folded.items())[:5]
     )
     more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
     return (

@@ -70,6 +70,25 @@ def unsoundness(
     )
 
 
+def overshoot_of_rest(
+    setup: Setup, mesh: Mesh, moved: FloatArray, part: float, length: float
+) -> str | None:
+    """Return in words that a node that is no boundary goes too far: ``length``, in the frame.
+
+    Parameters as of ``unsoundness``, of the skin of a mesh that such nodes are not in.
+    """
+    largest = part * float(np.linalg.norm(setup.target, axis=1).max(initial=0.0))
+    if length <= GROWTH * largest:
+        return None
+    shift = moved - setup.coords
+    if length <= GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding")):
+        return None
+    return (
+        f"would go {length:.3g} far, {length / largest:.3g} times the largest displacement that is "
+        f"asked for ({largest:.3g}): {_cause(setup, mesh, moved)}"
+    )
+
+
 def _reach(setup: Setup, shift: FloatArray, largest: float, kinds: tuple[str, ...]) -> float:
     """Return how far the displacement of boundaries of some kinds may carry nodes.
 

@@ -85,7 +85,7 @@ def deform(
     if setup is None:
         with watch.phase("classify"):
             setup = make_setup(case, mesh)
-    _require_memory(setup, case)
+    require_memory(setup, case)
     stepping = Stepping(case, mesh, setup, tell, watch.seconds)
     yield from stepping.steps(case.steps) if case.steps else _automatic(stepping)
 
@@ -158,7 +158,7 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     return first
 
 
-def _require_memory(setup: Setup, case: Case) -> None:
+def require_memory(setup: Setup, case: Case) -> None:
     """Raise DeformError when the system would not fit into memory."""
     if case.method == "elastic":
         _require_free(

@@ -15,6 +15,8 @@ from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.rbf.constraint_rows import AGREE
+from slideviz.rbf.field import Field
+from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
 
@@ -130,6 +132,8 @@ class Stepping:
         Receives ``Progress``; may raise to stop.
     seconds : dict
         Spent before the first step.
+    fields : list of Field or None
+        Receives the field of each step, where somebody wants them.
     """
 
     case: Case
@@ -137,6 +141,7 @@ class Stepping:
     setup: Setup
     tell: Callable[[Progress], None]
     seconds: dict[str, float]
+    fields: list[Field] | None = None
 
     def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
@@ -166,7 +171,7 @@ class Stepping:
             goal = setup.coords[setup.known] + setup.target * part
             solution = _step(setup, coords, goal, watch, before)
             moved = _moved(setup, coords, solution.displacement, goal)
-            points = _cartesian(setup, mesh.points, moved)
+            points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
                 points = mesh.halo.follow(mesh.points, points)
                 moved = _followed(setup, mesh.halo, points, moved)
@@ -184,6 +189,9 @@ class Stepping:
                 raise UnsoundError(f"step {index + 1}: {unsound}")
             coords, done, index = moved, part, index + 1
             before = solution
+            if self.fields is not None:
+                assert solution.field is not None
+                self.fields.append(solution.field)
             ahead.pop(0)
             if solution.short and solution.max_error > worst:
                 remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
@@ -274,21 +282,31 @@ def _moved(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
     """Return the new coordinates; known nodes are where they must be."""
-    displacement[setup.axis, :2] = 0.0
-    # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
-    moved = np.where(displacement == 0, coords, coords + displacement)
+    moved = shifted(coords, displacement, setup.axis)
     moved[setup.known] = np.where(
         goal == setup.coords[setup.known], setup.coords[setup.known], goal
     )
     return moved
 
 
-def _cartesian(setup: Setup, points: FloatArray, coords: FloatArray) -> FloatArray:
-    """Return the Cartesian points; nodes whose coordinates did not change keep every bit."""
-    if not setup.frame.cylindrical:
+def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> FloatArray:
+    """Return the coordinates (n, d) after a displacement; nodes on the ``axis`` (n,) stay on it."""
+    displacement[axis, :2] = 0.0
+    # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
+    return np.where(displacement == 0, coords, coords + displacement)
+
+
+def cartesian(
+    frame: Frame, points: FloatArray, start: FloatArray, coords: FloatArray
+) -> FloatArray:
+    """Return the Cartesian points of coordinates (n, d) that were ``start`` at ``points``.
+
+    Nodes whose coordinates did not change keep every bit.
+    """
+    if not frame.cylindrical:
         return coords
-    rest = np.all(coords == setup.coords, axis=1, keepdims=True)
-    return np.where(rest, points, setup.frame.points(coords))
+    rest = np.all(coords == start, axis=1, keepdims=True)
+    return np.where(rest, points, frame.points(coords))
 
 
 def _followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:

@@ -149,6 +149,23 @@ class Marker:
         return self.cells.nodes
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The numbers of points and cells in the mesh that a mesh is a part of, and how many it has.
+
+    Attributes
+    ----------
+    points, cells : (n,), (m,) int64
+        Ascending.
+    n_points, n_cells : int
+    """
+
+    points: IntArray
+    cells: IntArray
+    n_points: int
+    n_cells: int
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """Points, cells and boundaries of one zone.
@@ -175,6 +192,8 @@ class Mesh:
         What was found odd when reading, a sentence each.
     binary : BinaryForm or None
         How an SU2 binary file held it, kept for writing.
+    part : Part or None
+        Of which mesh it is a part: only what is needed of one that is larger than memory.
     """
 
     points: FloatArray
@@ -188,6 +207,7 @@ class Mesh:
     halo: Halo | None = None
     remarks: tuple[str, ...] = ()
     binary: BinaryForm | None = None
+    part: Part | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))
@@ -229,6 +249,10 @@ class Mesh:
             if marker.name == name:
                 return marker
         raise MeshError(f"no marker {name!r}; the mesh has {', '.join(self.marker_names)}")
+
+    def number(self, node: int) -> int:
+        """Return the number that a node has for people: that in its file."""
+        return node if self.part is None else int(self.part.points[node])
 
     def with_points(self, points: ArrayLike) -> Mesh:
         """Return the same mesh at other points, (n, d)."""

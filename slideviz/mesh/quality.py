@@ -117,8 +117,8 @@ class Quality:
 
     def inverted_cells(self, n: int) -> IntArray:
         """Return the ids of the first ``n`` inverted cells."""
-        ids = np.arange(len(self))[self.counted]
-        return ids[self.status[ids] == INVERTED][:n]
+        found = self.status == INVERTED
+        return np.flatnonzero(found if self.halo is None else found & ~self.halo)[:n]
 
     def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
         """Return the counts (bins,) and the edges (bins + 1,) of equal bins over 0 to 1."""

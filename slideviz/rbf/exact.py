@@ -7,8 +7,9 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Tick, matrix
+from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch, linear_terms
+from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
 from slideviz.rbf.solve import (
     NOTHING,
     Factor,

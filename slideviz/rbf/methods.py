@@ -11,6 +11,7 @@ lack is spread to the nodes near them (section 2.5.1, Eq. 2.30 and 2.31).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +22,7 @@ from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE, ConstraintRows, full_rows, merge, sliding_rows
 from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
+from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
 from slideviz.rbf.problem import Cycle, Interpolant, Problem, Solution, Watch
 
@@ -36,10 +38,6 @@ of the weights brings back."""
 GAMMA = 25.0
 NEGLIGIBLE = 1e-14
 """Errors below this part of the support radius are rounding, and are not spread."""
-
-TIE = 1e-4
-"""Boundary nodes farther than the nearest one by less than this part of its distance count too:
-far above rounding, far below any difference of distances that a mesh could mean."""
 
 
 class Fit(Protocol):
@@ -169,9 +167,12 @@ def _finish(
     if problem.reduction is None:
         lost = float(np.linalg.norm(errors[~left_out], axis=1).max(initial=0.0))
     off = lost > LOST * np.linalg.norm(values, axis=1).max(initial=0.0)
+    correction = None
     if problem.reduction is not None or len(fit.dropped) or off:
+        correction = correction_of(problem, nodes, errors)
+    if correction is not None:
         with watch.phase("correct") as tick:
-            correct(problem, displacement, nodes, errors, tick)
+            correct(problem, displacement, nodes, correction, tick)
     displacement[nodes] = values
     return Solution(
         displacement,
@@ -185,76 +186,48 @@ def _finish(
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
         lost=lost,
+        field=replace(fit.found.field(problem), correction=correction),
     )
+
+
+def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Correction | None:
+    """Return what spreads what boundary nodes lack; None where that is rounding.
+
+    It reaches ``gamma`` times the largest error (Eq. 2.31).
+
+    Parameters
+    ----------
+    nodes : (b,)
+        Boundary nodes with known displacement, and ``errors`` (b, d): what they lack.
+    """
+    largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
+    if largest <= NEGLIGIBLE * problem.basis.radius:
+        return None
+    radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest
+    # Nodes that coincide, or are images of each other, count once.
+    once = np.unique(problem.same_as[nodes], return_index=True)[1]
+    at = problem.coords[nodes[once]]
+    sources, lacking = problem.cartesian(at), errors[once]
+    if np.any(problem.shift):
+        images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
+        sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
+    return Correction(cKDTree(sources), lacking, radius)
 
 
 def correct(
     problem: Problem,
     displacement: FloatArray,
     nodes: IntArray,
-    errors: FloatArray,
+    correction: Correction,
     tick: Tick,
 ) -> None:
-    """Spread what boundary nodes lack to the nodes near them, in place.
-
-    Each node takes over the error of its nearest boundary node, weighted with Wendland's C2
-    function of the distance over ``gamma`` times the largest error. The search is bounded by
-    that radius, which is what makes it cheap, and goes on beyond periodic boundaries. Where
-    several are equally near, as on symmetric meshes, it is the mean of their errors: one of them
-    would be chosen by its number.
-
-    Parameters
-    ----------
-    displacement : (n, d)
-        Changed in place.
-    nodes : (b,)
-        Boundary nodes with known displacement, and ``errors`` (b, d): what they lack.
-    """
-    largest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
-    if largest <= NEGLIGIBLE * problem.basis.radius:
-        return
-    radius = (problem.reduction.gamma if problem.reduction else GAMMA) * largest
-    # Nodes that coincide, or are images of each other, count once.
-    once = np.unique(problem.same_as[nodes], return_index=True)[1]
-    at, lacking = problem.coords[nodes[once]], errors[once]
-    sources = problem.cartesian(at)
-    if np.any(problem.shift):
-        images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
-        sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
-    tree = cKDTree(sources)
+    """Spread what boundary nodes ``nodes`` (b,) lack to all others, in place."""
     free = np.ones(len(displacement), bool)
     free[nodes] = False
 
     def correct_part(part: slice) -> None:
         targets = part.start + np.flatnonzero(free[part])
-        points = problem.cartesian(problem.coords[targets])
-        near = tree.query(points, k=2, distance_upper_bound=radius)
-        distance, index = (np.asarray(found) for found in near)
-        hit = np.flatnonzero(np.isfinite(distance[:, 0]))
-        distance, taken = distance[hit], lacking[index[hit, 0]]
-        q = distance[:, 0] / radius
-        share = (1.0 - q) ** 4 * (4.0 * q + 1.0)
-        tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])
-        if len(tied):
-            taken[tied] = _means(tree, lacking, points[hit[tied]], distance[tied, 0])
-        displacement[targets[hit]] += share[:, None] * taken
+        hit, taken = correction.near(problem.cartesian(problem.coords[targets]))
+        displacement[targets[hit]] += taken
 
     in_parts(correct_part, len(displacement), tick)
-
-
-def _means(
-    tree: cKDTree, lacking: FloatArray, points: FloatArray, distance: FloatArray
-) -> FloatArray:
-    """Return the mean (m, d) of the errors of the sources that are nearest to points (m, d).
-
-    The weight of each falls to zero at ``TIE`` beyond the nearest, so that rounding, which moves
-    the nodes of a symmetric mesh a little, changes the mean little.
-    """
-    found = tree.query_ball_point(points, (1.0 + TIE) * distance)
-    row = np.repeat(np.arange(len(points)), [len(each) for each in found])
-    source = np.concatenate([np.array(each, np.int64) for each in found])
-    beyond = np.linalg.norm(points[row] - tree.data[source], axis=1) - distance[row]
-    weight = np.clip(1.0 - beyond / np.maximum(TIE * distance[row], 1e-300), 0.0, 1.0)
-    total = np.zeros((len(points), lacking.shape[1] + 1))
-    np.add.at(total, row, weight[:, None] * np.c_[lacking[source], np.ones(len(source))])
-    return total[:, :-1] / total[:, -1:]

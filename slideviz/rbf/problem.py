@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as made_by
 from time import perf_counter
 from typing import Literal
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
+from slideviz.rbf.evaluate import Basis, Tick, no_tick
+from slideviz.rbf.field import Field, RadialField
 from slideviz.terms import Selection
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
@@ -22,7 +24,7 @@ class Watch:
     """Seconds spent in each phase, and the progress callback of the step."""
 
     report: Callable[[str, float], None]
-    seconds: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = made_by(default_factory=dict)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[Tick]:
@@ -175,6 +177,8 @@ class Solution:
     lost : float
         By how much the solution of an exact system misses its own control nodes, before they
         are set.
+    field : Field or None
+        What displaced the nodes that are no boundary; None where a method has no such thing.
     """
 
     displacement: FloatArray
@@ -184,11 +188,12 @@ class Solution:
     condition: float
     history: tuple[Cycle, ...] = ()
     warnings: tuple[str, ...] = ()
-    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     lag: FloatArray | None = None
     dropped_error: float = 0.0
     short: str = ""
     lost: float = 0.0
+    field: Field | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,13 +216,12 @@ class Interpolant:
 
     def at(self, problem: Problem, nodes: IntArray | slice, tick: Tick = no_tick) -> FloatArray:
         """Return the displacements (m, d) of nodes in the frame."""
-        basis, targets = problem.basis, problem.features[:, nodes]
-        if not len(self.nodes):
-            return np.zeros((targets.shape[1], problem.values.shape[1]))
-        found = evaluate(basis, targets, problem.features[:, self.nodes], self.weights, tick)
-        if self.tail is not None:
-            found += linear_terms(basis, targets) @ self.tail
-        return found
+        return self.field(problem).interpolated(problem.features[:, nodes], tick)
+
+    def field(self, problem: Problem) -> RadialField:
+        """Return what gives it anywhere, without a correction."""
+        controls = problem.features[:, self.nodes]
+        return RadialField(problem.basis, controls, self.weights, self.tail)
 
     def plus(self, other: Interpolant) -> Interpolant:
         """Return the sum of both, each node once, in the order of first occurrence."""
@@ -231,18 +235,3 @@ class Interpolant:
         if self.tail is not None and other.tail is not None:
             tail = self.tail + other.tail
         return Interpolant(unique[order], total[order], tail)
-
-
-def linear_terms(basis: Basis, features: FloatArray) -> FloatArray:
-    """Return the terms of the linear polynomial at nodes, (n, q), periodic where the case is.
-
-    1 and the features: with a translational period these include the circle's cosine and sine;
-    with a rotational one the angle enters by the cosine and sine of its full period.
-    """
-    rows = [np.ones(features.shape[1])]
-    if basis.period > 0:
-        r, sine, cosine, z = features
-        rows += [r, cosine**2 - sine**2, 2 * sine * cosine, z]
-    else:
-        rows += list(features)
-    return np.stack(rows, axis=1)

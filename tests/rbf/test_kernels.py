@@ -6,8 +6,8 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Reduction
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
+from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import linear_terms
 from slideviz.rbf.solve import condition, saddle_condition, solve_saddle
 from slideviz.samples.table import sample, write_sample
 

@@ -12,7 +12,7 @@ from slideviz.case.model import Case, Reduction, Scale, Translate
 from slideviz.rbf.classify import _Around, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
-from slideviz.rbf.methods import correct
+from slideviz.rbf.methods import correct, correction_of
 from slideviz.rbf.problem import Problem
 from slideviz.rbf.problem import Reduction as Settings
 from slideviz.rbf.selection import TIE, favour
@@ -111,7 +111,8 @@ def problem_of(points, same_as=None, shift=(0.0, 0.0)):
 
 def corrected(problem, nodes, errors):
     out = np.zeros_like(problem.coords)
-    correct(problem, out, np.array(nodes), np.array(errors), no_tick)
+    correction = correction_of(problem, np.array(nodes), np.array(errors))
+    correct(problem, out, np.array(nodes), correction, no_tick)
     return out
 
 

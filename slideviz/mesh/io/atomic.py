@@ -61,7 +61,7 @@ def atomic_write(
     temporary: Path | None = None
     try:
         real = Path(os.path.realpath(target))
-        mode = _mode_of(real)
+        mode = mode_of(real)
         with draft(real.parent) as temporary:
             with temporary.open("xb") as file:
                 yield file
@@ -92,14 +92,14 @@ def require_writable(
     require_no_input(Path(path), error, replaces)
     real = Path(os.path.realpath(path))
     try:
-        _mode_of(real)
+        mode_of(real)
         with draft(real.parent) as temporary:
             temporary.touch(exist_ok=False)
     except OSError as problem:
         raise error(f"{path}: cannot be written: {reason_of(problem)}") from problem
 
 
-def _mode_of(path: Path) -> int | None:
+def mode_of(path: Path) -> int | None:
     """Return the permission bits of an existing file that may be replaced, or None."""
     if not path.exists():
         return None

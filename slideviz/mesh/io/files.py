@@ -62,7 +62,7 @@ def read(
     path = Path(path)
     tick = progress or (lambda _: None)
     try:
-        kind = _format_of(path, file_format)
+        kind = format_of(path, file_format)
         if kind == "su2b":
             return read_su2b(path, zone, tick)
         if kind == "su2":
@@ -80,7 +80,7 @@ def read(
         ) from problem
 
 
-def _format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
+def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
     """Return the SU2 format of a file: as given, by ending or, as that may not say, by content."""
     ending = path.suffix.lower()
     try:

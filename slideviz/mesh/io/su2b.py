@@ -100,13 +100,13 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
             done += count
             progress(min(1.0, done / max(whole, 1)))
 
-        cells, order = _cells(source, place, place.cells, place.dim, tick)
+        cells, order = read_elements(source, place, place.cells, place.dim, tick)
         points = np.empty((place.n_points, place.dim))
         for first, block in point_blocks(source, place):
             points[first : first + len(block)] = block
             tick(len(block))
         markers = tuple(
-            Marker(m.name, _cells(source, place, m.elements, place.dim - 1, tick)[0])
+            Marker(m.name, read_elements(source, place, m.elements, place.dim - 1, tick)[0])
             for m in place.markers
         )
         form = BinaryForm(
@@ -297,7 +297,7 @@ def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntA
         )
 
 
-def _cells(
+def read_elements(
     source: Source, place: ZonePlace, table: Elements, dim: int, tick: Callable[[int], None]
 ) -> tuple[Cells, IntArray | None]:
     """Return the elements of a table, and which of them stands at each place of the file.

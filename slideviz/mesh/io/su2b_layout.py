@@ -10,6 +10,7 @@ is cut off or was changed costs no memory.
 from __future__ import annotations
 
 import os
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Literal
@@ -102,6 +103,12 @@ class Source:
         self.zones = self.whole(_INT, "the number of zones")
         if self.zones < 1:
             raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
+
+    def of(self, file: BinaryIO) -> Source:
+        """Return the same for another file of the same layout, whose head is not read."""
+        other = copy(self)
+        other._file = file
+        return other
 
     @property
     def conn(self) -> np.dtype:

@@ -1,0 +1,109 @@
+"""The rest of a mesh: nodes that are no boundary, displaced by the fields of all steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.deformation.growth import overshoot_of_rest
+from slideviz.deformation.setup import Setup
+from slideviz.deformation.stepping import Step, cartesian, shifted
+from slideviz.errors import DeformError, MeshError, UnsoundError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.rbf.axis import on_axis
+from slideviz.rbf.field import Field
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What moves nodes of a mesh of which only the skin is in memory.
+
+    Attributes
+    ----------
+    skin : Mesh
+        Undeformed.
+    setup : Setup
+        That of the skin.
+    steps : tuple of Step
+        Those of the skin, deformed.
+    fields : tuple of Field
+        One for each step.
+    """
+
+    skin: Mesh
+    setup: Setup
+    steps: tuple[Step, ...]
+    fields: tuple[Field, ...]
+
+    def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
+        """Yield the points (m, d) of nodes (m,), by their numbers and ascending, after each step.
+
+        Raises
+        ------
+        DeformError
+            Coordinates became infinite, or a node would go far beyond the motion.
+        MeshError
+            A node lies where no boundary encloses it.
+        """
+        frame = self.setup.frame
+        start = frame.coords(points)
+        at, where = self._in_skin(nodes)
+        inner = np.ones(len(points), bool)
+        inner[at] = False
+        self._require_enclosed(nodes, points, start, inner)
+        axis, coords = on_axis(frame, start), start
+        for step, field in zip(self.steps, self.fields, strict=True):
+            displacement = field.at(frame.features(coords), frame.points(coords))
+            coords = shifted(coords, displacement, axis)
+            now = cartesian(frame, points, start, coords)
+            if not np.all(np.isfinite(now)):
+                raise DeformError(f"step {step.index}: coordinates became infinite; use more steps")
+            self._require_sound(step, nodes, points, (coords - start) * inner[:, None])
+            # A Cartesian frame has the points as coordinates, which are those of the next step.
+            out = now.copy()
+            out[at] = step.mesh.points[where]
+            yield out
+
+    def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
+        """Return which of some nodes, ascending, are in the skin, and their places there."""
+        assert self.skin.part is not None
+        numbers = self.skin.part.points
+        where = np.searchsorted(numbers, nodes)
+        at = np.flatnonzero(numbers[np.minimum(where, len(numbers) - 1)] == nodes)
+        return at, where[at]
+
+    def _require_enclosed(
+        self, nodes: IntArray, points: FloatArray, start: FloatArray, inner: np.ndarray
+    ) -> None:
+        """Raise where a node is farther from the axis, or in another sector, than any in the skin.
+
+        The frame of the whole mesh would be another one then.
+        """
+        frame, own = self.setup.frame, self.setup.coords
+        if not frame.cylindrical:
+            return
+        low, high = own[:, 1].min(), own[:, 1].max()
+        out = (start[:, 0] > frame.radius) | (start[:, 1] < low) | (start[:, 1] > high)
+        out &= inner
+        if out.any():
+            k = int(np.argmax(out))
+            where = ", ".join(f"{value:.6g}" for value in points[k])
+            raise MeshError(
+                f"{self.skin.name}: node {nodes[k]} at ({where}) is outside the sector that the "
+                "boundaries enclose, so the mesh cannot be streamed; give all its sides markers, "
+                "or run it without --stream"
+            )
+
+    def _require_sound(
+        self, step: Step, nodes: IntArray, points: FloatArray, shift: FloatArray
+    ) -> None:
+        length = np.linalg.norm(shift, axis=1)
+        k = int(np.argmax(length))
+        moved = self.setup.frame.coords(step.mesh.points)
+        part = step.index / step.total
+        message = overshoot_of_rest(self.setup, self.skin, moved, part, float(length[k]))
+        if message:
+            where = ", ".join(f"{value:.6g}" for value in points[k])
+            raise UnsoundError(f"step {step.index}: node {nodes[k]} at ({where}) {message}")

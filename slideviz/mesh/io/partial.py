@@ -1,0 +1,171 @@
+"""A large file that is made in place over some time, and can be gone on with after a stop.
+
+It is a copy of another one, which is changed part by part, under a hidden name beside what it is
+to become. Until the end its first bytes are zeros, so that nothing reads it; then they are put
+back, and it takes the place of the target in one step of the file system.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from slideviz.errors import MeshError
+from slideviz.mesh.io.atomic import mode_of, reason_of
+from slideviz.mesh.io.file_checks import require_no_input
+
+HEAD = 8
+"""Bytes that are zeros until the end."""
+_PIECE = 1 << 28
+
+
+@dataclass(eq=False)
+class Partial:
+    """A file that is being made.
+
+    Attributes
+    ----------
+    file : BinaryIO
+        Open for reading and writing.
+    done : int
+        How many parts are made, of those that the caller counts.
+    """
+
+    file: BinaryIO
+    done: int
+    _note: Path
+    _about: str
+
+    def note(self, done: int) -> None:
+        """Keep that so many parts are made, after they are on the disk."""
+        self.file.flush()
+        os.fdatasync(self.file.fileno())
+        self.done = done
+        fresh = self._note.with_suffix(".new")
+        fresh.write_text(json.dumps({"about": self._about, "done": done}))
+        fresh.replace(self._note)
+
+
+def names_of(path: Path) -> tuple[Path, Path]:
+    """Return what the file in the making is called, and the note of how far it is."""
+    real = Path(os.path.realpath(path))
+    return real.with_name(f".{real.name}.partial"), real.with_name(f".{real.name}.partial.json")
+
+
+@contextmanager
+def partial_copy(
+    path: Path,
+    source: Path,
+    about: str,
+    *,
+    resume: bool,
+    replaces: Path | None,
+    progress: Callable[[float], object],
+) -> Iterator[Partial]:
+    """Return a copy of ``source`` to be changed; it takes the place of ``path`` at the end.
+
+    After an error nothing is left; after the end of the process the copy and the note of what is
+    done stay, so that ``resume`` can go on with them.
+
+    Parameters
+    ----------
+    about : str
+        What is made of what: another text begins anew.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written, or another process is making it.
+    """
+    require_no_input(path, MeshError, replaces)
+    ours, note = names_of(path)
+    try:
+        mode = mode_of(Path(os.path.realpath(path)))
+        done = _noted(note, about) if resume else 0
+        with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
+            _lock(file, path)
+            try:
+                if not done or os.fstat(file.fileno()).st_size != source.stat().st_size:
+                    done = 0
+                    note.unlink(missing_ok=True)
+                    _copy(file, source, progress)
+                with source.open("rb") as given:
+                    head = given.read(HEAD)
+                yield Partial(file, done, note, about)
+                file.seek(0)
+                file.write(head)
+                file.flush()
+                os.fsync(file.fileno())
+            except Exception:
+                _removed(ours, note)
+                raise
+            ours.chmod(0o644 & ~_umask() if mode is None else mode)
+            ours.replace(os.path.realpath(path))
+            note.unlink(missing_ok=True)
+    except OSError as problem:
+        if problem.filename is not None and Path(str(problem.filename)) not in (ours, note, path):
+            raise
+        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+
+
+def _noted(note: Path, about: str) -> int:
+    """Return how many parts of the same work a stopped process has made."""
+    try:
+        kept = json.loads(note.read_text())
+        return int(kept["done"]) if kept["about"] == about else 0
+    except (OSError, ValueError, KeyError, TypeError):
+        return 0
+
+
+def _lock(file: BinaryIO, path: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as problem:
+        if problem.errno not in (errno.EAGAIN, errno.EACCES):
+            raise
+        raise MeshError(
+            f"{path}: another process is writing it; wait for it, or choose another name"
+        ) from problem
+
+
+def _copy(file: BinaryIO, source: Path, progress: Callable[[float], object]) -> None:
+    """Copy the source but for its head."""
+    with source.open("rb") as given:
+        size = os.fstat(given.fileno()).st_size
+        os.ftruncate(file.fileno(), 0)
+        os.ftruncate(file.fileno(), size)
+        at = HEAD
+        while at < size:
+            at += _copied(given, file, at, min(_PIECE, size - at))
+            progress(at / size)
+
+
+def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:
+    """Copy some bytes within the kernel where that is possible, and return how many."""
+    with suppress(OSError, AttributeError):
+        moved = os.copy_file_range(given.fileno(), file.fileno(), count, at, at)
+        if moved:
+            return moved
+    block = os.pread(given.fileno(), count, at)
+    if not block:
+        raise MeshError(f"{given.name}: became shorter while it was read; run it again")
+    return os.pwrite(file.fileno(), block, at)
+
+
+def _removed(*paths: Path) -> None:
+    for path in paths:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    now = os.umask(0)
+    os.umask(now)
+    return now

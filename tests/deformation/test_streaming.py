@@ -1,0 +1,381 @@
+"""Streamed runs: the bits of a run in memory, whatever the chunks; stopped, and gone on with."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.cli.options import changed
+from slideviz.deformation import rest, streaming
+from slideviz.deformation.solver import folded_at
+from slideviz.deformation.streaming import stream
+from slideviz.errors import CaseError, MeshError, UnsoundError
+from slideviz.mesh.io import partial
+from slideviz.mesh.io.partial import names_of
+from slideviz.mesh.io.su2b_layout import MAGIC
+from slideviz.mesh.skin import read_skin
+from slideviz.samples.table import write_sample
+from tests.builders import grid
+from tests.mesh.test_su2b import WHOLE, change
+
+RUNS = [
+    ("square", 25, ("STEPS=3",)),
+    ("square", 25, ("STEPS=3", "SLIDING_MODE=ds")),
+    ("square", 25, ("STEPS=1", "SLIDING_MODE=none", "PERIODIC_MODE=none")),
+    ("square", 25, ("STEPS=2", "RBF_KERNEL=thin-plate", "PERIODIC_MODE=fixed")),
+    ("square", 25, ("STEPS=2", "METHOD=idw")),
+    ("square", 25, ("STEPS=2", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-2")),
+    ("polar", 25, ("STEPS=2", "PERIODIC_MODE=periodic", "SLIDING_MODE=ds")),
+    ("hexahedron", 9, ("STEPS=2",)),
+    ("cylindrical", 9, ("STEPS=2", "METHOD=idw")),
+    ("cylindrical", 9, ("STEPS=2", "PERIODIC_MODE=none", "RBF_KERNEL=thin-plate")),
+    ("turbine-row", 5000, ("STEPS=2", "DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-6")),
+    ("stator", 7000, ("STEPS=2",)),
+]
+"""Sample, size and changes of its case: every sliding method, periodic mode and kind of frame."""
+
+
+def made(folder, name, size, sets=()):
+    write_sample(name, folder, size, file_format="su2b")
+    return changed(sv.Case.read(folder / f"{name}.cfg"), sets)
+
+
+def bits(points):
+    return points.view(np.int64)
+
+
+@pytest.mark.parametrize(("name", "size", "sets"), RUNS)
+def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, sets):
+    case = made(tmp_path, name, size, sets)
+    mesh = sv.read(case.mesh_file)
+    steps = list(sv.deform(case, mesh))
+    found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
+    ids = found.inverted_cells(100)
+    for chunk in (37, 1000, 1 << 20):
+        monkeypatch.setattr(streaming, "CHUNK", chunk)
+        done = stream(case, tmp_path / "out.su2b")
+        moved = sv.read(tmp_path / "out.su2b")
+        assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
+        assert moved.cells.same_as(mesh.cells)
+        assert done.quality.summary() == found.summary()
+        assert np.array_equal(done.quality.values, found.values)
+        assert done.undeformed.summary() == before.summary()
+        when = {cell: step for cell, (_, step) in done.folded.items()}
+        assert when == dict(zip(ids.tolist(), folded_at(steps, mesh, ids).tolist(), strict=True))
+        for one, other in zip(steps, done.steps, strict=True):
+            for field in ("max_error", "control_nodes", "node_counts", "warnings"):
+                assert getattr(one, field) == getattr(other, field)
+            assert one.periodic_misfit == other.periodic_misfit
+    assert sorted(p.name for p in tmp_path.glob(".*")) == []
+
+
+def test_folded_cells_are_followed_through_the_steps(tmp_path, monkeypatch):
+    monkeypatch.setattr(streaming, "CHUNK", 50)
+    case = made(tmp_path, "square", 25, ("STEPS=3", "SLIDING_MODE=none", "PERIODIC_MODE=none"))
+    case = case.change(motions=(sv.Rotate(case.markers_with("moving")[0], 170.0),))
+    mesh = sv.read(case.mesh_file)
+    steps = list(sv.deform(case, mesh))
+    found = sv.quality(steps[-1].mesh, mesh)
+    assert found.inverted > 5
+    done = stream(case, tmp_path / "out.su2b", listed=5)
+    ids = found.inverted_cells(5)
+    assert list(done.folded) == ids.tolist()
+    assert [step for _, step in done.folded.values()] == folded_at(steps, mesh, ids).tolist()
+    assert {vtk for vtk, _ in done.folded.values()} == {9}
+
+
+@pytest.mark.parametrize("kind", ["mixed", "prism"])
+def test_cells_in_another_order_and_other_zones_stay(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(streaming, "CHUNK", 40)
+    mesh = grid((5, 4, 4), kind=kind)
+    assert kind == "prism" or len(mesh.cells.by_type) > 1
+    path = tmp_path / "mesh.su2b"
+    sv.write(tmp_path / "a.su2", mesh)
+    text = (tmp_path / "a.su2").read_text()
+    (tmp_path / "two.su2").write_text(f"NZONE= 2\nIZONE= 1\n{text}IZONE= 2\n{text}")
+    sv.convert(tmp_path / "two.su2", path)
+    case = sv.Case(
+        mesh_file=path,
+        zone=2,
+        roles={"x_p": "moving", "y_m": "sliding"},
+        motions=(sv.Translate("x_p", (0.2, 0.1, 0.0)),),
+        sliding="ds",
+        steps=2,
+    )
+    done = stream(case, tmp_path / "out.su2b")
+    second = sv.read(path, zone=2)
+    *_, last = sv.deform(case, second)
+    sv.write(tmp_path / "memory.su2b", last.mesh)
+    assert (tmp_path / "out.su2b").read_bytes() == (tmp_path / "memory.su2b").read_bytes()
+    assert np.array_equal(done.quality.values, sv.quality(last.mesh, second).values)
+
+
+def test_the_command_writes_the_same_files_and_report(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    made(tmp_path, "square", 25)
+    call = ["run", "square.cfg", "--steps", "2"]
+    texts = []
+    for more in ([], ["--stream"]):
+        assert run([*call, "-o", "out.su2b", "--json", "-", *more]) == 0
+        report = json.loads(capsys.readouterr().out)
+        assert all(part >= 0 for part in report.pop("seconds").values())
+        assert len(report.pop("condition")) == 2  # an estimate, which differs from run to run
+        texts.append((report, Path("out.su2b").read_bytes(), Path("out_qual.txt").read_bytes()))
+    assert texts[0] == texts[1]
+    assert run([*call, "-o", "mesh.su2b", "--stream"]) == 1
+    assert "is the input mesh" in capsys.readouterr().err
+    assert run([*call, "-o", "mesh.su2b", "--stream", "--force", "-q"]) == 0
+    assert Path("mesh.su2b").read_bytes() == texts[0][1]
+
+
+class KilledError(BaseException):
+    """What ends a process without a chance to tidy up."""
+
+
+def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(streaming, "CHUNK", 60)
+    case = made(tmp_path, "square", 25, ("STEPS=2",))
+    out = tmp_path / "out.su2b"
+    stream(case, out)
+    whole, move = out.read_bytes(), streaming._move
+    parts = -(-len(sv.read(case.mesh_file).points) // 60)
+    out.write_bytes(b"older")
+    for stop in range(parts):
+        calls = []
+
+        def stopping(*arguments, stop=stop, calls=calls):
+            if len(calls) == stop:
+                raise KilledError
+            calls.append(1)
+            move(*arguments)
+
+        monkeypatch.setattr(streaming, "_move", stopping)
+        with pytest.raises(KilledError):
+            stream(case, out)
+        assert out.read_bytes() == b"older"
+        ours, _ = names_of(out)
+        assert ours.read_bytes()[:4] not in MAGIC
+        with pytest.raises(MeshError, match="this is no SU2 binary mesh"):
+            sv.read(ours, file_format="su2b")
+        counted = []
+        monkeypatch.setattr(
+            streaming, "_move", lambda *a, seen=counted: (seen.append(1), move(*a))[1]
+        )
+        stream(case, out, resume=True)
+        assert len(counted) == parts - stop
+        assert out.read_bytes() == whole
+        assert not list(tmp_path.glob(".*"))
+        out.write_bytes(b"older")
+
+
+def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr(streaming, "CHUNK", 60)
+    case = made(tmp_path, "square", 25, ("STEPS=2",))
+    out, move = tmp_path / "out.su2b", streaming._move
+    monkeypatch.setattr(streaming, "_move", lambda *a: (_ for _ in ()).throw(KilledError()))
+    with pytest.raises(KilledError):
+        stream(case, out)
+    names_of(out)[1].write_text("no note")
+    monkeypatch.setattr(streaming, "_move", move)
+    other = case.change(steps=1)
+    stream(other, out, resume=True)
+    again = out.read_bytes()
+    stream(other, out)
+    assert out.read_bytes() == again
+
+
+def test_an_error_leaves_nothing(tmp_path, monkeypatch):
+    case = made(tmp_path, "square", 8, ("STEPS=1",))
+    out = tmp_path / "out.su2b"
+    out.write_bytes(b"older")
+
+    def stop(progress):
+        if progress.phase == "quality" and progress.fraction:
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        stream(case, out, tell=stop)
+    assert out.read_bytes() == b"older"
+    assert not list(tmp_path.glob(".*"))
+    monkeypatch.setattr(rest, "overshoot_of_rest", lambda *_: "would go too far")
+    with pytest.raises(UnsoundError, match=r"step 1: node \d+ at \(.*\) would go too far"):
+        stream(case, out)
+    assert out.read_bytes() == b"older"
+
+
+SCRIPT = """
+import sys, time
+from pathlib import Path
+import slideviz as sv
+from slideviz.deformation import streaming
+move = streaming._move
+def slow(*a):
+    time.sleep(0.05)
+    move(*a)
+streaming._move, streaming.CHUNK = slow, 30
+streaming.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
+"""
+
+
+def test_killing_it_leaves_no_half_mesh(tmp_path):
+    case = made(tmp_path, "square", 25)
+    case.change(steps=2).write(tmp_path / "square.cfg")
+    out, reference = tmp_path / "out.su2b", tmp_path / "reference.su2b"
+    stream(sv.Case.read(tmp_path / "square.cfg"), reference)
+    note = names_of(out)[1]
+    for goal in (2, 9, 17):
+        call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), str(out), "resume"]
+        process = subprocess.Popen(call, cwd=Path(sv.__file__).parents[1])
+        until = time.monotonic() + 100
+        while process.poll() is None and time.monotonic() < until:
+            if note.exists() and json.loads(note.read_text())["done"] >= goal:
+                break
+            time.sleep(0.01)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        assert not out.exists()
+        assert json.loads(note.read_text())["done"] >= goal
+    subprocess.run(call, check=True, cwd=Path(sv.__file__).parents[1])
+    assert out.read_bytes() == reference.read_bytes()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    case = made(tmp_path, "square", 8)
+    out = tmp_path / "out.su2b"
+    with pytest.raises(CaseError, match="STEPS= auto cannot be streamed"):
+        stream(case.change(steps=0), out)
+    with pytest.raises(CaseError, match="METHOD= elastic needs the whole mesh at once"):
+        stream(case.change(method="elastic"), out)
+    sv.convert("mesh.su2b", "mesh.su2")
+    with pytest.raises(MeshError, match="only SU2 binary meshes can be streamed; make one with"):
+        stream(case.change(mesh_file=tmp_path / "mesh.su2"), out)
+    for more, words in (
+        (["-o", "out.su2"], "a streamed run writes SU2 binary meshes"),
+        (["--picture", "a.png"], "--picture needs the mesh in memory"),
+        (["--steps-dir", "steps"], "--steps-dir needs the mesh in memory"),
+    ):
+        assert run(["run", "square.cfg", "--stream", *more]) == 1
+        assert words in capsys.readouterr().err
+
+
+def test_cells_numbered_both_ways_are_told(tmp_path):
+    mesh = grid((4, 4))
+    turned = mesh.cells.connectivity.reshape(-1, 4).copy()
+    turned[:8] = turned[:8, ::-1]
+    cells = sv.Cells.from_types(mesh.cells.types, turned.ravel())
+    sv.write(tmp_path / "mesh.su2b", replace(mesh, cells=cells))
+    case = sv.Case(
+        mesh_file=tmp_path / "mesh.su2b",
+        roles={"x_p": "moving"},
+        motions=(sv.Translate("x_p", (0.1, 0.0)),),
+    )
+    whole = streaming.CHUNK
+    streaming.CHUNK = 8
+    try:
+        with pytest.raises(MeshError, match=r"numbered the other way round .* without --stream"):
+            stream(case, tmp_path / "out.su2b")
+    finally:
+        streaming.CHUNK = whole
+    assert not (tmp_path / "out.su2b").exists()
+
+
+def test_a_node_beyond_the_sector_of_the_boundary_is_told(tmp_path):
+    case = made(tmp_path, "cylindrical", 9)
+    mesh = sv.read(case.mesh_file)
+    on = np.unique(np.concatenate([marker.nodes for marker in mesh.markers]))
+    inner = np.setdiff1d(np.arange(len(mesh.points)), on)
+    skin = read_skin(case.mesh_file, None)
+    inner = np.setdiff1d(inner, skin.part.points)
+    assert len(inner)
+    points = mesh.points.copy()
+    r, angle = np.hypot(*points[:, :2].T), np.arctan2(points[:, 1], points[:, 0])
+    far = angle.max() + 0.05
+    # Within the box around the mesh, so that it is none of its outermost nodes.
+    points[inner[0], :2] = 1.1 * r.min() * np.array([np.cos(far), np.sin(far)])
+    assert (points[inner[0]] < mesh.points.max(axis=0)).all()
+    assert (points[inner[0]] > mesh.points.min(axis=0)).all()
+    sv.write(tmp_path / "odd.su2b", mesh.with_points(points))
+    with pytest.raises(MeshError, match=rf"node {inner[0]} at .* is outside the sector"):
+        stream(case.change(mesh_file=tmp_path / "odd.su2b"), tmp_path / "out.su2b")
+
+
+def test_two_processes_do_not_write_one_file(tmp_path):
+    case = made(tmp_path, "square", 8, ("STEPS=1",))
+    out = tmp_path / "out.su2b"
+    ours, _ = names_of(out)
+    with ours.open("wb") as held:
+        import fcntl
+
+        fcntl.flock(held, fcntl.LOCK_EX)
+        with pytest.raises(MeshError, match="another process is writing it"):
+            stream(case, out)
+
+
+def test_a_copy_is_the_same_where_the_system_cannot_copy_by_itself(tmp_path, monkeypatch):
+    case = made(tmp_path, "square", 8, ("STEPS=1",))
+    stream(case, tmp_path / "one.su2b")
+    monkeypatch.setattr(partial, "_PIECE", 100)
+    monkeypatch.delattr(os, "copy_file_range")
+    stream(case, tmp_path / "two.su2b")
+    assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "two.su2b").read_bytes()
+    monkeypatch.setattr(os, "pread", lambda *_: b"")
+    with pytest.raises(MeshError, match="became shorter while it was read"):
+        stream(case, tmp_path / "two.su2b")
+    with pytest.raises(MeshError, match="cannot be written: the folder does not exist"):
+        stream(case, tmp_path / "none" / "two.su2b")
+
+
+# The skin ------------------------------------------------------------------------------------
+
+
+def test_the_skin_is_the_boundary_and_what_is_at_it(tmp_path):
+    mesh = grid((6, 6, 6))
+    sv.write(tmp_path / "mesh.su2b", mesh)
+    skin = read_skin(tmp_path / "mesh.su2b", None)
+    assert skin.marker_names == mesh.marker_names
+    assert skin.extent == mesh.extent
+    part = skin.part
+    assert (part.n_points, part.n_cells) == (7**3, 6**3)
+    assert np.array_equal(skin.points, mesh.points[part.points])
+    inner = ((mesh.points > 0.3) & (mesh.points < 0.7)).all(axis=1)
+    assert not inner[part.points].any()
+    assert len(part.cells) == 6**3 - 4**3
+    assert skin.number(3) == part.points[3]
+    assert mesh.number(3) == 3
+    nodes = part.points[skin.cells.connectivity].reshape(-1, 8)
+    assert np.array_equal(nodes, mesh.cells.connectivity.reshape(-1, 8)[part.cells])
+
+
+def test_the_extent_is_that_of_the_mesh_even_without_boundaries(tmp_path):
+    mesh = replace(grid((4, 4)), markers=grid((4, 4)).markers[:1])
+    sv.write(tmp_path / "mesh.su2b", mesh)
+    skin = read_skin(tmp_path / "mesh.su2b", None)
+    assert skin.extent == mesh.extent
+    assert len(skin.points) < len(mesh.points)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (change(WHOLE, 56, "<Q", 1), "byte 48: element 0: node 1 stands twice in one triangle"),
+        (change(WHOLE, 80, "<Q", 1), "byte 48: element 0: its index 1 is not below .* twice"),
+        (change(WHOLE, 80, "<Q", 2), "byte 48: element 0: its index 2 is not below the number"),
+        (change(WHOLE, 144, "<d", 1e60), "byte 144: point 0 is at .* larger than 1e.50"),
+    ],
+)
+def test_mistakes_are_told_as_by_the_reader(tmp_path, data, message):
+    path = tmp_path / "mesh.su2b"
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match=message):
+        read_skin(path, None)
