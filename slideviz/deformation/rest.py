@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,6 @@ from slideviz.deformation.stepping import Step, cartesian, shifted
 from slideviz.errors import DeformError, MeshError, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.axis import on_axis
-from slideviz.rbf.field import Field
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +25,13 @@ class Rest:
         Undeformed.
     setup : Setup
         That of the skin.
-    steps : tuple of Step
-        Those of the skin, deformed.
-    fields : tuple of Field
-        One for each step.
+    steps : sequence of Step
+        Those of the skin, deformed, with their fields.
     """
 
     skin: Mesh
     setup: Setup
-    steps: tuple[Step, ...]
-    fields: tuple[Field, ...]
+    steps: Sequence[Step]
 
     def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """Yield the points (m, d) of nodes (m,), by their numbers and ascending, after each step.
@@ -54,8 +50,9 @@ class Rest:
         inner[at] = False
         self._require_enclosed(nodes, points, start, inner)
         axis, coords = on_axis(frame, start), start
-        for step, field in zip(self.steps, self.fields, strict=True):
-            displacement = field.at(frame.features(coords), frame.points(coords))
+        for step in self.steps:
+            assert step.field is not None
+            displacement = step.field.at(frame.features(coords), frame.points(coords))
             coords = shifted(coords, displacement, axis)
             now = cartesian(frame, points, start, coords)
             if not np.all(np.isfinite(now)):
@@ -102,8 +99,8 @@ class Rest:
         length = np.linalg.norm(shift, axis=1)
         k = int(np.argmax(length))
         moved = self.setup.frame.coords(step.mesh.points)
-        part = step.index / step.total
-        message = overshoot_of_rest(self.setup, self.skin, moved, part, float(length[k]))
+        far = float(length[k])
+        message = overshoot_of_rest(self.setup, self.skin, moved, step.part, far)
         if message:
             where = ", ".join(f"{value:.6g}" for value in points[k])
             raise UnsoundError(f"step {step.index}: node {nodes[k]} at ({where}) {message}")

@@ -87,7 +87,13 @@ def deform(
             setup = make_setup(case, mesh)
     require_memory(setup, case)
     stepping = Stepping(case, mesh, setup, tell, watch.seconds)
-    yield from stepping.steps(case.steps) if case.steps else _automatic(stepping)
+    yield from all_steps(stepping)
+
+
+def all_steps(stepping: Stepping) -> Iterator[Step]:
+    """Yield the steps that the case asks for."""
+    count = stepping.case.steps
+    yield from stepping.steps(count) if count else _automatic(stepping)
 
 
 def _automatic(stepping: Stepping) -> Iterator[Step]:
@@ -114,7 +120,7 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
             if worse == 2:
                 break
             continue
-        found = quality(steps[-1].mesh, stepping.mesh, stepping.case.quality_metric)
+        found = stepping.quality_of(steps)
         trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
         tried.append(trial)
         if best is not None and best[0].inverted == 0:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from dataclasses import field as made_by
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from slideviz.deformation.setup import Setup
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import Quality, quality
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.field import Field
 from slideviz.rbf.frames import Frame
@@ -101,6 +102,10 @@ class Step:
     periodic_misfit : float or None
         Largest difference of the displacements of periodic images so far, in the mesh's length
         unit: rounding, for more is an error. None where images need not move alike.
+    part : float
+        Of the whole displacement, after this step.
+    field : Field or None
+        What displaced the nodes that are no boundary, where a run keeps it.
     """
 
     index: int
@@ -114,10 +119,12 @@ class Step:
     warnings: tuple[str, ...]
     history: tuple[Cycle, ...] = ()
     tried: tuple[Trial, ...] = ()
-    control: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     candidates: int = 0
     tolerance: float | None = None
     periodic_misfit: float | None = None
+    part: float = 1.0
+    field: Field | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +139,9 @@ class Stepping:
         Receives ``Progress``; may raise to stop.
     seconds : dict
         Spent before the first step.
-    fields : list of Field or None
-        Receives the field of each step, where somebody wants them.
+    rate : callable or None
+        Returns the quality after steps, given all of them; that of the last one's mesh where it is
+        None. With it, steps keep their field.
     """
 
     case: Case
@@ -141,7 +149,7 @@ class Stepping:
     setup: Setup
     tell: Callable[[Progress], None]
     seconds: dict[str, float]
-    fields: list[Field] | None = None
+    rate: Callable[[Sequence[Step]], Quality] | None = None
 
     def steps(self, count: int, halve: bool = False) -> Iterator[Step]:
         """Yield the steps that divide the displacement into ``count`` equal parts.
@@ -164,6 +172,7 @@ class Stepping:
         worst = 0.0
         seconds = dict(self.seconds)
         before: Solution | None = None
+        made: list[Step] = []
         while ahead:
             part, halvings = ahead[0]
             total = index + len(ahead)
@@ -177,29 +186,48 @@ class Stepping:
                 moved = _followed(setup, mesh.halo, points, moved)
             if not np.all(np.isfinite(points)):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
+            step = self._made(index + 1, total, points, solution, watch, part)
             unsound = unsoundness(setup, mesh, solution, moved, part)
+            failure = UnsoundError(f"step {index + 1}: {unsound}") if unsound else None
             if halve:
-                now = quality(mesh.with_points(points), mesh).inverted
-                if (now > folded or unsound) and halvings < HALVINGS:
+                try:
+                    now = self.quality_of([*made, step]).inverted
+                except UnsoundError as problem:
+                    now, failure = folded, failure or problem
+                if (now > folded or failure) and halvings < HALVINGS:
                     ahead[0] = part, halvings + 1
                     ahead.insert(0, ((done + part) / 2, halvings + 1))
                     continue
                 folded = now
-            if unsound:
-                raise UnsoundError(f"step {index + 1}: {unsound}")
+                made.append(step)
+            if failure:
+                raise failure
             coords, done, index = moved, part, index + 1
             before = solution
-            if self.fields is not None:
-                assert solution.field is not None
-                self.fields.append(solution.field)
             ahead.pop(0)
             if solution.short and solution.max_error > worst:
                 remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
             elif not remarks:
                 remarks = _dropped_warning(solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
-            yield self._made(index, total, points, solution, watch, [*warnings, *remarks])
+            yield replace(
+                step,
+                warnings=(*warnings, *remarks),
+                periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
+            )
             seconds = {}
+
+    def quality_of(self, steps: Sequence[Step]) -> Quality:
+        """Return the quality after the last of some steps.
+
+        Raises
+        ------
+        UnsoundError
+            A node that is not in ``mesh`` would go far beyond the motion.
+        """
+        if self.rate is not None:
+            return self.rate(steps)
+        return quality(steps[-1].mesh, self.mesh, self.case.quality_metric)
 
     def _report(self, index: int, total: int) -> Callable[[str, float], None]:
         return lambda phase, fraction: self.tell(Progress(index, total, phase, fraction))
@@ -211,9 +239,8 @@ class Stepping:
         points: FloatArray,
         solution: Solution,
         watch: Watch,
-        warnings: list[str],
+        part: float,
     ) -> Step:
-        setup = self.setup
         return Step(
             index=index,
             total=total,
@@ -221,14 +248,15 @@ class Stepping:
             control_nodes=solution.control_nodes,
             max_error=solution.max_error,
             condition=solution.condition,
-            node_counts=setup.classes.counts(),
+            node_counts=self.setup.classes.counts(),
             seconds=watch.seconds,
-            warnings=tuple(warnings),
+            warnings=(),
             history=solution.history,
             control=solution.control,
-            candidates=setup.candidates,
-            tolerance=setup.reduction.tolerance if setup.reduction else None,
-            periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
+            candidates=self.setup.candidates,
+            tolerance=self.setup.reduction.tolerance if self.setup.reduction else None,
+            part=part,
+            field=solution.field if self.rate is not None else None,
         )
 
 

@@ -1,0 +1,134 @@
+"""The quality of a mesh larger than memory, measured block by block, from its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.deformation.rest import Rest
+from slideviz.deformation.solver import folded_at
+from slideviz.errors import MeshError
+from slideviz.mesh.io.cleanup import draft
+from slideviz.mesh.io.su2b import Block
+from slideviz.mesh.io.su2b_layout import Source, ZonePlace
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED, Quality, quality
+from slideviz.terms import Metric
+
+READ = 1 << 20
+"""Points that are read in one piece."""
+SPARSE = 8
+"""A block of cells whose nodes lie within so many times their number is read with all between."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointFiles:
+    """The points of a mesh in its file and in that of the deformed one."""
+
+    before: Source
+    after: Source
+    place: ZonePlace
+
+    def cells_of(self, block: Block) -> tuple[Mesh, Mesh]:
+        """Return the cells of a block as a mesh, before and after."""
+        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
+        if high - low <= SPARSE * len(block.types):
+            nodes, flat = np.arange(low, high), block.nodes - low
+        else:
+            nodes, flat = np.unique(block.nodes, return_inverse=True)
+        cells = Cells.from_types(block.types, flat)
+        base = Mesh(self.points(self.before, nodes), cells, name=self.before.name)
+        return base, base.with_points(self.points(self.after, nodes))
+
+    def points(self, source: Source, nodes: IntArray) -> FloatArray:
+        """Return the points of nodes (k,), ascending; those close to each other in one piece."""
+        kind = source.point(self.place.dim)
+        out = np.empty((len(nodes), self.place.dim))
+        a = 0
+        while a < len(nodes):
+            first = int(nodes[a])
+            b = int(np.searchsorted(nodes, first + READ))
+            count = int(nodes[b - 1]) + 1 - first
+            rows = source.array(
+                self.place.points + first * kind.itemsize, count, kind, "the points"
+            )
+            out[a:b] = rows["x"][nodes[a:b] - first]
+            a = b
+        return out
+
+
+class Rating:
+    """The quality of all cells, block by block; it is kept in files, which end with ``stack``.
+
+    Attributes
+    ----------
+    inverted : dict of int to (int, (n,) int64)
+        Type and nodes of the inverted cells with the lowest numbers.
+    """
+
+    def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
+        self._metric = metric
+        self._values, self._before = (_scratch(stack, folder, count, float) for _ in range(2))
+        self._status, self._old = (_scratch(stack, folder, count, np.uint8) for _ in range(2))
+        self._signs = np.zeros(0, np.int8)
+        self.inverted: dict[int, tuple[int, IntArray]] = {}
+
+    def add(self, block: Block, base: Mesh, moved: Mesh, listed: int) -> None:
+        """Measure a block; of inverted cells the ``listed`` with the lowest numbers are kept."""
+        one, other = quality(base, metric=self._metric), quality(moved, base, self._metric)
+        self._signs = np.unique(np.concatenate([self._signs, one.signs]))
+        if len(self._signs) > 1:
+            raise MeshError(
+                f"{base.name}: some cells are numbered the other way round than others (near "
+                f"element {block.first}), which only the whole mesh can tell from folded ones; run "
+                "it without --stream, or mesh again"
+            )
+        self._values[block.ids], self._status[block.ids] = other.values, other.status
+        self._before[block.ids], self._old[block.ids] = one.values, one.status
+        ends = moved.cells.offsets
+        for k in np.flatnonzero(other.status == INVERTED).tolist():
+            nodes = block.nodes[ends[k] : ends[k + 1]]
+            self.inverted[int(block.ids[k])] = int(block.types[k]), nodes.copy()
+        self.inverted = dict(sorted(self.inverted.items())[:listed])
+
+    def quality(self) -> Quality:
+        """Return the quality of the deformed cells, without size and skew."""
+        none = np.empty(0)
+        return Quality(self._values, none, none, self._status, self._signs, self._metric)
+
+    def undeformed(self) -> Quality:
+        """Return the quality of the undeformed cells, without size and skew."""
+        none = np.empty(0)
+        return Quality(self._before, none, none, self._old, self._signs, self._metric)
+
+
+def _scratch(stack: ExitStack, folder: Path, count: int, kind: type) -> NDArray:
+    """Return an array in a file, which is removed with ``stack``."""
+    path = stack.enter_context(draft(folder))
+    return np.memmap(path, kind, "w+", shape=(count,))
+
+
+def folded_steps(
+    rest: Rest, files: PointFiles, cells: Mapping[int, tuple[int, IntArray]]
+) -> dict[int, tuple[int, int]]:
+    """Return the type of each cell, and after which step it is inverted for the first time."""
+    if not cells:
+        return {}
+    types = [vtk for vtk, _ in cells.values()]
+    nodes, flat = np.unique(
+        np.concatenate([nodes for _, nodes in cells.values()]), return_inverse=True
+    )
+    points = files.points(files.before, nodes)
+    part = Mesh(points, Cells.from_types(types, flat))
+    moved = rest.after_steps(nodes, points)
+    steps = [
+        replace(step, mesh=part.with_points(now))
+        for step, now in zip(rest.steps, moved, strict=True)
+    ]
+    when = folded_at(steps, part, np.arange(len(cells)))
+    return dict(zip(cells, zip(types, when.tolist(), strict=True), strict=True))
