@@ -16,6 +16,7 @@ from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
+    from slideviz.mesh.io.cgns import CgnsForm
     from slideviz.mesh.io.su2 import Document
     from slideviz.mesh.io.su2b import BinaryForm
 
@@ -194,6 +195,8 @@ class Mesh:
         How an SU2 binary file held it, kept for writing.
     part : Part or None
         Of which mesh it is a part: only what is needed of one that is larger than memory.
+    cgns : CgnsForm or None
+        Where a CGNS file has the coordinates, for writing.
     """
 
     points: FloatArray
@@ -208,6 +211,7 @@ class Mesh:
     remarks: tuple[str, ...] = ()
     binary: BinaryForm | None = None
     part: Part | None = None
+    cgns: CgnsForm | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

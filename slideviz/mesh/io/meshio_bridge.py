@@ -85,7 +85,7 @@ def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
     )
     points = _points(path, data, cells)
     if dim == 2 and points.shape[1] == 3:
-        points = _flattened(path, points, cells)
+        points = flattened(path, points, cells)
     mesh = Mesh(points=points, cells=cells, name=printable(path.name), source=path.resolve())
     # The outer surface can be looked for only in sound cells.
     check_mesh(mesh)
@@ -128,7 +128,7 @@ def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:
     return points
 
 
-def _flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
+def flattened(path: Path, points: FloatArray, cells: Cells) -> FloatArray:
     """Return the first two columns of points that all have one z."""
     used = points[cells.nodes]
     if np.ptp(used[:, 2]) > _FLAT * np.ptp(used, axis=0).max():

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import meshio
 
 Groups = dict[str, list[tuple[int, IntArray]]]
+Name = TypeVar("Name")
 
 # The numbers that formats put on cells, the telling ones first, and how to name a nameless one.
 _TAGS = {
@@ -135,26 +136,33 @@ def _add(groups: Groups, name: str | None, vtk: int, nodes: IntArray) -> None:
 
 
 def _by_point_sets(mesh: Mesh, data: meshio.Mesh, facets: Cells) -> tuple[Marker, ...]:
-    """Return the outer facets whose nodes are all in a named set of points.
+    """Return the outer facets whose nodes are all in a named set of points."""
+    groups: Groups = {}
+    for name, parts in in_node_sets(len(mesh.points), facets, data.point_sets).items():
+        for vtk, nodes in parts:
+            _add(groups, name, vtk, nodes)
+    return tuple(Marker(name, Cells.from_blocks(parts)) for name, parts in groups.items())
+
+
+def in_node_sets(
+    n_points: int, facets: Cells, sets: Mapping[Name, ArrayLike]
+) -> dict[Name, list[tuple[int, IntArray]]]:
+    """Return for each set of nodes the facets whose nodes are all in it, as blocks.
 
     A facet goes to the smallest set that has it, so that a set of all points takes nothing away.
     """
     free = np.ones(len(facets), bool)
-    found: dict[object, list[tuple[int, IntArray]]] = {}
-    for name, members in sorted(data.point_sets.items(), key=lambda item: len(item[1])):
-        inside = np.zeros(len(mesh.points), bool)
-        inside[np.asarray(members, np.int64)] = True
-        parts = []
+    found: dict[Name, list[tuple[int, IntArray]]] = {name: [] for name in sets}
+    members = {name: np.asarray(nodes, np.int64) for name, nodes in sets.items()}
+    for name, chosen in sorted(members.items(), key=lambda item: len(item[1])):
+        inside = np.zeros(n_points, bool)
+        inside[chosen] = True
         for vtk, ids, nodes in _rows(facets):
-            chosen = free[ids] & inside[nodes].all(axis=1)
-            free[ids[chosen]] = False
-            parts.append((vtk, nodes[chosen]))
-        found[name] = [(vtk, nodes) for vtk, nodes in parts if len(nodes)]
-    groups: Groups = {}
-    for name in data.point_sets:
-        for vtk, nodes in found[name]:
-            _add(groups, name, vtk, nodes)
-    return tuple(Marker(name, Cells.from_blocks(parts)) for name, parts in groups.items())
+            taken = free[ids] & inside[nodes].all(axis=1)
+            free[ids[taken]] = False
+            if taken.any():
+                found[name].append((vtk, nodes[taken]))
+    return found
 
 
 def _rows(cells: Cells) -> Iterator[tuple[int, IntArray, IntArray]]:

@@ -1,4 +1,4 @@
-"""Subprocess reader: meshes of other formats are read in a process of their own.
+"""Subprocess reader: meshes of other formats than SU2 are read in a process of their own.
 
 Some readers of meshio run for hours on a wrong count, ask for all memory, or crash with the
 library below them. In a process of its own that costs nobody anything: it has limits of time and
@@ -20,10 +20,13 @@ from pathlib import Path
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
+from slideviz.mesh.io.cgns import CgnsForm, read_cgns
 from slideviz.mesh.io.cleanup import ended
 from slideviz.mesh.io.meshio_bridge import read_with_meshio
 from slideviz.mesh.io.su2_scan import Progress
-from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.model import Cells, Marker, Mesh, frozen_array
+
+CGNS = ".cgns"
 
 _SECONDS = 20
 _SECONDS_PER_BYTE = 20e-6
@@ -37,12 +40,12 @@ _SET_DEATH_SIGNAL = 1
 
 
 def read_in_subprocess(path: Path, progress: Progress) -> Mesh:
-    """Return the mesh of a file that meshio reads, as ``read_with_meshio`` does.
+    """Return the mesh of a file, as ``read_cgns`` or, of other endings, ``read_with_meshio`` does.
 
     Raises
     ------
     MeshError
-        As ``read_with_meshio``, and when the reader takes too long, or crashes.
+        As these, and when the reader takes too long, or crashes.
     """
     begun = time.monotonic()
     expected = 1.0 + path.stat().st_size / _BYTES_PER_SECOND
@@ -109,20 +112,27 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
     if code or not answer:
         raise path_error(
             path,
-            f"cannot be read: meshio crashed on it (code {code}); check the file, or use another "
-            "format, such as .su2 or .vtu",
+            f"cannot be read: {_library(path)} crashed on it (code {code}); check the file, "
+            "or use another format, such as .su2 or .vtu",
         )
     content = pickle.loads(answer)
     if isinstance(content, str):
         raise MeshError(content)
-    points, cells, markers, name = content
+    points, cells, markers, name, remarks, form = content
+    points = frozen_array(points, float)
     return Mesh(
         points=points,
         cells=Cells.from_types(*cells),
         markers=tuple(Marker(label, Cells.from_types(*parts)) for label, parts in markers),
         name=name,
         source=path.resolve(),
+        remarks=remarks,
+        cgns=None if form is None else CgnsForm(form[0], form[1], points),
     )
+
+
+def _library(path: Path) -> str:
+    return "HDF5" if path.suffix.lower() == CGNS else "meshio"
 
 
 def main() -> None:
@@ -138,7 +148,10 @@ def main() -> None:
         seconds, memory, path = int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
         _limit(seconds, memory)
         try:
-            mesh = read_with_meshio(path, lambda _: None)
+            if path.suffix.lower() == CGNS:
+                mesh = read_cgns(path)
+            else:
+                mesh = read_with_meshio(path, lambda _: None)
         except MeshError as problem:
             pickle.dump(str(problem), channel)
         except MemoryError:
@@ -146,7 +159,9 @@ def main() -> None:
         else:
             markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
             cells = (mesh.cells.types, mesh.cells.connectivity)
-            pickle.dump((mesh.points, cells, markers, mesh.name), channel)
+            form = (mesh.cgns.datasets, mesh.cgns.numbers) if mesh.cgns else None
+            content = (mesh.points, cells, markers, mesh.name, mesh.remarks, form)
+            pickle.dump(content, channel)
 
 
 def _limit(seconds: int, memory: int) -> None:
