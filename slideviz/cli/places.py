@@ -153,16 +153,20 @@ def _require_mesh_ending(file: Path) -> None:
 
 
 def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -> None:
-    """Say before the work what an SU2 binary file will not keep of a mesh.
+    """Say before the work what an SU2 binary file will not keep of a mesh; ask for CGNS's source.
 
     Raises
     ------
     MeshError
         It cannot hold the mesh at all.
     """
+    from slideviz.mesh.io.cgns_write import require_cgns
     from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
 
-    if (file_format or output.suffix.lower().removeprefix(".")) != "su2b":
+    kind = file_format or output.suffix.lower().removeprefix(".")
+    if kind == "cgns":
+        require_cgns(output, mesh)
+    if kind != "su2b":
         return
     require_binary(mesh)
     lost = lost_in_binary(mesh)

@@ -218,7 +218,7 @@ def _require_places(
             arguments.steps_dir,
             "--steps-dir",
             named=False,
-            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.su2b?",
+            files=rf"{re.escape(case.mesh_file.stem)}_\d+\.(su2b?|cgns)",
         ),
     )
 
@@ -240,6 +240,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
+    from slideviz.session.formats import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir
@@ -248,8 +249,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))
-                ending = ".su2" if mesh.binary is None else ".su2b"
-                name = f"{case.mesh_file.stem}_{step.index:0{width}d}{ending}"
+                name = f"{case.mesh_file.stem}_{step.index:0{width}d}{usual_ending(mesh)}"
                 write(folder / name, step.mesh)
             steps.append(step)
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:

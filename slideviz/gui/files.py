@@ -232,7 +232,7 @@ class Files(QObject):
             return False
         session = self.window.store.session
         case = session.case
-        if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b"):
+        if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b", ".cgns"):
             case = case.change(mesh_out=self._saved_to)
         try:
             keep_view(replace(session, case=case), self.window.scene.camera.place).write(path)

@@ -30,6 +30,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     ".vtu": MeshFormat("VTU for ParaView, with quality and displacement", True, "names"),
     ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
     ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),
+    ".cgns": MeshFormat("CGNS (a copy of the file, with other coordinates)", False, "names"),
     ".med": MeshFormat("MED for Salome, with quality", True, "names"),
     ".msh": MeshFormat("Gmsh", False, "names"),
     ".inp": MeshFormat("Abaqus", False, "names"),
@@ -42,11 +43,17 @@ MESH_FORMATS: dict[str, MeshFormat] = {
 
 def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
     """Return the formats that can hold a mesh, by ending."""
-    return {end: row for end, row in MESH_FORMATS.items() if mesh.dim in row.dims}
+    return {
+        end: row
+        for end, row in MESH_FORMATS.items()
+        if mesh.dim in row.dims and (end != ".cgns" or mesh.cgns is not None)
+    }
 
 
 def usual_ending(mesh: Mesh) -> str:
     """Return the ending that a mesh is offered to be saved with."""
+    if mesh.cgns is not None:
+        return ".cgns"
     return ".su2" if mesh.binary is None else ".su2b"
 
 
@@ -59,19 +66,19 @@ def holds_quality(path: Path) -> bool:
 def left_out(path: Path, mesh: Mesh) -> str:
     """Return a sentence on the parts of a mesh that a file of that name leaves out, or nothing."""
     end = path.suffix.lower()
-    if end == ".su2":
+    if end == ".cgns":
         return ""
-    if end == ".su2b":
-        few = lost_in_binary(mesh)
-        return f"{path.name} does not hold {' and '.join(few)}." if few else ""
     row = MESH_FORMATS.get(end)
-    lost = []
-    if row is None or row.boundaries == "numbers":
-        lost.append("the names of the boundaries (they are numbers now)")
-    if row is None or not row.quality:
-        lost.append("the quality of the cells")
-    if mesh.source is not None and mesh.source.suffix.lower() == ".su2":
-        lost.append("what else was in the SU2 file, such as FFD boxes and other zones")
+    lost = list(lost_in_binary(mesh)) if end == ".su2b" else []
+    if end not in (".su2", ".su2b"):
+        if row is None or row.boundaries == "numbers":
+            lost.append("the names of the boundaries (they are numbers now)")
+        if row is None or not row.quality:
+            lost.append("the quality of the cells")
+        if mesh.source is not None and mesh.source.suffix.lower() == ".su2":
+            lost.append("what else was in the SU2 file, such as FFD boxes and other zones")
+    if mesh.cgns is not None:
+        lost.append("what else was in the CGNS file, such as its zones and solutions")
     if not lost:
         return ""
     words = lost[0] if len(lost) == 1 else f"{', '.join(lost[:-1])} and {lost[-1]}"

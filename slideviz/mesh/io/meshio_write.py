@@ -1,4 +1,4 @@
-"""Writing meshes in other formats than SU2: VTU by our own writer, the rest through meshio.
+"""Writing meshes in other formats than SU2: VTU and CGNS by our own writers, the rest by meshio.
 
 meshio writes VTU too, but reorders cells of mixed type and loses the names of boundaries.
 """
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.cgns_write import write_cgns
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
 from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
@@ -69,6 +70,14 @@ def write_other_format(
         The file cannot be written, or the format cannot hold the mesh.
     """
     check_mesh(mesh)
+    if path.suffix.lower() == ".cgns":
+        if cell_data:
+            raise path_error(
+                path,
+                f"a CGNS file gets no cell data ({', '.join(cell_data)}); write a .vtu file",
+            )
+        write_cgns(path, mesh, replaces)
+        return
     if path.suffix.lower() == ".vtu":
         with atomic_write(path, replaces=replaces) as file:
             for block in vtu_blocks(mesh, cell_data, point_data):

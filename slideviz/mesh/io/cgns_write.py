@@ -1,0 +1,90 @@
+"""Writing CGNS meshes: a copy of the file that the mesh was read from, with other coordinates.
+
+So solutions, units, families, connectivities and whatever else is in it stay as they are.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from slideviz.mesh.check import path_error, printable
+from slideviz.mesh.io.cgns import CgnsForm
+from slideviz.mesh.io.cgns_join import JOINED
+from slideviz.mesh.io.hdf5 import hdf5_write
+from slideviz.mesh.model import FloatArray, Mesh
+
+
+def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
+    """Write a mesh that was read from a CGNS file as another one.
+
+    Points that have not moved keep the bits of each zone; those that have are rounded to the type
+    that the file has, R4 or R8.
+
+    Raises
+    ------
+    MeshError
+        The mesh is from no CGNS file, that file is no more as it was, or this cannot be written.
+    """
+    form, source = require_cgns(path, mesh)
+    try:
+        with hdf5_write(path, replaces, source) as tree:
+            _replace(path, source, tree, form, mesh.points)
+    except OSError as problem:
+        raise path_error(
+            path,
+            f"cannot be written: {printable(source)}, of which it is a copy, cannot be read: "
+            f"{problem.strerror or problem}; put that file back, or write .su2",
+        ) from problem
+
+
+def require_cgns(path: Path, mesh: Mesh) -> tuple[CgnsForm, Path]:
+    """Return where the coordinates of a mesh are, and the file.
+
+    Raises
+    ------
+    MeshError
+        It was read from no CGNS file, so it cannot be written as one.
+    """
+    form, source = mesh.cgns, mesh.source
+    if form is None or source is None or len(mesh.points) != len(form.points):
+        raise path_error(
+            path,
+            "a CGNS file is written as a copy of the one that the mesh was read from, with other "
+            f"coordinates, but {mesh.name} is from none; write .su2, or .vtu for ParaView",
+        )
+    return form, source
+
+
+def _replace(path: Path, source: Path, tree: h5py.File, form: CgnsForm, points: FloatArray) -> None:
+    """Put the points into the copy of the file."""
+    tolerance = JOINED * float(np.ptp(form.points, axis=0).max())
+    for names, numbers in zip(form.datasets, form.numbers, strict=True):
+        for axis, name in enumerate(names):
+            dataset = tree.get(name)
+            before, after = form.points[numbers, axis], points[numbers, axis]
+            if not isinstance(dataset, h5py.Dataset) or dataset.size != len(numbers):
+                raise _changed(path, source, name)
+            values = np.asarray(dataset[()])
+            if not (np.abs(values.ravel() - before) <= tolerance).all():
+                raise _changed(path, source, name)
+            with np.errstate(over="ignore"):
+                rounded = after.astype(values.dtype)
+            if not np.isfinite(rounded).all():
+                raise path_error(
+                    path,
+                    f"cannot be written: a coordinate is larger than {values.dtype} holds, the "
+                    f"type of {printable(name)}; write .su2, or scale the mesh",
+                )
+            moved = before != after
+            dataset[...] = np.where(moved, rounded, values.ravel()).reshape(values.shape)
+
+
+def _changed(path: Path, source: Path, name: str) -> Exception:
+    return path_error(
+        path,
+        f"cannot be written: {printable(source)}, of which it is a copy, was changed after the "
+        f"mesh was read ({printable(name)}); read that file again",
+    )
