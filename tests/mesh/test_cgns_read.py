@@ -553,7 +553,7 @@ SECTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "told"), [*MISTAKES, *SECTIONS], ids=lambda one: str(one)[:30])
+@pytest.mark.parametrize(("change", "told"), [*MISTAKES, *SECTIONS], ids=lambda one: one[:30] if isinstance(one, str) else "file")
 def test_mistakes_have_node_rule_and_remedy(tmp_path, change, told):
     path = tmp_path / "a.cgns"
     if (change, told) in SECTIONS:
