@@ -1,5 +1,7 @@
 """What all tests share."""
 
+import gc
+
 from hypothesis import settings
 
 # No test fails because a machine was busy for a moment.
@@ -8,3 +10,9 @@ settings.load_profile("slideviz")
 
 # Plotters, scenes and small meshes that the tests of several rooms draw.
 pytest_plugins = ["tests.scenes"]
+
+
+def pytest_collection_finish():
+    """Leave modules and collected tests out of every later look for garbage; it took seconds."""
+    gc.collect()
+    gc.freeze()

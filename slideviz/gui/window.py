@@ -15,6 +15,7 @@ from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
 
 from slideviz.case.motion_words import mesh_words
+from slideviz.color_scheme import Look
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
 from slideviz.gui.dialogs.exporter import Exports
@@ -81,6 +82,8 @@ class MainWindow(Services):
         self.setMinimumSize(QSize(900, 620).boundedTo(room))
         self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
+        # Before there are widgets, each of which a style sheet that comes later would polish anew.
+        look = self._choose_theme(str(self.settings.value("theme", "system")))
         self.store = Store()
         self.banner = Banner()
         self.offer = Banner()
@@ -100,7 +103,7 @@ class MainWindow(Services):
         self._make_status()
         self.actions_ = Actions(self)
         self._connect()
-        self.set_theme(str(self.settings.value("theme", "system")))
+        self._take_look(look)
         self.docks_.restore(self.settings)
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
@@ -283,9 +286,14 @@ class MainWindow(Services):
 
     def set_theme(self, name: str) -> None:
         """Change to the light or dark theme, or to that of the desktop."""
+        self._take_look(self._choose_theme(name))
+
+    def _choose_theme(self, name: str) -> Look:
         name = name if name in theme.THEMES else "system"
         self.settings.setValue("theme", name)
-        look = theme.apply(name)
+        return theme.apply(name)
+
+    def _take_look(self, look: Look) -> None:
         redraw_icons(self)
         self.sync_actions()
         # Words about inverted cells have the theme's red.

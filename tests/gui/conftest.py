@@ -29,6 +29,14 @@ DIALOGS = (
 )
 
 
+@pytest.fixture(autouse=True, scope="module")
+def modules_are_no_garbage():
+    """Leave what was imported since out of the looks for garbage, of which each test has one."""
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def nothing_of_closed_windows():
     """Collect what closed windows left, as PySide would give their wrappers to new objects.
