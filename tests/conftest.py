@@ -1,12 +1,16 @@
 """What all tests share."""
 
 import gc
+import os
 
 from hypothesis import settings
 
 # No test fails because a machine was busy for a moment.
 settings.register_profile("slideviz", deadline=None)
 settings.load_profile("slideviz")
+
+# Many tests start the program, which would compile each of its modules anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Plotters, scenes and small meshes that the tests of several rooms draw.
 pytest_plugins = ["tests.scenes"]

@@ -7,7 +7,7 @@ import pytest
 if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
     collect_ignore_glob = ["test_*.py"]
 else:
-    from qtpy.QtCore import QSettings, Qt
+    from qtpy.QtCore import QCoreApplication, QEvent, QSettings, Qt
     from qtpy.QtTest import QTest
 
     from slideviz.gui.widgets import plot_canvas, questions
@@ -44,7 +44,10 @@ def nothing_of_closed_windows():
     The view keeps a QSurface; where Qt puts an action at its address later, Python gets the
     surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.threads`), no thread
     of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
+
+    Qt deletes closed windows in the next event loop only: the next window would polish them, too.
     """
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.collect()
     gc.disable()
     yield

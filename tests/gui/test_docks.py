@@ -287,6 +287,7 @@ def tabs(window):
     end = time.monotonic() + 0.3
     while time.monotonic() < end:
         app.processEvents()
+        time.sleep(0.01)
     inside = [bar for bar in window.docks_.tabs.bars() if window.rect().intersects(bar.geometry())]
     return sorted([bar.tabText(index) for index in range(bar.count())] for bar in inside)
 
