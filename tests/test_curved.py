@@ -11,6 +11,7 @@ from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.samples.table import write_sample
 from tests import builders
+from tests.slow import one_of_each_fast
 
 REDUCTIONS = [None, Reduction(tolerance=1e-4)]
 
@@ -114,8 +115,9 @@ def test_the_walls_of_a_bent_duct(sliding, reduction):
     assert sv.quality(held.mesh, mesh).inverted > 0
 
 
-@pytest.mark.parametrize("sliding", ["ps", "ds"])
-@pytest.mark.parametrize("role", ["sliding", "internal"])
+@pytest.mark.parametrize(
+    ("role", "sliding"), one_of_each_fast(["sliding", "internal"], ["ps", "ds"])
+)
 def test_hub_and_shroud_of_an_annular_passage(tmp_path, sliding, role):
     """In the cylindrical frame hub and shroud are planes, so their nodes keep their radius."""
     write_sample("stator", tmp_path, 5000)
@@ -177,7 +179,7 @@ def test_walls_go_on_beyond_a_moving_end(sliding):
     assert last.mesh.points[followed, 1].min() < -0.05
 
 
-@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("sliding", ["ps", pytest.param("ds", marks=pytest.mark.slow)])
 def test_a_blade_may_leave_its_place_on_the_hub(tmp_path, sliding):
     """Nodes of the hub follow the blade into the place where it stood, which has no facets."""
     write_sample("stator", tmp_path, 5000)

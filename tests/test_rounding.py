@@ -8,10 +8,12 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Reduction
 from slideviz.samples.table import write_sample
+from tests.slow import one_of_each_fast
 
 
-@pytest.mark.parametrize("selection", ["block", "one", "double"])
-@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize(
+    ("sliding", "selection"), one_of_each_fast(["ps", "ds"], ["block", "one", "double"])
+)
 @pytest.mark.parametrize(
     ("name", "periodic"), [("polar", "periodic"), ("hexahedron", "moving"), ("cylindrical", "none")]
 )

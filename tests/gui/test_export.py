@@ -513,7 +513,16 @@ def test_cancelled_steps_keep_whole_files(ran, tmp_path):
     assert [path.name for path in tmp_path.glob("s_*")] in ([], ["s_1.su2"])
 
 
-@pytest.mark.parametrize("name", [".su2", ".vtu", ".vtk", ".xdmf", ".med", ".msh", ".inp", ".vol"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(".su2", ".vtu", ".med"),
+        *(
+            pytest.param(e, marks=pytest.mark.slow)
+            for e in (".vtk", ".xdmf", ".msh", ".inp", ".vol")
+        ),
+    ],
+)
 def test_every_format_is_written_and_what_is_lost_is_said(ran, answers, tmp_path, name):
     path = tmp_path / f"out{name}"
     answers("ask_save", path)

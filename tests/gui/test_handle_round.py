@@ -81,7 +81,7 @@ def blue(view):
     return np.column_stack([found[:, 1], len(image) - 1 - found[:, 0]])
 
 
-@pytest.mark.parametrize("side", ["iso", "-x", "+z"])
+@pytest.mark.parametrize("side", ["iso", pytest.param("-x", marks=pytest.mark.slow), "+z"])
 def test_the_ball_is_seen_on_the_cut_in_front_of_all(window, panel, side):
     window.viewing.look_from(side)
     drawn = blue(window.view)

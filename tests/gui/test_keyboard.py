@@ -8,6 +8,7 @@ from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
 from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
+from tests.slow import one_of_each_fast
 
 
 @pytest.fixture
@@ -25,8 +26,10 @@ def menu_key(view):
     QApplication.sendEvent(view, event)
 
 
-@pytest.mark.parametrize("name", ["inflow", "periodic_1", "periodic_2", "outflow"])
-@pytest.mark.parametrize("by_click", [True, False])
+@pytest.mark.parametrize(
+    ("name", "by_click"),
+    one_of_each_fast(["inflow", "periodic_1", "periodic_2", "outflow"], [True, False]),
+)
 def test_the_menu_key_is_about_the_row_that_is_selected(opened, name, by_click):
     panel = opened.window.boundaries
     if by_click:

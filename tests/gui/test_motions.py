@@ -8,6 +8,7 @@ from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
 from slideviz.gui.dialogs.motion_table import TableDialog
 from slideviz.session import changes
 from slideviz.session.motion_table import Rows
+from tests.slow import one_of_each_fast
 
 NOISE = 3.7e-13
 
@@ -118,8 +119,7 @@ def type_first(driver, kind):
     driver.type(field, text)
 
 
-@pytest.mark.parametrize("kind", MOVED)
-@pytest.mark.parametrize("what", ["blade", "block"])
+@pytest.mark.parametrize(("kind", "what"), one_of_each_fast(list(MOVED), ["blade", "block"]))
 def test_every_kind_moves_its_ghost_as_it_is_typed(request, kind, what):
     driver, name = request.getfixturevalue(what), {"blade": "airfoil", "block": "BLOCK"}[what]
     driver.add_motion(kind)

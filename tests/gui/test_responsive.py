@@ -219,7 +219,7 @@ sys.exit(app.launch(Path(sys.argv[1])))
 """
 
 
-@pytest.mark.parametrize("after_ms", [5, 700])
+@pytest.mark.parametrize("after_ms", [5, pytest.param(700, marks=pytest.mark.slow)])
 def test_the_program_ends_well_when_it_is_closed_while_it_runs(case_file, tmp_path, after_ms):
     places = {f"XDG_{name}_HOME": str(tmp_path / name) for name in ("DATA", "CACHE", "CONFIG")}
     places["NUMBA_CACHE_DIR"] = os.environ.get("NUMBA_CACHE_DIR", "")

@@ -34,7 +34,7 @@ window.close()
 """
 
 
-@pytest.mark.parametrize("scale", ["1", "1.25", "1.6"])
+@pytest.mark.parametrize("scale", ["1", pytest.param("1.25", marks=pytest.mark.slow), "1.6"])
 def test_the_window_fits_the_screen(scale, tmp_path):
     """Also where that is small beside the letters: 1000 pixels wide at the last scale."""
     call = [sys.executable, "-c", SIZES]

@@ -69,6 +69,7 @@ def test_side_by_side_shows_what_sliding_is_good_for(window, tmp_path):
     assert window.viewing.second.isVisible()
 
 
+@pytest.mark.slow  # `test_window` has what themes change
 def test_dark_is_dark(window, tmp_path):
     shots_states.dark(window, tmp_path)
     with Image.open(shots.photograph(window, tmp_path / "dark.png")) as image:

@@ -23,6 +23,7 @@ from slideviz.sections.model import Section
 from slideviz.session.passages import passages, show_passages
 from slideviz.terms import QUANTITIES
 from tests.builders import cube, passage, square
+from tests.slow import one_of_each_fast
 
 
 def bent(mesh):
@@ -82,9 +83,11 @@ def test_cells_have_the_colours_of_their_values():
 
 
 @pytest.mark.parametrize(
-    "size", [(1004, 756), (2008, 1252), (2953, 1654), (1600, 1000), (600, 300)]
+    ("size", "high"),
+    one_of_each_fast(
+        [(1004, 756), (2008, 1252), (2953, 1654), (1600, 1000), (600, 300)], [0.3, 2.0]
+    ),
 )
-@pytest.mark.parametrize("high", [0.3, 2.0])
 def test_numbers_of_a_narrow_range_do_not_run_together(size, high):
     mesh = cube(4, block=False)
     mesh = mesh.with_points(mesh.points * [1.0, high, 1.0])
@@ -92,7 +95,7 @@ def test_numbers_of_a_narrow_range_do_not_run_together(size, high):
     section = Section("plane", (0, 0, 0.4))
     pieces = show_passages(Cutter.of(mesh), mesh.points, section, {0: np.eye(4)})
     figure = draw_section([Shown(pieces, painted)], section, SectionStyle(size, trimmed=True))
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     axes = bar_of(figure)
     upright = axes.get_position().height > axes.get_position().width
     labels = (axes.get_yticklabels() if upright else axes.get_xticklabels())[:]
@@ -155,15 +158,19 @@ def test_a_wheel_unrolls_to_its_circumference():
     assert np.ptp(around) == pytest.approx(0.7 * 2 * np.pi)
 
 
-@pytest.mark.parametrize("size", [(1600, 1000), (600, 400), (400, 1600), (3000, 600)])
-@pytest.mark.parametrize("box", [(1, 1), (8, 1), (1, 8), (40, 1)])
+@pytest.mark.parametrize(
+    ("size", "box"),
+    one_of_each_fast(
+        [(1600, 1000), (600, 400), (400, 1600), (3000, 600)], [(1, 1), (8, 1), (1, 8), (40, 1)]
+    ),
+)
 def test_both_directions_have_one_scale_and_nothing_leaves_the_picture(size, box):
     mesh = cube(4, block=False)
     mesh = folded(mesh.with_points(mesh.points * (*box, 1.0)))
     section = Section("plane", (0, 0, 0.4))
     figure, shapes, _ = drawn(mesh, section, size=size, base=cube(4, block=False))
     assert figure.get_size_inches() * figure.dpi == pytest.approx(size)
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     axes = figure.axes[0]
     assert axes.transData.get_matrix()[0, 0] == pytest.approx(axes.transData.get_matrix()[1, 1])
     corners = np.concatenate([path.vertices for path in shapes.get_paths()])
@@ -184,7 +191,7 @@ def test_letters_are_not_smaller_than_8_points_and_inside(size):
     mesh = passage()
     section = Section("plane", (0.6, 0.3, 0.2), (1, 0.2, 0.3))
     figure, _, _ = drawn(mesh, section, size=size, name="a_very_long_name_" * 12)
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     renderer = figure.canvas.get_renderer()
     letters = [*figure.texts]
     for axes in (*figure.axes, bar_of(figure)):
@@ -377,7 +384,7 @@ def test_without_title_and_axes_the_section_has_the_room():
     section, sizes = Section("plane", (0, 0, 0.4)), []
     for shown in (True, False):
         figure, _, _ = drawn(mesh, section, size=(1004, 756), dpi=300.0, title=shown, axes=shown)
-        figure.canvas.draw()
+        figure.draw_without_rendering()
         sizes.append(figure.axes[0].bbox.width)
         assert bool(words_of(figure)) is shown
         assert figure.axes[0].axison is shown

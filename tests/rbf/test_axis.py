@@ -99,7 +99,7 @@ def pie(n=4, angle_deg=20.0):
 
 @pytest.mark.parametrize("periodic", ["none", "periodic", "fixed", "moving"])
 @pytest.mark.parametrize("method", ["ps", "ds"])
-@pytest.mark.parametrize("angle", [8.0, 20.0, 60.0])
+@pytest.mark.parametrize("angle", [8.0, pytest.param(20.0, marks=pytest.mark.slow), 60.0])
 def test_a_wedge_of_a_cylinder(method, periodic, angle):
     mesh = pie(angle_deg=angle)
     case = Case(

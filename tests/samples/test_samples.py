@@ -112,7 +112,11 @@ def test_block_has_the_nearest_whole_number_of_cells_that_stays_in_the_middle(si
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [*((n, s) for n in GRIDS for s in (3, 8, 9)), ("hexahedron", 50), ("passage", 12)],
+    [
+        *((n, s) for n in GRIDS for s in (3, 8, 9)),
+        pytest.param("hexahedron", 50, marks=pytest.mark.slow),
+        ("passage", 12),
+    ],
 )
 def test_markers_are_the_sides_of_the_mesh_and_every_node_is_used(name, size):
     mesh = made(name, size).mesh
