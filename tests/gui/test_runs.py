@@ -568,10 +568,10 @@ def test_the_camera_moves_after_a_run_only_if_some_of_the_mesh_has_left_the_view
     shapes = [np.asarray(shape.points) for shape in window.scene._shapes()]
     for points in shapes:
         points[:, 0] *= 0.98
-    window._job_ended()
+    window.running.ended.emit()
     assert eye.place == before, "a camera that moves looks like a mesh that does"
     for points in shapes:
         points[:, 0] += 0.5 * np.ptp(points[:, 0])
-    window._job_ended()
+    window.running.ended.emit()
     assert eye.place != before
     assert not eye.loses_some()
