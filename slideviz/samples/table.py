@@ -94,7 +94,9 @@ def _turbine_row(name: str, size: int, _variant: str) -> Sample:
 
 def _stator(name: str, size: int, _variant: str) -> Sample:
     mesh = stator_mesh(size)
-    return Sample(name, mesh, stator_case(), stator_displacement(mesh))
+    nodes = mesh.marker("BLADE").nodes
+    moved = stator_displacement(nodes, mesh.points[nodes])
+    return Sample(name, mesh, stator_case(), moved)
 
 
 def _streamed_stator(size: int) -> Streamed:
@@ -231,9 +233,7 @@ def write_sample(
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
     if isinstance(made, Streamed):
-        with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
-            for block in chain(file_head(1), zone_blocks(made.zone, 1)):
-                file.write(block)
+        _write_blocks(mesh, made.zone, overwrite)
     else:
         write(mesh, made.mesh, overwrite)
     if made.displacement is not None:
@@ -242,6 +242,13 @@ def write_sample(
     placed = _in_folder(made.case, folder, name, file_format)
     write_case(case, placed.change(source=case if overwrite else None))
     return paths
+
+
+def _write_blocks(mesh: Path, zone: Zone, overwrite: bool) -> None:
+    """Write a mesh as SU2's binary, block by block."""
+    with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
+        for block in chain(file_head(1), zone_blocks(zone, 1)):
+            file.write(block)
 
 
 def _in_folder(case: Case, folder: Path, name: str, ending: str) -> Case:
