@@ -206,6 +206,14 @@ def test_wrong_usage_is_one_sentence(square, capsys):
     assert err.count("\n") == 1
 
 
+def test_run_writes_the_quality_of_each_cell(square, tmp_path):
+    assert run(["run", str(square / "square.cfg"), "-q"]) == 0
+    found = sv.quality(sv.read(square / "square_deformed.su2"), sv.read(square / "mesh.su2"))
+    text = (square / "square_deformed_qual.txt").read_text()
+    assert text.endswith("\n")
+    assert [float(line) for line in text.splitlines()] == found.values.tolist()
+
+
 def test_info_tells_what_is_there(square, capsys):
     assert run(["info", str(square / "mesh.su2"), "--json", "-"]) == 0
     report = json.loads(capsys.readouterr().out)

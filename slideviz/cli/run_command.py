@@ -259,13 +259,18 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
 
 def _write_qualities(path: Path, found: Quality) -> None:
     """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
+    import orjson
+
     from slideviz.errors import CaseError
     from slideviz.mesh.io.atomic import atomic_write
 
     with atomic_write(path, CaseError) as file:
         for first in range(0, len(found), _ROWS):
-            part = found.values[first : first + _ROWS].tolist()
-            file.write(("\n".join(map(repr, part)) + "\n").encode())
+            part = found.values[first : first + _ROWS]
+            text = orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)
+            file.write(text[1:-1].replace(b",", b"
+") + b"
+")
 
 
 def _print_run(
