@@ -6,12 +6,18 @@ leave the interpreter to others meanwhile. What a part gives must not depend on 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 PART = 16384
 """Rows of a part."""
+
+
+def cores() -> int:
+    """Return the number of threads to work with: as many as Numba uses."""
+    from numba import get_num_threads
+
+    return int(get_num_threads())
 
 
 def in_parts(
@@ -39,7 +45,7 @@ def in_parts(
                 pass
             raise
 
-    helpers = min(len(os.sched_getaffinity(0)), -(-count // PART)) - 1
+    helpers = min(cores(), -(-count // PART)) - 1 if count > PART else 0
     if helpers <= 0:
         rest(tick)
         return

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ from tests.mesh.test_quality import shaken, soup
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 1003])
 def test_every_row_is_worked_on_once(monkeypatch, cores, count):
     monkeypatch.setattr(threads, "PART", 10)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(cores))
+    monkeypatch.setattr(threads, "cores", lambda: cores)
     seen = np.zeros(count, int)
 
     def work(part):
@@ -30,7 +28,7 @@ def test_every_row_is_worked_on_once(monkeypatch, cores, count):
 @pytest.mark.parametrize("cores", [1, 3])
 def test_what_is_raised_ends_the_work(monkeypatch, cores):
     monkeypatch.setattr(threads, "PART", 1)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(cores))
+    monkeypatch.setattr(threads, "cores", lambda: cores)
     done = []
 
     def fail(part):
@@ -56,7 +54,7 @@ def test_quality_is_the_same_for_any_cores(monkeypatch, vtk):
     mesh, before = soup(vtk, shaken(vtk, 100, 0.3)), soup(vtk, shaken(vtk, 100, 0.1, seed=1))
     found = []
     for cores in (1, 3):
-        monkeypatch.setattr(os, "sched_getaffinity", lambda _, cores=cores: range(cores))
+        monkeypatch.setattr(threads, "cores", lambda cores=cores: cores)
         found.append(quality(mesh, before))
     for name in ("values", "size", "skew", "status"):
         np.testing.assert_array_equal(*(getattr(one, name) for one in found))
