@@ -94,7 +94,7 @@ def prescribed(
         )
     values = np.zeros(mesh.points.shape)
     values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    largest = float(np.linalg.norm(values, axis=1).max(initial=0.0))
+    largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
     allowed = alike * largest + ROUNDING * largest_coordinate(mesh.points)
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)

@@ -12,9 +12,11 @@ from slideviz.case.model import Case
 from slideviz.deformation.growth import unsoundness
 from slideviz.deformation.setup import Setup
 from slideviz.errors import DeformError, Note, UnsoundError
+from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
+from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.field import Field
 from slideviz.rbf.frames import Frame
@@ -184,7 +186,7 @@ class Stepping:
             if mesh.halo is not None:
                 points = mesh.halo.follow(mesh.points, points)
                 moved = _followed(setup, mesh.halo, points, moved)
-            if not np.all(np.isfinite(points)):
+            if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, watch, part)
             unsound = unsoundness(setup, mesh, solution, moved, part)
@@ -321,7 +323,14 @@ def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> F
     """Return the coordinates (n, d) after a displacement; nodes on the ``axis`` (n,) stay on it."""
     displacement[axis, :2] = 0.0
     # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
-    return np.where(displacement == 0, coords, coords + displacement)
+    moved = np.empty_like(coords)
+
+    def add(part: slice) -> None:
+        by, before = displacement[part], coords[part]
+        moved[part] = np.where(by == 0, before, before + by)
+
+    in_parts(add, len(coords))
+    return moved
 
 
 def cartesian(
@@ -333,8 +342,14 @@ def cartesian(
     """
     if not frame.cylindrical:
         return coords
-    rest = np.all(coords == start, axis=1, keepdims=True)
-    return np.where(rest, points, frame.points(coords))
+    out = np.empty_like(points)
+
+    def fill(part: slice) -> None:
+        rest = np.all(coords[part] == start[part], axis=1, keepdims=True)
+        out[part] = np.where(rest, points[part], frame.points(coords[part]))
+
+    in_parts(fill, len(points))
+    return out
 
 
 def _followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
