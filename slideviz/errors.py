@@ -23,6 +23,14 @@ class DeformError(SlidevizError):
     """The mesh and the case are sound, but the deformation cannot be computed."""
 
 
+class NodeError(DeformError):
+    """Some nodes stand in the way; ``sentence`` has a ``{}`` for the number of each."""
+
+    def __init__(self, sentence: str, *nodes: int) -> None:
+        super().__init__(sentence.format(*nodes))
+        self.sentence, self.nodes = sentence, nodes
+
+
 class UnsoundError(DeformError):
     """A step was computed, but its result cannot be right."""
 

@@ -18,7 +18,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.report import CYCLE_KEYS, TRIAL_KEYS
-from slideviz.deformation.stepping import Trial
+from slideviz.deformation.steps import Trial
 from slideviz.rbf.problem import Cycle
 from slideviz.samples.table import write_sample
 

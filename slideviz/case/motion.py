@@ -89,7 +89,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     if apart.any():
         rows = np.flatnonzero(apart)
         pairs = np.stack([owner[first[rows]], owner[rows]], axis=1)
-        raise CaseError("\n".join(_disagreements(names, nodes[rows], pairs)))
+        raise CaseError("\n".join(_disagreements(mesh, names, nodes[rows], pairs)))
     keep = np.flatnonzero(first == np.arange(len(nodes)))
     warnings = [text for file in files.values() for text in file.warnings]
     return Displacements(nodes[keep], stacked[keep], tuple(dict.fromkeys(warnings)))
@@ -272,7 +272,9 @@ def _pushed(motion: Radial, points: FloatArray) -> FloatArray:
     return arm * ((motion.factor - 1.0) + outwards)[:, None]
 
 
-def _disagreements(names: tuple[str, ...], nodes: IntArray, pairs: IntArray) -> list[str]:
+def _disagreements(
+    mesh: Mesh, names: tuple[str, ...], nodes: IntArray, pairs: IntArray
+) -> list[str]:
     """Return a sentence for each pair of markers (m, 2) that displace nodes (m,) differently."""
     found, where = np.unique(pairs, axis=0, return_inverse=True)
     lines = []
@@ -280,7 +282,7 @@ def _disagreements(names: tuple[str, ...], nodes: IntArray, pairs: IntArray) -> 
         shared = nodes[where.ravel() == place]
         more = f" (and {len(shared) - 1} more)" if len(shared) > 1 else ""
         lines.append(
-            f"node {shared[0]}{more} is on the moving markers {names[one]!r} and "
+            f"node {mesh.number(int(shared[0]))}{more} is on the moving markers {names[one]!r} and "
             f"{names[other]!r}, which displace it differently; give both the same motion"
         )
     return lines

@@ -268,9 +268,7 @@ def _write_qualities(path: Path, found: Quality) -> None:
         for first in range(0, len(found), _ROWS):
             part = found.values[first : first + _ROWS]
             text = orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)
-            file.write(text[1:-1].replace(b",", b"
-") + b"
-")
+            file.write(text[1:-1].replace(b",", b"\n") + b"\n")
 
 
 def _print_run(

@@ -64,9 +64,9 @@ def unsoundness(
     node = int(on[np.argmax(length[on])]) if len(on) else int(np.argmax(length * beyond))
     where = ", ".join(f"{value:.6g}" for value in mesh.points[node])
     return (
-        f"node {node} at ({where}) would go {length[node]:.3g} far, more than {GROWTH:g} times the "
-        f"{reach[node]:.3g} that the motion reaches, whose largest displacement so far is "
-        f"{largest:.3g}: {_cause(setup, mesh, moved)}"
+        f"node {mesh.number(node)} at ({where}) would go {length[node]:.3g} far, more than "
+        f"{GROWTH:g} times the {reach[node]:.3g} that the motion reaches, whose largest "
+        f"displacement so far is {largest:.3g}: {_cause(setup, mesh, moved)}"
     )
 
 
@@ -128,7 +128,7 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
             "DATA_REDUCTION= YES"
         )
     pair = sorted((int(nodes[k]), int(nodes[others[k]])))
-    named = " and ".join(f"{node} ({_boundaries(setup, node)})" for node in pair)
+    named = " and ".join(f"{mesh.number(node)} ({_boundaries(setup, node)})" for node in pair)
     return (
         f"boundary nodes {named}, {gaps[k]:.2g} apart, move by {apart[k]:.3g} differently, which a "
         "smooth function cannot follow; let the boundary that stays go along (role moving, "

@@ -9,7 +9,8 @@ import numpy as np
 
 from slideviz.deformation.growth import overshoot_of_rest
 from slideviz.deformation.setup import Setup
-from slideviz.deformation.stepping import Step, cartesian, shifted
+from slideviz.deformation.stepping import cartesian, shifted
+from slideviz.deformation.steps import Step
 from slideviz.errors import DeformError, MeshError, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.axis import on_axis

@@ -12,7 +12,8 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.deformation.setup import Setup, make_setup
-from slideviz.deformation.stepping import Progress, Step, Stepping, Trial, renumbered
+from slideviz.deformation.stepping import Stepping, renumbered
+from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality

@@ -2,131 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from dataclasses import field as made_by
 
 import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.deformation.growth import unsoundness
 from slideviz.deformation.setup import Setup
+from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE
-from slideviz.rbf.field import Field
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit
-from slideviz.rbf.problem import Cycle, Problem, Solution, Watch
+from slideviz.rbf.problem import Problem, Solution, Watch
 
 HALVINGS = 3
 """How often a step that folds a cell is halved."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far the work is.
-
-    Attributes
-    ----------
-    step, total : int
-        The step in work (from 1), and all steps.
-    phase : str
-        ``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``.
-    fraction : float
-        Of the phase, 0 to 1.
-    """
-
-    step: int
-    total: int
-    phase: str
-    fraction: float
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A number of steps that STEPS= auto tried.
-
-    Attributes
-    ----------
-    planned, steps : int
-        Steps asked for, and made: more where folding steps were halved.
-    min, mean : float
-        Quality of the result.
-    inverted : int
-        Inverted cells of the result.
-    """
-
-    planned: int
-    steps: int
-    min: float
-    mean: float
-    inverted: int
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """The mesh after one step.
-
-    Attributes
-    ----------
-    index, total : int
-        Number of the step, from 1, and of all steps.
-    mesh : Mesh
-        The deformed mesh.
-    control_nodes : int
-        Nodes in the interpolation system of this step.
-    max_error : float
-        Largest misfit at nodes of known displacement before they are set exactly, in the mesh's
-        length unit.
-    condition : float
-        Estimated condition number of the interpolation system.
-    node_counts : Mapping of str to int
-        ``moving``, ``fixed``, ``sliding_edge``, ``sliding_surface``, ``internal``.
-    seconds : Mapping of str to float
-        Spent in this step, by phase; ``classify`` only in the first.
-    warnings : tuple of str
-        What the user should know; those of all steps so far.
-    history : tuple of Cycle
-        Convergence of the greedy selection in this step; empty without data reduction.
-    tried : tuple of Trial
-        The numbers of steps tried by STEPS= auto, in the last step of the run.
-    control : (c,) int64
-        The control nodes of this step; empty where a method has none.
-    candidates : int
-        Nodes that could have been control nodes; periodic images count as one.
-    tolerance : float or None
-        Of the data reduction, in the mesh's length unit; None where there was none.
-    periodic_misfit : float or None
-        Largest difference of the displacements of periodic images so far, in the mesh's length
-        unit: rounding, for more is an error. None where images need not move alike.
-    part : float
-        Of the whole displacement, after this step.
-    field : Field or None
-        What displaced the nodes that are no boundary, where a run keeps it.
-    """
-
-    index: int
-    total: int
-    mesh: Mesh
-    control_nodes: int
-    max_error: float
-    condition: float
-    node_counts: Mapping[str, int]
-    seconds: Mapping[str, float]
-    warnings: tuple[str, ...]
-    history: tuple[Cycle, ...] = ()
-    tried: tuple[Trial, ...] = ()
-    control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
-    candidates: int = 0
-    tolerance: float | None = None
-    periodic_misfit: float | None = None
-    part: float = 1.0
-    field: Field | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,9 +279,9 @@ def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
     sentence = (
         f"from step {index} on, {len(solution.dropped)} boundary nodes that nearly coincide with "
-        f"others (first: node {node} at {where}) are no control nodes; they still get exactly "
-        f"their displacement, from which the interpolation is off by {solution.dropped_error:.2g} "
-        "at most, and the cells beside them take that up"
+        f"others (first: node {mesh.number(node)} at {where}) are no control nodes; they still get "
+        f"exactly their displacement, from which the interpolation is off by "
+        f"{solution.dropped_error:.2g} at most, and the cells beside them take that up"
     )
     harmless = solution.dropped_error <= AGREE * mesh.extent
     return [Note(sentence) if harmless else sentence]

@@ -8,8 +8,8 @@ number depends on where a block ends. Last, cells are measured block by block.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,10 +22,11 @@ from slideviz.deformation.rest import Rest
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.solver import Progress, Step, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping
-from slideviz.errors import CaseError, MeshError
+from slideviz.errors import CaseError, MeshError, NodeError
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.partial import Partial, partial_copy
-from slideviz.mesh.io.su2b import chosen_zone, element_blocks
+from slideviz.mesh.io.su2b import chosen_zone
+from slideviz.mesh.io.su2b_elements import element_blocks
 from slideviz.mesh.io.su2b_layout import Source, find_zones
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
@@ -102,10 +103,11 @@ def stream(
     with watch.phase("read") as tick:
         skin = read_skin(path, case.zone, tick)
     first = Watch(watch.report)
-    with first.phase("classify"):
-        setup = make_setup(case, skin)
-    require_memory(setup, case)
     with ExitStack() as stack:
+        stack.enter_context(_numbered(skin))
+        with first.phase("classify"):
+            setup = make_setup(case, skin)
+        require_memory(setup, case)
         out = _Output(stack, case, output, watch, resume=resume, replaces=replaces)
 
         def rate(steps: Sequence[Step]) -> Quality:
@@ -125,6 +127,16 @@ def stream(
         folded,
         watch.seconds,
     )
+
+
+@contextmanager
+def _numbered(skin: Mesh) -> Iterator[None]:
+    """Return a context whose errors have the numbers that nodes have in the file."""
+    try:
+        yield
+    except NodeError as problem:
+        nodes = (skin.number(node) for node in problem.nodes)
+        raise NodeError(problem.sentence, *nodes) from problem
 
 
 class _Output:

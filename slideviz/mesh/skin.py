@@ -13,14 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.mesh.check import LARGEST, first_fault, printable
-from slideviz.mesh.io.su2b import (
-    Block,
-    chosen_zone,
-    element_blocks,
-    point_blocks,
-    read_elements,
-    taken,
-)
+from slideviz.mesh.io.su2b import chosen_zone, point_blocks, read_elements
+from slideviz.mesh.io.su2b_elements import Block, element_blocks, taken
 from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 

@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from slideviz.errors import DeformError
+from slideviz.errors import NodeError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.problem import Problem
 
@@ -162,9 +162,11 @@ def disagree(problem: Problem, nodes: IntArray, row: int, gap: float) -> NoRetur
 
 def refuse(node: int, other: int, gap: float) -> NoReturn:
     """Raise the error for two nodes that coincide but are asked to move differently."""
-    raise DeformError(
-        f"nodes {node} and {other} coincide (in the same place, or one period apart) but are "
+    raise NodeError(
+        "nodes {} and {} coincide (in the same place, or one period apart) but are "
         f"asked to move differently, by {gap:.3g}; a moving boundary must move alike at both "
         "periodic sides (in a rotational case: about the axis of periodicity) and may not reach "
-        "into the next passage; or choose PERIODIC_MODE= none"
+        "into the next passage; or choose PERIODIC_MODE= none",
+        node,
+        other,
     )

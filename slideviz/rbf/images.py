@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from slideviz.errors import DeformError
+from slideviz.errors import NodeError
 from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.topology import components
@@ -173,9 +173,11 @@ def largest_misfit(
     if not found[worst] <= allowed:
         one, two = images[worst]
         where = ", ".join(f"{value:.6g}" for value in points[two])
-        raise DeformError(
-            f"node {two}, now at {where}, and its periodic image, node {one}, have moved "
+        raise NodeError(
+            f"node {{}}, now at {where}, and its periodic image, node {{}}, have moved "
             f"differently, by {found[worst]:.3g}; rounding makes {allowed:.1g} at most; let the "
-            "boundaries at both periodic sides move alike, or choose PERIODIC_MODE= none"
+            "boundaries at both periodic sides move alike, or choose PERIODIC_MODE= none",
+            int(two),
+            int(one),
         )
     return float(found[worst])

@@ -24,6 +24,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.blade import Section, Shares, camber, counts
 from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points
 from slideviz.samples.refined import refined
+from slideviz.samples.reshaping import reshaped
 from slideviz.samples.thesis import FILE
 
 QUADRILATERAL, HEXAHEDRON = 9, 12
@@ -52,14 +53,6 @@ RADIAL = 0.62
 """Cells in r over those along the inflow."""
 ROUGH = 1e-3
 """Step of the smoothing of a finer grid at which it ends, in chords."""
-
-TWIST_DEG = -8.0
-"""Turn about the stacking line at the shroud; none at the hub."""
-LEAN_DEG = -3.0
-"""Shift in theta at the shroud; none at the hub. So far that the blade leaves its old passage."""
-BUMPS, SEED = 40, 41
-HEIGHT, WIDTH = 6e-4, (3e-3, 9e-3)
-"""Greatest height of a bump, and its least and greatest radius, in the unit of length."""
 
 
 def stator_mesh(size: int) -> Mesh:
@@ -258,40 +251,3 @@ def _repeated(cells: IntArray, nodes: int, layers: int) -> IntArray:
     """Return the cells of the first layer in all layers: (layers * k, n)."""
     shift = nodes * np.arange(layers)[:, None, None]
     return (cells + shift).reshape(-1, cells.shape[1])
-
-
-def reshaped(points: FloatArray, radii: tuple[float, float], stack_z: float) -> FloatArray:
-    """Return the displacement of blade nodes, which keeps their distance from the axis: (k, 3).
-
-    Parameters
-    ----------
-    points : (k, 3)
-        Nodes of the blade; the axis is z.
-    radii : (float, float)
-        Hub and shroud.
-    stack_z : float
-        Where the line that the twist turns about meets theta = 0.
-    """
-    r, theta = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
-    z, arc = points[:, 2], r * theta
-    span = (r - radii[0]) / (radii[1] - radii[0])
-    twist = np.radians(TWIST_DEG) * span**2
-    away = z - stack_z
-    moved_z = stack_z + np.cos(twist) * away - np.sin(twist) * arc
-    moved_arc = np.sin(twist) * away + np.cos(twist) * arc
-    moved_arc += r * np.radians(LEAN_DEG) * np.sin(np.pi / 2 * span) + _bumps(points)
-    angle = moved_arc / r
-    return np.column_stack([r * np.cos(angle), r * np.sin(angle), moved_z]) - points
-
-
-def _bumps(points: FloatArray) -> FloatArray:
-    """Return the sum of smooth bumps around random nodes' places, in r theta: (k,)."""
-    random = np.random.default_rng(SEED)
-    low, high = points.min(axis=0), points.max(axis=0)
-    total = np.zeros(len(points))
-    for _ in range(BUMPS):
-        centre = random.uniform(low, high)
-        width, height = random.uniform(*WIDTH), random.uniform(-HEIGHT, HEIGHT)
-        near = np.sum((points - centre) ** 2, axis=1) / width**2
-        total += height * np.exp(-near)
-    return total

@@ -18,7 +18,7 @@ from slideviz import terms
 from slideviz.case.model import Case, Translate
 from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.solver import deform
-from slideviz.deformation.stepping import Progress, Step
+from slideviz.deformation.steps import Progress, Step
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.mesh.model import FloatArray, Mesh, frozen_array
 from slideviz.mesh.quality import Quality, quality

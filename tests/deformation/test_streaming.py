@@ -18,7 +18,7 @@ from slideviz.cli.options import changed
 from slideviz.deformation import rest, streaming
 from slideviz.deformation.solver import folded_at
 from slideviz.deformation.streaming import stream
-from slideviz.errors import CaseError, MeshError, UnsoundError
+from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
 from slideviz.mesh.io import partial
 from slideviz.mesh.io.partial import names_of
 from slideviz.mesh.io.su2b_layout import MAGIC
@@ -379,3 +379,42 @@ def test_mistakes_are_told_as_by_the_reader(tmp_path, data, message):
     path.write_bytes(data)
     with pytest.raises(MeshError, match=message):
         read_skin(path, None)
+
+
+@pytest.mark.parametrize(
+    "motions",
+    [
+        "(x_m, translate, 0.1, 0, 0), (y_m, translate, 0, 0.1, 0)",
+        "(x_p, translate, 0.05, 0, 0), (x_p, file, far.txt)",
+    ],
+)
+def test_sentences_have_the_numbers_of_the_file(tmp_path, monkeypatch, motions):
+    """Nodes of the skin have others, which nobody knows."""
+    monkeypatch.chdir(tmp_path)
+    mesh = grid((7, 7, 7))
+    sv.write("mesh.su2b", mesh)
+    corner = int(np.intersect1d(mesh.marker("x_p").nodes, mesh.marker("y_p").nodes)[3])
+    Path("far.txt").write_text(f"{corner} 3 0 0\n999 1 0 0\n")
+    moving = "x_m, y_m" if "y_m" in motions else "x_p"
+    text = f"MESH_FILENAME= mesh.su2b\nMARKER_MOVING= ({moving})\nMOTION= {motions}\n"
+    Path("case.cfg").write_text(text)
+    case = sv.Case.read("case.cfg")
+    with pytest.raises(CaseError) as one:
+        list(sv.deform(case, sv.read("mesh.su2b")))
+    with pytest.raises(CaseError) as other:
+        stream(case, tmp_path / "out.su2b")
+    assert str(one.value) == str(other.value)
+    assert "node " in str(one.value)
+
+
+def test_errors_of_the_method_have_the_numbers_of_the_file(tmp_path, monkeypatch):
+    case = made(tmp_path, "square", 25, ("STEPS=1",))
+    skin = read_skin(case.mesh_file, None)
+    assert skin.number(150) != 150
+
+    def fail(*_):
+        raise NodeError("nodes {} and {} are apart by 0.1", 3, 150)
+
+    monkeypatch.setattr(streaming, "make_setup", fail)
+    with pytest.raises(NodeError, match=f"nodes {skin.number(3)} and {skin.number(150)} are apart"):
+        stream(case, tmp_path / "out.su2b")

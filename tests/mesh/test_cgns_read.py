@@ -553,7 +553,11 @@ SECTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "told"), [*MISTAKES, *SECTIONS], ids=lambda one: one[:30] if isinstance(one, str) else "file")
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [*MISTAKES, *SECTIONS],
+    ids=lambda one: one[:30] if isinstance(one, str) else "file",
+)
 def test_mistakes_have_node_rule_and_remedy(tmp_path, change, told):
     path = tmp_path / "a.cgns"
     if (change, told) in SECTIONS:

@@ -14,6 +14,7 @@ from slideviz.mesh.halo import Halo
 from slideviz.mesh.io import su2b, su2b_write
 from slideviz.mesh.io.convert import convert
 from slideviz.mesh.io.files import read, write
+from slideviz.mesh.io.su2b_elements import element_blocks
 from slideviz.mesh.io.su2b_write import su2b_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh
 from tests.builders import grid
@@ -102,10 +103,9 @@ def stored(tmp_path, data, name="mesh.su2b"):
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("chunk", [1, 2, 1 << 18])
 def test_both_widths_and_byte_orders_are_read(tmp_path, monkeypatch, width, order, chunk):
-    for module in (su2b, su2b_write):
-        monkeypatch.setattr(module, "BLOCK", chunk)
+    monkeypatch.setattr(su2b_write, "BLOCK", chunk)
     monkeypatch.setattr(su2b.point_blocks, "__defaults__", (chunk,))
-    monkeypatch.setattr(su2b.element_blocks, "__defaults__", (chunk,))
+    monkeypatch.setattr(element_blocks, "__defaults__", (chunk,))
     data = packed([TWO_D, THREE_D], width, order)
     path = stored(tmp_path, data)
     for number, zone in enumerate((TWO_D, THREE_D), 1):

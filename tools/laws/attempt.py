@@ -9,7 +9,7 @@ from types import FrameType
 
 from slideviz.case.model import Case
 from slideviz.deformation.solver import deform
-from slideviz.deformation.stepping import Step
+from slideviz.deformation.steps import Step
 from slideviz.mesh.model import Mesh
 
 LIMIT_S = 60.0

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from slideviz.case.model import Translate
-from slideviz.deformation.stepping import Step
+from slideviz.deformation.steps import Step
 from tools.laws.attempt import told, tried
 from tools.laws.cases import Run
 from tools.laws.meshes import images, renumbered

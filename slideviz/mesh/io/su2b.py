@@ -1,7 +1,6 @@
 """Reading SU2 binary meshes (``.su2b``), block by block, and what is kept for writing them again.
 
-The type of each element, its nodes and its index are taken out of the list of all numbers with
-array operations; coordinates and indices of points have a fixed stride.
+Coordinates and indices of points have a fixed stride; elements are those of `su2b_elements`.
 """
 
 from __future__ import annotations
@@ -12,21 +11,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.mesh.check import first_fault, path_error, printable
-from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.su2b_elements import BLOCK, element_blocks, taken
 from slideviz.mesh.io.su2b_layout import MAGIC, Elements, Source, ZonePlace, find_zones
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
-
-BLOCK = 1 << 18
-"""Elements or points that are read at a time."""
-SIZES = np.zeros(256, np.int64)
-"""Nodes of an element, by type."""
-_DIMS = np.zeros(256, np.int64)
-for _row in ELEMENTS.values():
-    SIZES[_row.vtk], _DIMS[_row.vtk] = _row.n_nodes, _row.dim
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +46,6 @@ class BinaryForm:
     order: IntArray | None
     names: tuple[bytes, ...]
     cells: Cells
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Some elements as they stand in a file: types (k,), nodes one after the other, indices (k,).
-
-    ``first`` is the number of the first, and ``ids`` empty where elements have no index.
-    """
-
-    first: int
-    types: NDArray[np.uint8]
-    nodes: IntArray
-    ids: IntArray
 
 
 def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
@@ -183,120 +160,6 @@ def point_blocks(
         yield first, points
 
 
-def element_blocks(
-    source: Source, place: ZonePlace, table: Elements, dim: int, size: int = BLOCK
-) -> Iterator[Block]:
-    """Yield the elements of a table, of dimension ``dim``, so many at a time.
-
-    Raises
-    ------
-    MeshError
-        An element is not what it should be; the message has its byte.
-    """
-    what, start, width = "the elements", 0, source.width
-    for first in range(0, table.count, size):
-        count = min(size, table.count - first)
-        at = table.offsets + first * width
-        offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
-        steps = np.diff(offsets)
-        wrong = (steps <= 0) | (offsets[1:] > table.length) | (offsets[:-1] < start)
-        if wrong.any() or int(offsets[0]) != start:
-            k = 0 if int(offsets[0]) != start else int(np.argmax(wrong)) + 1
-            raise source.error(
-                at + k * width,
-                f"the offset of element {first + k} is {int(offsets[k]) % 2**64}, which must be "
-                f"{'0' if first + k == 0 else 'above the one before it'} and at most "
-                f"{table.length}, the last; the file is damaged, so write the mesh again",
-            )
-        begin = table.entries + start * width
-        numbers = source.array(begin, int(offsets[-1]) - start, source.conn, what)
-        block = _taken_apart(source, table, first, begin, _whole_numbers(numbers), offsets - start)
-        _check_nodes(source, place, block, begin, offsets - start)
-        _check_dim(source, block, dim, begin, offsets - start)
-        start = int(offsets[-1])
-        yield block
-    if start != table.length:
-        raise source.error(
-            table.entries + start * width,
-            f"the list of elements has {table.length} numbers, of which the elements use {start}; "
-            "the file is damaged, so write the mesh again",
-        )
-
-
-def _whole_numbers(values: NDArray) -> IntArray:
-    """Return counts as int64; those that are too large for it become negative."""
-    return np.asarray(values.astype(np.uint64, copy=False).view(np.int64))
-
-
-def _taken_apart(
-    source: Source, table: Elements, first: int, begin: int, numbers: IntArray, offsets: IntArray
-) -> Block:
-    """Return the types, nodes and indices in a part of a list, ``offsets`` counted from there."""
-    types = numbers[offsets[:-1]]
-    known = (types > 0) & (types < 256)
-    sizes = np.where(known, SIZES[np.where(known, types, 0)], 0)
-    steps = np.diff(offsets)
-    wrong = (sizes == 0) | (steps != sizes + 1 + table.numbered)
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        at = begin + int(offsets[k]) * source.width
-        if not sizes[k]:
-            allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim)
-            raise source.error(
-                at,
-                f"element {first + k} has the type {int(types[k]) % 2**64}, which is not supported "
-                f"(supported: {allowed}); export the mesh with these",
-            )
-        row = ELEMENTS[int(types[k])]
-        raise source.error(
-            at,
-            f"element {first + k} has {steps[k]} numbers, but a {row.name} has {row.n_nodes} "
-            f"nodes and {2 if table.numbered else 1} more; write the mesh again",
-        )
-    ids = numbers[offsets[1:] - 1] if table.numbered else numbers[:0]
-    if (steps == steps[0]).all():
-        nodes = numbers.reshape(len(types), -1)[:, 1 : 1 + int(sizes[0])].ravel()
-    else:
-        keep = np.ones(len(numbers), bool)
-        keep[offsets[:-1]] = False
-        if table.numbered:
-            keep[offsets[1:] - 1] = False
-        nodes = numbers[keep]
-    return Block(first, types.astype(np.uint8), nodes, ids)
-
-
-def _check_nodes(
-    source: Source, place: ZonePlace, block: Block, begin: int, offsets: IntArray
-) -> None:
-    """Raise for the first node of a block that does not exist."""
-    wrong = block.nodes.view(np.uint64) >= place.n_points
-    if not wrong.any():
-        return
-    at = int(np.argmax(wrong))
-    ends = np.cumsum(SIZES[block.types])
-    k = int(np.searchsorted(ends, at, "right"))
-    column = at - int(ends[k]) + int(SIZES[block.types[k]])
-    raise source.error(
-        begin + (int(offsets[k]) + 1 + column) * source.width,
-        f"element {block.first + k} has the node {int(block.nodes[at]) % 2**64}, but the "
-        f"{place.n_points} points are numbered from 0 to {place.n_points - 1}; correct the element "
-        "or the points",
-    )
-
-
-def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntArray) -> None:
-    """Raise for the first element of a block that has another dimension."""
-    wrong = _DIMS[block.types] != dim
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        row = ELEMENTS[int(block.types[k])]
-        raise source.error(
-            begin + int(offsets[k]) * source.width,
-            f"element {block.first + k} is a {row.name} (type {row.vtk}, dimension {row.dim}), but "
-            f"dimension {dim} is needed here; correct the element or the dimension of its zone",
-        )
-
-
 def read_elements(
     source: Source, place: ZonePlace, table: Elements, dim: int, tick: Callable[[int], None]
 ) -> tuple[Cells, IntArray | None]:
@@ -351,14 +214,6 @@ def sorted_back(cells: Cells, order: IntArray) -> Cells:
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     return taken(cells, place)
-
-
-def taken(cells: Cells, chosen: IntArray) -> Cells:
-    """Return the chosen cells (k,), in that order."""
-    sizes = np.diff(cells.offsets)[chosen]
-    ends = np.cumsum(sizes)
-    rows = np.repeat(cells.offsets[chosen] - (ends - sizes), sizes) + np.arange(sizes.sum())
-    return Cells.from_types(cells.types[chosen], cells.connectivity[rows])
 
 
 def is_su2b(path: Path) -> bool:

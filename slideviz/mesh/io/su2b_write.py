@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
-from slideviz.mesh.io.su2b import BLOCK, SIZES, BinaryForm, taken
+from slideviz.mesh.io.su2b import BinaryForm
+from slideviz.mesh.io.su2b_elements import BLOCK, SIZES, taken
 from slideviz.mesh.io.su2b_layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
