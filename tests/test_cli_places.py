@@ -137,7 +137,14 @@ def path_options(name: str) -> set[str]:
 def test_every_path_of_every_command_is_known_as_read_or_written(name):
     given = argparse.Namespace(**{option: Path(option) for option in path_options(name)})
     read = {str(path) for path in inputs_of(given)}
-    assert path_options(name) - read <= {"output", "json", "history", "steps_dir", "picture"}
+    assert path_options(name) - read <= {
+        "output",
+        "json",
+        "history",
+        "steps_dir",
+        "steps_file",
+        "picture",
+    }
 
 
 def test_nothing_that_writes_gets_round_it(tmp_path):

@@ -146,7 +146,7 @@ def _meet(one: Output, other: Output) -> bool:
 
 
 def _require_mesh_ending(file: Path) -> None:
-    if file.suffix.lower() not in (".su2", ".su2b", ".vtu"):
+    if file.suffix.lower() not in (".su2", ".su2b", ".vtu", ".vtkhdf"):
         from slideviz.mesh.io.meshio_calls import formats_of
 
         formats_of(file)

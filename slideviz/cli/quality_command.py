@@ -27,7 +27,11 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
     add_shared(call, "zone")
     add_shared(call, "json")
     call.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="mesh with quality (.vtu), or .csv"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="mesh with quality (.vtu, .vtkhdf), or .csv",
     )
     call.set_defaults(command=quality)
 

@@ -243,6 +243,6 @@ def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
 
 def cell_data(path: Path, found: Quality) -> dict | None:
     """Return the qualities for formats that hold cell data, None for the others."""
-    if path.suffix.lower() not in (".vtu", ".vtk", ".xdmf"):
+    if path.suffix.lower() not in (".vtu", ".vtkhdf", ".vtk", ".xdmf"):
         return None
     return {"size-skew": found.values, "size": found.size, "skew": found.skew}

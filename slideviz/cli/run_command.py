@@ -45,6 +45,12 @@ def add_run(calls: argparse._SubParsersAction) -> None:
         "--history", type=Path, metavar="FILE", help="convergence of the data reduction (CSV)"
     )
     call.add_argument("--steps-dir", type=Path, metavar="DIR", help="write the mesh of every step")
+    call.add_argument(
+        "--steps-file",
+        type=Path,
+        metavar="FILE",
+        help="all steps with their quality in one file for ParaView (.vtkhdf)",
+    )
     call.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
     call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
     add_zoom(call)
@@ -174,6 +180,7 @@ def _tell(
     elif not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
+        files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
     for warning in report["warnings"]:
         print(f"slideviz: warning: {warning}", file=sys.stderr)
@@ -188,6 +195,7 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
     from slideviz.cli.places import Output, require_places
+    from slideviz.cli.steps_file import require_series
     from slideviz.mesh.io.file_checks import same_file
 
     assert case.mesh_file is not None
@@ -201,6 +209,8 @@ def _require_places(
         remedy="choose another name with -o or MESH_OUT_FILENAME"
         + (", or say --force to write over it" if may_force else ""),
     )
+    if arguments.steps_file:
+        require_series(arguments.steps_file)
     if arguments.picture:
         from slideviz.export.offscreen import check_png, check_size
         from slideviz.export.picture import SIZE
@@ -214,6 +224,7 @@ def _require_places(
         Output(arguments.json, "--json"),
         Output(arguments.picture, "--picture"),
         Output(arguments.history, "--history"),
+        Output(arguments.steps_file, "--steps-file"),
         Output(
             arguments.steps_dir,
             "--steps-dir",
@@ -240,17 +251,20 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
+    from slideviz.cli.steps_file import steps_file
     from slideviz.session.formats import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir
-    with Bar(not arguments.quiet) as bar:
+    series = steps_file(arguments.steps_file, mesh, case.quality_metric)
+    with series as add, Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:
                 assert case.mesh_file is not None
                 width = len(str(step.total))
                 name = f"{case.mesh_file.stem}_{step.index:0{width}d}{usual_ending(mesh)}"
                 write(folder / name, step.mesh)
+            add(step.mesh)
             steps.append(step)
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
                 steps[-2] = replace(steps[-2], mesh=mesh)

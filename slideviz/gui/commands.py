@@ -106,7 +106,7 @@ _EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshe
             lambda window: window.exports.quality(),
             enabled=idle, tip_now=why_not(idle, "There is no mesh yet: open one first.")),
     Command("export_steps", "&Meshes of all steps…",
-            "Save the mesh of every step, each in a file of its own.",
+            "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
             lambda window: window.exports.steps(),
             enabled=stepped_and_idle, tip_now=why_not(stepped_and_idle, _NO_STEPS)),
 ), tooltips=True)

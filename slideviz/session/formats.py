@@ -28,6 +28,7 @@ MESH_FORMATS: dict[str, MeshFormat] = {
     ".su2": MeshFormat("SU2 (keeps all markers and sections)", False, "names"),
     ".su2b": MeshFormat("SU2 binary (keeps all markers)", False, "names"),
     ".vtu": MeshFormat("VTU for ParaView, with quality and displacement", True, "names"),
+    ".vtkhdf": MeshFormat("VTKHDF for ParaView: boundaries as blocks, steps", True, "names"),
     ".vtk": MeshFormat("Legacy VTK, with quality", True, "numbers"),
     ".xdmf": MeshFormat("XDMF, with quality", True, "numbers"),
     ".cgns": MeshFormat("CGNS (a copy of the file, with other coordinates)", False, "names"),

@@ -14,7 +14,7 @@ from pathlib import Path
 from slideviz.case.model import Case
 from slideviz.errors import Cancelled, CaseError
 from slideviz.mesh.io.private import private_folder
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import Surface, find_surfaces
@@ -184,12 +184,15 @@ def save_mesh(
     from slideviz.mesh.io.files import write
 
     report(Doing(f"Writing {path.name}"))
-    data = None
-    if holds_quality(path):
-        measured = frame.quality
-        data = {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
+    data = cell_values(frame) if holds_quality(path) else None
     write(path, frame.mesh, overwrite, data, base, lambda: require_going(stopped))
     return path
+
+
+def cell_values(frame: Frame) -> dict[str, FloatArray]:
+    """Return the quality of the cells of a frame by name, each (m,)."""
+    measured = frame.quality
+    return {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}
 
 
 def require_going(stopped: Stopped) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.vtkhdf import VTKHDF, vtkhdf_series
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.session.jobs import Doing, Report, Stopped, require_going, save_mesh
+from slideviz.session.jobs import Doing, Report, Stopped, cell_values, require_going, save_mesh
 from slideviz.session.state import Frame
 from slideviz.terms import CELL_STATES
 
@@ -63,13 +64,26 @@ def centroids(mesh: Mesh) -> FloatArray:
 
 
 def step_paths(path: Path, count: int) -> list[Path]:
-    """Return the files of ``count`` steps: the name of ``path`` with a number before its end."""
+    """Return the files of ``count`` steps: the name of ``path`` with a number before its end.
+
+    A VTKHDF file has them all.
+    """
+    if path.suffix.lower() == VTKHDF:
+        return [path]
     width = len(str(count))
     return [path.with_name(f"{path.stem}_{k:0{width}d}{path.suffix}") for k in range(1, count + 1)]
 
 
-def save_steps(path: Path, frames: Sequence[Frame], report: Report, stopped: Stopped) -> list[Path]:
+def save_steps(
+    path: Path,
+    frames: Sequence[Frame],
+    report: Report,
+    stopped: Stopped,
+    first: Frame | None = None,
+) -> list[Path]:
     """Write the mesh of every step, whole files only, and return them.
+
+    All go into one file, with the undeformed mesh ``first`` before them, where its format can.
 
     Parameters
     ----------
@@ -84,8 +98,22 @@ def save_steps(path: Path, frames: Sequence[Frame], report: Report, stopped: Sto
         A file cannot be written; those before it stay.
     """
     paths = step_paths(path, len(frames))
+    if path.suffix.lower() == VTKHDF:
+        _save_series(path, [*([first] if first else []), *frames], report, stopped)
+        return paths
     for k, (target, frame) in enumerate(zip(paths, frames, strict=True)):
         require_going(stopped)
         report(Doing(f"Writing {target.name}", k / len(frames)))
         save_mesh(target, frame, False, lambda _: None, stopped)
     return paths
+
+
+def _save_series(path: Path, frames: Sequence[Frame], report: Report, stopped: Stopped) -> None:
+    """Write all frames into one file, with quality, and displacement from the first of them."""
+    start = frames[0].mesh
+    with vtkhdf_series(path, start) as series:
+        for k, frame in enumerate(frames):
+            require_going(stopped)
+            report(Doing(f"Writing {path.name}", k / len(frames)))
+            moved = {"displacement": frame.mesh.points - start.points}
+            series.add(frame.mesh.points, cell_values(frame), moved)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from pathlib import Path
 
 from qtpy.QtCore import QObject
@@ -16,6 +17,7 @@ from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services
+from slideviz.mesh.io.vtkhdf import VTKHDF
 from slideviz.session import changes, jobs_export
 from slideviz.session.formats import usual_ending
 from slideviz.session.state import Session
@@ -159,7 +161,7 @@ class Exports(QObject):
             return
         ending = usual_ending(mesh)
         default = files.folder() / f"{files.stem()}_step{ending}"
-        title = f"Save {len(run.frames)} steps: each name gets a number, as in NAME_1{ending}"
+        title = f"Save {len(run.frames)} steps: NAME_1{ending} and so on, or one .vtkhdf file"
         filters = questions.mesh_filters(mesh)
         path = questions.ask_numbered(self.window, title, default, filters)
         if path is None:
@@ -170,17 +172,19 @@ class Exports(QObject):
         self.window.start_job(
             "Saving the steps",
             lambda paths: self._steps_written(paths, run.number),
-            jobs_export.save_steps,
+            partial(jobs_export.save_steps, first=session.frames[0]),
             path,
             run.frames,
         )
 
     def _steps_written(self, paths: list[Path], number: int) -> None:
         run = self._session.run_shown
-        if run is not None and run.number == number and len(run.frames) == len(paths):
+        whole = paths[-1].suffix.lower() == VTKHDF
+        if run is not None and run.number == number and (whole or len(run.frames) == len(paths)):
             self.window.store.change(changes.saved_mesh)
         self._written(paths[-1])
-        self.window.say(f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}")
+        if not whole:
+            self.window.say(f"Saved {len(paths)} meshes, {paths[0].name} to {paths[-1].name}")
 
     def _written(self, path: Path) -> None:
         self.window.settings.setValue("folder", str(path.parent))

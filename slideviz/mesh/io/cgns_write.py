@@ -30,8 +30,8 @@ def write_cgns(path: Path, mesh: Mesh, replaces: Path | None = None) -> None:
     """
     form, source = require_cgns(path, mesh)
     try:
-        with hdf5_write(path, replaces, source) as tree:
-            _replace(path, source, tree, form, mesh.points)
+        with hdf5_write(path, replaces, source) as draft:
+            _replace(path, source, draft.tree, form, mesh.points)
     except OSError as problem:
         raise path_error(
             path,

@@ -124,7 +124,7 @@ def write(
     cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
         Values on the cells by name; not for SU2, which has no place for them.
     base : Mesh, optional
-        The undeformed mesh: VTU files get the displacement of every point, as vectors.
+        The undeformed mesh: VTU and VTKHDF files get the displacement of every point, as vectors.
     going_on : callable, optional
         Called between the blocks of an SU2 file; what it raises stops the writing, and what was
         at ``path`` stays.

@@ -40,6 +40,8 @@ def formats_of(path: Path) -> list[str]:
             return sorted(table[ending], key=lambda name: name != "gmsh")
     if path.suffix.lower() == ".cfg":
         raise path_error(path, "is a case file, not a mesh; name the mesh itself")
+    if path.suffix.lower() == ".vtkhdf":
+        raise path_error(path, "is written for ParaView, but not read; use the mesh it is made of")
     raise path_error(
         path,
         f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .vtu, "

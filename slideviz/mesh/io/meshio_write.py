@@ -1,4 +1,4 @@
-"""Writing meshes in other formats than SU2: VTU and CGNS by our own writers, the rest by meshio.
+"""Writing meshes in other formats than SU2: VTU, VTKHDF and CGNS here, the rest by meshio.
 
 meshio writes VTU too, but reorders cells of mixed type and loses the names of boundaries.
 """
@@ -22,6 +22,7 @@ from slideviz.mesh.io.cgns_write import write_cgns
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
 from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
+from slideviz.mesh.io.vtkhdf import VTKHDF, write_vtkhdf
 from slideviz.mesh.model import IntArray, Mesh
 
 if TYPE_CHECKING:
@@ -60,9 +61,9 @@ def write_other_format(
 ) -> None:
     """Write a mesh in the format that the ending names.
 
-    Only VTU files get the point data. Names of boundaries are kept in VTU, Gmsh, MED and Abaqus
-    files; other formats get numbers at most. What meshio wrote is read again and compared, for it
-    leaves out what a format cannot hold.
+    Only VTU and VTKHDF files get the point data. Names of boundaries are kept in these, in Gmsh,
+    MED and Abaqus files; other formats get numbers at most. What meshio wrote is read again and
+    compared, for it leaves out what a format cannot hold.
 
     Raises
     ------
@@ -77,6 +78,9 @@ def write_other_format(
                 f"a CGNS file gets no cell data ({', '.join(cell_data)}); write a .vtu file",
             )
         write_cgns(path, mesh, replaces)
+        return
+    if path.suffix.lower() == VTKHDF:
+        write_vtkhdf(path, mesh, cell_data, point_data or {}, replaces)
         return
     if path.suffix.lower() == ".vtu":
         with atomic_write(path, replaces=replaces) as file:

@@ -1,0 +1,209 @@
+"""Writing VTKHDF files: the format of VTK and ParaView on HDF5, version 2.1.
+
+A mesh is a collection of blocks: ``volume`` with the cells, and under ``boundaries`` one for each
+marker, by its name, as other readers of ParaView give boundaries; so they are shown, hidden and
+extracted by name. (The cells of a VTU file are all in one grid, with numbers for the boundaries,
+for such a file has no blocks.) A series has its topology once, and points and values of each step
+behind each other; ``Steps`` says where each begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.io.hdf5 import Hdf5Draft, hdf5_write
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+
+if TYPE_CHECKING:
+    import h5py
+
+VTKHDF = ".vtkhdf"
+_VERSION = (2, 1)
+_VOLUME = "volume"
+_CHUNK_ROWS = 1 << 16
+
+Values = Mapping[str, NDArray]
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """A block of the collection: its group, its nodes in the mesh, and how many cells it has."""
+
+    group: h5py.Group
+    nodes: IntArray
+    count: int
+
+
+class Series:
+    """A VTKHDF file of the steps of a mesh, which grows by `add`."""
+
+    def __init__(self, draft: Hdf5Draft, blocks: Sequence[_Block], is_series: bool) -> None:
+        self._draft = draft
+        self._blocks = blocks
+        self._is_series = is_series
+        self._times: list[float] = []
+
+    def add(self, points: FloatArray, cell_data: Values, point_data: Values) -> None:
+        """Write the next step, whose time is its number from 0.
+
+        Parameters
+        ----------
+        points : (n, d)
+            Points of the mesh.
+        cell_data : mapping of str to (m,) or (m, k)
+            Values on its cells; the same names in every step.
+        point_data : mapping of str to (n,) or (n, d)
+            Values on its points; vectors get a third component.
+
+        Raises
+        ------
+        MeshError
+            The file cannot be written.
+        """
+        for block in self._blocks:
+            self._append(block.group, "Points", _in_space(points[block.nodes]))
+            for name, values in point_data.items():
+                rows = values[block.nodes]
+                rows = _in_space(rows) if rows.ndim == 2 else rows
+                self._append(block.group, f"PointData/{_clean(name)}", rows)
+        for name, values in cell_data.items():
+            self._append(self._blocks[0].group, f"CellData/{_clean(name)}", values)
+        self._draft.require()
+        self._times.append(float(len(self._times)))
+
+    def _append(self, group: h5py.Group, name: str, rows: NDArray) -> None:
+        """Put rows behind those of the steps before."""
+        if not self._is_series:
+            group.create_dataset(name, data=rows)
+            return
+        if name not in group:
+            chunk = max(min(len(rows), _CHUNK_ROWS), 1)
+            shape, dtype = rows.shape[1:], rows.dtype
+            group.create_dataset(
+                name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(chunk, *shape)
+            )
+        data = group[name]
+        data.resize(len(data) + len(rows), axis=0)
+        data[len(data) - len(rows) :] = rows
+
+    def end(self) -> None:
+        """Say where each step begins; the file is complete."""
+        if not self._is_series:
+            return
+        count = len(self._times)
+        numbers = np.arange(count)
+        for block in self._blocks:
+            steps = block.group.create_group("Steps")
+            steps.attrs["NSteps"] = count
+            steps["Values"] = np.array(self._times)
+            steps["PartOffsets"] = np.zeros(count, np.int64)
+            steps["NumberOfParts"] = np.ones(count, np.int64)
+            steps["PointOffsets"] = numbers * len(block.nodes)
+            # All steps have the topology of the first.
+            steps["CellOffsets"] = np.zeros((count, 1), np.int64)
+            steps["ConnectivityIdOffsets"] = np.zeros((count, 1), np.int64)
+            for kind, length in (("PointData", len(block.nodes)), ("CellData", block.count)):
+                for name in block.group.get(kind, ()):
+                    steps[f"{kind}Offsets/{name}"] = numbers * length
+
+
+@contextmanager
+def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[Series]:
+    """Return a file that steps of a mesh are added to; it is there when the block ends well.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written.
+    """
+    with _collection(path, mesh, replaces, is_series=True) as series:
+        yield series
+
+
+def write_vtkhdf(
+    path: Path, mesh: Mesh, cell_data: Values, point_data: Values, replaces: Path | None = None
+) -> None:
+    """Write one mesh, with values on its cells and points.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written.
+    """
+    with _collection(path, mesh, replaces, is_series=False) as series:
+        series.add(mesh.points, cell_data, point_data)
+
+
+@contextmanager
+def _collection(path: Path, mesh: Mesh, replaces: Path | None, is_series: bool) -> Iterator[Series]:
+    with hdf5_write(path, replaces) as draft:
+        # ParaView shows the assembly in the order in which it was made.
+        root = draft.tree.create_group("VTKHDF", track_order=True)
+        _typed(root, "PartitionedDataSetCollection")
+        tree = root.create_group("Assembly", track_order=True)
+        blocks = [_add_block(root, tree, _VOLUME, mesh.cells, np.arange(len(mesh.points)))]
+        taken = {_VOLUME}
+        if mesh.markers:
+            tree = tree.create_group("boundaries", track_order=True)
+            taken.add("boundaries")
+        for marker in mesh.markers:
+            name = _free(_clean(marker.name), taken)
+            taken.add(name)
+            blocks.append(_add_block(root, tree, name, marker.cells, marker.nodes))
+        series = Series(draft, blocks, is_series)
+        yield series
+        series.end()
+
+
+def _add_block(
+    root: h5py.Group, tree: h5py.Group, name: str, cells: Cells, nodes: IntArray
+) -> _Block:
+    """Add a block with its topology to the collection, and its name to the assembly."""
+    import h5py
+
+    group = root.create_group(name)
+    _typed(group, "UnstructuredGrid")
+    group.attrs["Index"] = len(root) - 2  # the assembly is no block
+    tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
+    own = np.searchsorted(nodes, cells.connectivity)
+    group["NumberOfPoints"] = np.array([len(nodes)], np.int64)
+    group["NumberOfCells"] = np.array([len(cells)], np.int64)
+    group["NumberOfConnectivityIds"] = np.array([len(own)], np.int64)
+    # VTK's prisms are numbered as those of SU2: so its own CGNS reader has them, and so their
+    # volumes are positive in VTK and their sides look outward.
+    group["Types"] = cells.types
+    group["Offsets"] = cells.offsets
+    group["Connectivity"] = own
+    return _Block(group, nodes, len(cells))
+
+
+def _typed(group: h5py.Group, kind: str) -> None:
+    """Say what a group is; VTK reads only texts of a fixed length."""
+    group.attrs["Version"] = np.array(_VERSION, np.int64)
+    group.attrs.create("Type", np.bytes_(kind), dtype=f"S{len(kind)}")
+
+
+def _in_space(rows: NDArray) -> NDArray:
+    """Return points or vectors, (n, 2) or (n, 3), with three components."""
+    return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))) if rows.shape[1] < 3 else rows
+
+
+def _clean(name: str) -> str:
+    """Return a name that HDF5 takes: ``/`` would divide it, and dots are places."""
+    clean = name.replace("/", "_").replace("\0", "_")
+    return clean if clean.strip(".") else f"_{clean}"
+
+
+def _free(name: str, taken: set[str]) -> str:
+    number, free = 1, name
+    while free in taken or free == "Assembly":
+        number += 1
+        free = f"{name}_{number}"
+    return free
