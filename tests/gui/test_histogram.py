@@ -7,8 +7,9 @@ from qtpy.QtTest import QTest
 from test_worst import session_with_runs
 
 from slideviz.color_scheme import DARK
+from slideviz.errors import SlidevizError
 from slideviz.gui.panels.histogram import HistogramPanel
-from slideviz.gui.widgets import plot_canvas, questions
+from slideviz.gui.widgets import plot_canvas
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
@@ -275,7 +276,7 @@ def test_it_is_saved_as_a_figure(full, tmp_path, answers, name, start):
 
 
 def test_another_kind_of_file_is_refused_and_nothing_written(full, tmp_path):
-    with pytest.raises(questions.SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
+    with pytest.raises(SlidevizError, match=r"a plot is a \.png, \.svg or \.pdf file"):
         plot_canvas.write_plot(tmp_path / "h.xls", full.drawing())
     assert not list(tmp_path.iterdir())
 
