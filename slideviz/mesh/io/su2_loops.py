@@ -12,7 +12,7 @@ import numpy as np
 
 from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.su2_decimal import OPTIONS, U10, U48, decimal, ends
+from slideviz.mesh.io.su2_decimal import OPTIONS, U10, U48, decimal
 from slideviz.mesh.io.su2_lines import KEYWORD, ROWS, TEXT
 
 SIZES = np.zeros(257, np.int64)
@@ -117,16 +117,17 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", **OPTIONS)
 def _whole_number(text, at):  # type: ignore[no-untyped-def]
-    """Return a whole number of plain digits and where it ends; -1 where there is none."""
+    """Return a whole number of plain digits and where they end; -1 where there is none.
+
+    What follows the digits need not be looked at: no other number begins with it.
+    """
     first, value = at, np.int64(0)
     digit = np.uint64(text[at]) - U48
     while digit < U10:
         value = value * 10 + np.int64(digit)
         at += 1
         digit = np.uint64(text[at]) - U48
-    if at == first or at > first + 18 or not ends(text[at]):
-        return -1, at
-    return value, at
+    return -1 if at == first or at > first + 18 else value, at
 
 
 @njit(inline="always", **OPTIONS)
