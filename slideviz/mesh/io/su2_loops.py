@@ -82,9 +82,9 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
     ----------
     text : (b,) uint8
         The lines.
-    runs : (b / 2 + 2, 5) int64
-        Receives the runs, with bytes and lines counted from the start of the block; the first
-        may begin without text.
+    runs : (l, 5) int64
+        As many rows as there are lines. Receives the runs, with bytes and lines counted from the
+        start of the block; the first may begin without text.
 
     Returns
     -------

@@ -41,7 +41,7 @@ def scan(raw: Source, progress: Progress) -> Lines:
                 f"{printable(raw.path)}: this is not a text file; slideviz reads the ASCII form of "
                 "SU2 meshes, so write the mesh as ASCII"
             )
-        runs = np.empty((len(text) // 2 + 2, RUN_COLUMNS), np.int64)
+        runs = np.empty((text.count(b"\n"), RUN_COLUMNS), np.int64)
         n_runs, n_lines = scan_block(np.frombuffer(text, np.uint8), runs)
         runs[:n_runs, 0] += bounds[0]
         return runs[:n_runs].copy(), n_lines, text.isspace()
