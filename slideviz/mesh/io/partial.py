@@ -8,7 +8,6 @@ back, and it takes the place of the target in one step of the file system.
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -125,6 +124,8 @@ def _noted(note: Path, about: str) -> int:
 
 
 def _lock(file: BinaryIO, path: Path) -> None:
+    import fcntl  # POSIX only
+
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as problem:
