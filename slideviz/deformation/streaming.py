@@ -20,7 +20,13 @@ from slideviz.case.model import Case
 from slideviz.deformation.measuring import PointFiles, Rating, folded_steps
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.setup import make_setup
-from slideviz.deformation.solver import Progress, Step, all_steps, require_memory
+from slideviz.deformation.solver import (
+    Progress,
+    Step,
+    all_steps,
+    free_memory,
+    require_memory,
+)
 from slideviz.deformation.stepping import Stepping
 from slideviz.errors import CaseError, MeshError, NodeError
 from slideviz.mesh.io.files import format_of
@@ -35,6 +41,8 @@ from slideviz.rbf.problem import Watch
 
 CHUNK = 1 << 20
 """Nodes, or cells, that are in memory at a time."""
+NEEDED = 5.0
+"""Memory of a run that is not streamed over the size of its file: 4.2 on hexahedra."""
 Tell = Callable[[Progress], None]
 
 
@@ -240,6 +248,25 @@ def _require_streamable(case: Case, path: Path) -> None:
             f"{path}: only SU2 binary meshes can be streamed; make one with `slideviz convert "
             f"{path.name} {path.stem}.su2b`"
         )
+
+
+def missing_memory(case: Case) -> str:
+    """Return in words that a mesh that can be streamed needs more memory than is free, or nothing.
+
+    Raises
+    ------
+    MeshError
+        The mesh cannot be read.
+    """
+    path = case.mesh_file
+    if path is None or case.method == "elastic" or case.mesh_format == "su2":
+        return ""
+    if format_of(path, case.mesh_format) != "su2b":
+        return ""
+    needed, free = NEEDED * path.stat().st_size, free_memory()
+    if needed <= free:
+        return ""
+    return f"{path.name} needs about {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free"
 
 
 def _about(case: Case, path: Path) -> str:

@@ -418,3 +418,23 @@ def test_errors_of_the_method_have_the_numbers_of_the_file(tmp_path, monkeypatch
     monkeypatch.setattr(streaming, "make_setup", fail)
     with pytest.raises(NodeError, match=f"nodes {skin.number(3)} and {skin.number(150)} are apart"):
         stream(case, tmp_path / "out.su2b")
+
+
+def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    case = made(tmp_path, "square", 8)
+    size = case.mesh_file.stat().st_size
+    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED * size - 1)
+    call = ["run", "square.cfg", "--steps", "1"]
+    assert run([*call, "-o", "out.su2b"]) == 0
+    told = capsys.readouterr().err
+    assert "slideviz: note: mesh.su2b needs about 0 GB of memory" in told
+    assert "it is streamed" in told
+    monkeypatch.setattr(streaming, "stream", None)
+    for more in (["-o", "out.su2"], ["-o", "b.su2b", "--steps-dir", "steps"]):
+        assert run([*call, *more, "-q"]) == 0
+    assert run([*call, "-q", "-o", "c.su2b", "--set", "METHOD=elastic"]) == 3  # done, with folds
+    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED * size)
+    assert run([*call, "-q", "-o", "d.su2b"]) == 0
+    assert streaming.missing_memory(sv.Case()) == ""
+    assert streaming.missing_memory(case.change(mesh_format="su2")) == ""

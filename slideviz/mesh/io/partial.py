@@ -45,7 +45,7 @@ class Partial:
     def note(self, done: int) -> None:
         """Keep that so many parts are made, after they are on the disk."""
         self.file.flush()
-        os.fdatasync(self.file.fileno())
+        os.fsync(self.file.fileno())
         self.done = done
         fresh = self._note.with_suffix(".new")
         fresh.write_text(json.dumps({"about": self._about, "done": done}))

@@ -1,0 +1,116 @@
+"""What a run tells: its report, the quality of each cell as a file, and a summary."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.terms import SLIDES
+
+if TYPE_CHECKING:
+    from slideviz.mesh.quality import Quality
+
+CELLS = "quality of each cell"
+_ROWS = 1 << 18
+
+
+def tell(
+    arguments: argparse.Namespace,
+    report: dict,
+    files: dict[str, Path | None],
+    found: Quality,
+    before: Quality,
+    folded: Mapping[int, tuple[int, int]],
+) -> int:
+    """Write and print the report of a run, and return the exit code."""
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.report import save_history, save_json
+
+    if arguments.history:
+        save_history(arguments.history, report)
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    elif not arguments.quiet:
+        files |= {"report": arguments.json, "picture": arguments.picture}
+        files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
+        files |= {"all steps": arguments.steps_file}
+        _print_run(report, found, before, files)
+    for warning in report["warnings"]:
+        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    if found.inverted:
+        print(f"slideviz: {_inverted_sentence(found, report, folded)}", file=sys.stderr)
+        return INVERTED
+    return DONE
+
+
+def write_qualities(path: Path, found: Quality) -> None:
+    """Write one size-skew value for each cell, as RBF-SliDe's GENERATE_QUALITY does."""
+    import numpy as np
+    import orjson
+
+    from slideviz.errors import CaseError
+    from slideviz.mesh.io.atomic import atomic_write
+
+    with atomic_write(path, CaseError) as file:
+        for first in range(0, len(found), _ROWS):
+            part = np.asarray(found.values[first : first + _ROWS])
+            text = orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)
+            file.write(text[1:-1].replace(b",", b"\n") + b"\n")
+
+
+def _print_run(
+    report: dict, found: Quality, before: Quality, files: dict[str, Path | None]
+) -> None:
+    """Print the summary of a run; ``found`` and ``before`` are the quality after it and before."""
+    from slideviz.cli.report import counted, quality_lines, table
+
+    counts, spent = report["node_counts"], report["seconds"]
+    method = "" if report["method"] == "rbf" else f"method {report['method']}, "
+    print(f"{report['case']}: {counted(report['steps'], 'step')}, {method}", end="")
+    zone = f", zone {report['zone']}" if report["zones"] > 1 else ""
+    print(f"sliding {report['sliding']}, periodic {report['periodic']}{zone}")
+    print(quality_lines(found, before))
+    rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
+    rows.append(("control nodes", report["control_nodes"][-1]))
+    if report["periodic_misfit"] is not None:
+        rows.append(("periodic misfit", report["periodic_misfit"]))
+    print(table(rows))
+    parts = {k: v for k, v in spent.items() if k != "total"}
+    parts["start and others"] = spent["total"] - sum(parts.values())
+    phases = ", ".join(f"{k} {v:.2f}" for k, v in parts.items() if v >= 0.005)
+    print(f"  {spent['total']:.2f} s ({phases or 'all phases below 0.01'})")
+    for name, path in files.items():
+        if path:
+            print(f"{name}: {path}")
+
+
+def _inverted_sentence(found: Quality, report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
+    """Return which cells are inverted, and what helps."""
+    from slideviz.mesh.elements import ELEMENTS
+
+    named = ", ".join(
+        f"{cell} ({ELEMENTS[vtk].name}, step {step})"
+        for cell, (vtk, step) in list(folded.items())[:5]
+    )
+    more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
+    return (
+        f"{found.inverted} of {found.cells} cells are inverted: {named}{more}; more STEPS, "
+        f"{_advice(report)} may help"
+    )
+
+
+def _advice(report: dict) -> str:
+    """Return what this case has not tried yet."""
+    ideas = ["STEPS= auto" if report["steps"] < 20 else "a smaller motion"]
+    if report["method"] != "rbf":
+        ideas.append("METHOD= rbf")
+    if report["sliding"] == "none":
+        ideas.append(f"SLIDING_MODE= {SLIDES}")
+    if report["periodic"] in ("none", "periodic") and report["sliding"] != "none":
+        ideas.append("PERIODIC_MODE= moving for a repeating mesh")
+    ideas.append("another role for the boundaries near these cells")
+    return ", ".join(ideas[:-1]) + " or " + ideas[-1]
