@@ -20,6 +20,9 @@ _PHASES = {
     "solve": "solving",
     "evaluate": "moving nodes",
     "project": "sliding",
+    "read": "reading",
+    "write": "copying the mesh",
+    "quality": "measuring cells",
 }
 _EVERY = 0.1
 _WIPE = "\r\033[K"
@@ -66,7 +69,7 @@ class Bar:
     def __init__(self, enabled: bool = True, head: str = "", expected: float | None = None) -> None:
         self.enabled = enabled and sys.stderr.isatty()
         self._head, self._expected = head, expected
-        self._next = 0.0
+        self._next, self._phase = 0.0, ""
         self._start = time.monotonic()
 
     def __enter__(self) -> Bar:
@@ -97,6 +100,19 @@ class Bar:
         word = _PHASES.get(progress.phase, progress.phase)
         steps = f"step {progress.step} of {progress.total}: {word}{left}"
         self._draw(done, f"{self._head}{steps}")
+
+    def phase(self, progress: Progress) -> None:
+        """Draw the bar for the phase in work alone, with the time that is left of it."""
+        now = time.monotonic()
+        if progress.phase != self._phase or not progress.fraction:
+            self._phase, self._start = progress.phase, now
+        if not self.enabled or now < self._next:
+            return
+        self._next = now + _EVERY
+        done = progress.fraction
+        left = f", about {(now - self._start) / done * (1 - done):.0f} s left" if done else ""
+        word = _PHASES.get(progress.phase, progress.phase)
+        self._draw(done, f"{self._head}{word}: {100 * done:.0f} %{left}")
 
     def count(self, done: int, total: int, what: str) -> None:
         """Draw the bar for ``done`` of ``total`` things."""

@@ -57,7 +57,7 @@ def run_streamed(
         done = stream(
             case,
             output,
-            tell=bar,
+            tell=bar.phase,
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,

@@ -17,6 +17,7 @@ from slideviz.cli import run
 from slideviz.cli.options import changed
 from slideviz.deformation import rest, streaming
 from slideviz.deformation.solver import folded_at
+from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
 from slideviz.mesh.io import partial
@@ -438,3 +439,60 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     assert run([*call, "-q", "-o", "d.su2b"]) == 0
     assert streaming.missing_memory(sv.Case()) == ""
     assert streaming.missing_memory(case.change(mesh_format="su2")) == ""
+
+
+def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):
+    from slideviz.cli import progress as module
+
+    drawn, clock = [], iter(range(0, 1000, 10))
+    monkeypatch.setattr(module, "control", drawn.append)
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr(module.sys.stderr, "isatty", lambda: True, raising=False)
+    bar = module.Bar()
+    for fraction in (0.0, 0.25, 0.5):
+        bar.phase(progress_of("quality", fraction))
+    bar.phase(progress_of("write", 0.0))
+    texts = [text.rpartition("] ")[2] for text in drawn]
+    assert texts == [
+        "measuring cells: 0 %",
+        "measuring cells: 25 %, about 30 s left",
+        "measuring cells: 50 %, about 20 s left",
+        "copying the mesh: 0 %",
+    ]
+    monkeypatch.undo()
+    case, told = made(tmp_path, "square", 8, ("STEPS=1",)), []
+    stream(case, tmp_path / "out.su2b", tell=told.append)
+    ends = {now.phase: now.fraction for now in told}
+    assert {phase: ends[phase] for phase in ("read", "write", "evaluate", "quality")} == (
+        dict.fromkeys(("read", "write", "evaluate", "quality"), 1.0)
+    )
+
+
+def progress_of(phase, fraction):
+    return Progress(1, 1, phase, fraction)
+
+
+@pytest.mark.slow
+def test_killing_it_at_random_moments_leaves_no_half_mesh(tmp_path):
+    """Also while it copies, reads and measures; what is there at the end has the same bits."""
+    random = np.random.default_rng(3)
+    case = made(tmp_path, "square", 40)
+    case.change(steps=2).write(tmp_path / "square.cfg")
+    out, reference = tmp_path / "out.su2b", tmp_path / "reference.su2b"
+    stream(sv.Case.read(tmp_path / "square.cfg"), reference)
+    call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), str(out), "resume"]
+    begin = time.monotonic()
+    subprocess.run([*call[:-1], "anew"], check=True, cwd=Path(sv.__file__).parents[1])
+    usual = time.monotonic() - begin
+    out.write_bytes(b"older")
+    for _ in range(20):
+        process = subprocess.Popen(call, cwd=Path(sv.__file__).parents[1])
+        time.sleep(random.uniform(0.1, 1.1) * usual)
+        process.kill()
+        process.wait()
+        assert out.read_bytes() in (b"older", reference.read_bytes())
+        for file in tmp_path.glob(".*"):
+            if file.suffix == ".partial":
+                assert file.read_bytes()[:4] not in MAGIC
+    subprocess.run(call, check=True, cwd=Path(sv.__file__).parents[1])
+    assert out.read_bytes() == reference.read_bytes()
