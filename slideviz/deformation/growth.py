@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from slideviz.deformation.setup import Setup
 from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.threads import in_parts
 from slideviz.rbf.problem import Solution
 
 GROWTH = 5.0
@@ -49,10 +50,15 @@ def unsoundness(
             f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
             f"{_cause(setup, mesh, moved)}"
         )
-    shift = moved - setup.coords
-    length = np.linalg.norm(shift, axis=1)
+    length = np.empty(len(moved))
+
+    def measure(part: slice) -> None:
+        length[part] = np.linalg.norm(moved[part] - setup.coords[part], axis=1)
+
+    in_parts(measure, len(moved))
     if length.max() <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
+    shift = moved - setup.coords
     # Sliding nodes first, for what they do is data to all others.
     reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
     slid = setup.classes.sliding

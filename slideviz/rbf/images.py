@@ -80,7 +80,7 @@ def spread(
     Parameters
     ----------
     values : (n, d)
-        Displacements in the frame; those of ``given`` (k,) count.
+        Displacements in the frame, of which those of ``given`` (k,) count; all others become 0.
     allowed : float
         By how much the given displacements of images may differ.
 
@@ -96,8 +96,8 @@ def spread(
     if gap.max(initial=0.0) > allowed:
         row = int(np.argmax(gap))
         refuse(int(given[row]), int(source[given[row]]), float(gap[row]))
-    out = values.copy()
-    out[source >= 0] = values[source[source >= 0]]
+    out, rows = np.zeros_like(values), np.flatnonzero(source >= 0)
+    out[rows] = values[source[rows]]
     return out, source
 
 
