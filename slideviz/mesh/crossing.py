@@ -14,6 +14,7 @@ remaining nodes have followed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -113,7 +114,7 @@ def swept_crossing(
         An element has another dimension than a boundary.
     """
     before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
-    going = np.flatnonzero((before != after).any(axis=1))
+    going = np.flatnonzero(reduce(np.logical_or, (before != after).T))
     body = Surface.of(moved, after.shape[1])
     for name, cells in others:
         wall = Surface.of(cells, after.shape[1]).without(going)

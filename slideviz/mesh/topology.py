@@ -319,20 +319,30 @@ def fan_normals(
     """
     x = coords[boundary.facets] if corners is None else corners
     normal = unit(corner_vectors(x))
-    if boundary.facets.shape[1] == 4:
-        triangle = boundary.facets[:, 2] == boundary.facets[:, 3]
-        weight = np.where(triangle[:, None], [1 / 3, 1 / 3, 1 / 6, 1 / 6], 1 / 4)
-        centre = np.einsum("fk,fkd->fd", weight, x)
-    else:
-        centre = x.mean(axis=1)
-    distance = np.linalg.norm(coords[fans.node] - centre[fans.facet], axis=1)
-    share = 1.0 / np.maximum(distance, np.finfo(float).tiny)
     total = np.zeros((len(fans.fan_node), coords.shape[1]))
-    for axis in range(coords.shape[1]):
-        total[:, axis] = np.bincount(
-            fans.fan, weights=share * normal[fans.facet, axis], minlength=len(total)
-        )
+    _add_normals(coords, boundary.facets, x, normal, fans.facet, fans.node, fans.fan, total)
     return unit(total)
+
+
+@njit(nogil=True, cache=True)
+def _add_normals(coords, facets, x, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
+    """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``."""
+    tiny = np.finfo(np.float64).tiny
+    weight = np.full(facets.shape[1], 1.0 / facets.shape[1])
+    of_triangle = np.array([1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0])
+    for row in range(len(facet)):
+        f, squared = facet[row], 0.0
+        triangle = facets.shape[1] == 4 and facets[f, 2] == facets[f, 3]
+        share = of_triangle if triangle else weight
+        for axis in range(coords.shape[1]):
+            centre = 0.0
+            for k in range(facets.shape[1]):
+                centre += share[k] * x[f, k, axis]
+            off = coords[node[row], axis] - centre
+            squared += off * off
+        nearness = 1.0 / max(np.sqrt(squared), tiny)
+        for axis in range(coords.shape[1]):
+            total[fan[row], axis] += nearness * normal[f, axis]
 
 
 def find_pieces(

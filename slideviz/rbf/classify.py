@@ -308,8 +308,13 @@ def _collect(
     order = np.argsort(at[rows[:, 0]], kind="stable")
     rows = rows[order]
     # Every image has the rows of the node that stands for it.
-    start, stop = (np.searchsorted(at[rows[:, 0]], stands, side) for side in ("left", "right"))
-    node = np.repeat(np.arange(len(stands)), stop - start)
+    active = np.zeros(len(stands), bool)
+    active[at[rows[:, 0]]] = True
+    slid = np.flatnonzero(active[stands])
+    start, stop = (
+        np.searchsorted(at[rows[:, 0]], stands[slid], side) for side in ("left", "right")
+    )
+    node = np.repeat(slid, stop - start)
     row = np.arange(len(node)) - np.repeat(np.cumsum(stop - start) - stop, stop - start)
     rows = rows[row]
     order = np.lexsort((rows[:, 1], node))

@@ -91,7 +91,8 @@ def spread(
     """
     first = np.full(len(values), -1, np.int64)
     first[stands[given[::-1]]] = given[::-1]
-    source = first[stands]
+    source, images = first.copy(), np.flatnonzero(stands != np.arange(len(stands)))
+    source[images] = first[stands[images]]
     gap = np.abs(values[given] - values[source[given]]).max(axis=1, initial=0.0)
     if gap.max(initial=0.0) > allowed:
         row = int(np.argmax(gap))
