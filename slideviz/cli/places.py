@@ -160,14 +160,15 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
     MeshError
         It cannot hold the mesh at all.
     """
-    from slideviz.mesh.io.cgns_write import require_cgns
-    from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
-
     kind = file_format or output.suffix.lower().removeprefix(".")
     if kind == "cgns":
+        from slideviz.mesh.io.cgns_write import require_cgns
+
         require_cgns(output, mesh)
     if kind != "su2b":
         return
+    from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
+
     require_binary(mesh)
     lost = lost_in_binary(mesh)
     if lost:

@@ -24,6 +24,7 @@ from slideviz.mesh.threads import in_parts
 from slideviz.mesh.unique_rows import row_groups
 
 FEATURE_ANGLE_DEG = 40.0
+TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,28 +320,29 @@ def fan_normals(
     """
     x = coords[boundary.facets] if corners is None else corners
     normal = unit(corner_vectors(x))
+    width = boundary.facets.shape[1]
+    share = np.array([[1 / width] * width, [1 / 3, 1 / 3, 1 / 6, 1 / 6][:width]])
     total = np.zeros((len(fans.fan_node), coords.shape[1]))
-    _add_normals(coords, boundary.facets, x, normal, fans.facet, fans.node, fans.fan, total)
+    _add_normals(coords, boundary.facets, x, share, normal, fans.facet, fans.node, fans.fan, total)
     return unit(total)
 
 
 @njit(nogil=True, cache=True)
-def _add_normals(coords, facets, x, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
-    """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``."""
-    tiny = np.finfo(np.float64).tiny
-    weight = np.full(facets.shape[1], 1.0 / facets.shape[1])
-    of_triangle = np.array([1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0])
+def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
+    """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``.
+
+    ``share`` (2, k) are the weights of the corners in the centre of a facet, and of a triangle.
+    """
     for row in range(len(facet)):
         f, squared = facet[row], 0.0
         triangle = facets.shape[1] == 4 and facets[f, 2] == facets[f, 3]
-        share = of_triangle if triangle else weight
         for axis in range(coords.shape[1]):
             centre = 0.0
             for k in range(facets.shape[1]):
-                centre += share[k] * x[f, k, axis]
+                centre += share[1 if triangle else 0, k] * x[f, k, axis]
             off = coords[node[row], axis] - centre
             squared += off * off
-        nearness = 1.0 / max(np.sqrt(squared), tiny)
+        nearness = 1.0 / max(np.sqrt(squared), TINY)
         for axis in range(coords.shape[1]):
             total[fan[row], axis] += nearness * normal[f, axis]
 

@@ -264,7 +264,8 @@ def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-un
                 if most >= 0 and along[i, most] > smooth:
                     best[i, most] = True
         labels = label[start : start + count]
-        labels[:] = np.arange(count)
+        for i in range(count):
+            labels[i] = i
         for i in range(count):
             for j in range(i):
                 one = mine[i] == mine[j] and side[i] == side[j] and along[i, j] > merge
@@ -272,10 +273,14 @@ def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-un
                     old = labels[i]
                     for k in range(count):
                         labels[k] = labels[j] if labels[k] == old else labels[k]
+        # Numbered without gaps. (Other than loops is not used here: loading it takes long.)
         names = np.zeros(count, np.int64)
-        names[labels] = 1
-        names = np.cumsum(names) - 1
-        labels[:] = names[labels]
+        for i in range(count):
+            names[labels[i]] = 1
+        for i in range(1, count):
+            names[i] += names[i - 1]
+        for i in range(count):
+            labels[i] = names[labels[i]] - 1
         start += count
 
 
