@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.topology import (
+    components,
     facet_vectors,
     fan_normals,
     find_boundary,
@@ -207,3 +212,14 @@ def test_a_marker_inside_the_domain_looks_one_way():
     boundary = find_boundary(Mesh(mesh.points, mesh.cells, (*mesh.markers, inside)))
     normal = unit(facet_vectors(mesh.points, boundary.facets))[boundary.marker == 4]
     assert np.ptp(normal, axis=0).max() < 1e-14
+
+
+@settings(max_examples=60, deadline=None)
+@given(count=st.integers(0, 30), data=st.data())
+def test_parts_are_those_that_scipy_finds_in_its_order(count, data):
+    place = st.integers(0, max(count - 1, 0))
+    pairs = data.draw(st.lists(st.tuples(place, place), max_size=40 if count else 0))
+    a, b = np.array(pairs, np.int64).reshape(-1, 2).T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    expected = connected_components(graph, directed=False)[1] if count else np.empty(0)
+    np.testing.assert_array_equal(components(count, a, b), expected)
