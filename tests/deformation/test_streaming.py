@@ -265,6 +265,7 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
         (["-o", "out.su2"], "a streamed run writes SU2 binary meshes"),
         (["--picture", "a.png"], "--picture needs the mesh in memory"),
         (["--steps-dir", "steps"], "--steps-dir needs the mesh in memory"),
+        (["--steps-file", "a.vtkhdf"], "--steps-file needs the mesh in memory"),
     ):
         assert run(["run", "square.cfg", "--stream", *more]) == 1
         assert words in capsys.readouterr().err
