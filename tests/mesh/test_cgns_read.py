@@ -266,6 +266,21 @@ def test_vertices_are_the_faces_between_them(tmp_path):
     assert [len(m.cells) for m in found.markers] == [len(m.cells) for m in mesh.markers]
 
 
+def test_vertices_of_a_block_and_a_range_of_them(tmp_path):
+    with cgns_root(tmp_path / "a.cgns") as file:
+        one = block(base(file, 3), "b", passage_grid((2, 2, 2)))
+        side = [[1, j, k] for k in (1, 2, 3) for j in (1, 2, 3)]
+        condition(one, "in", side, label="IndexArray_t", child="PointList")
+    mesh = read_cgns(tmp_path / "a.cgns")
+    assert len(mesh.marker("in").cells) == 4
+    assert set(mesh.points[mesh.marker("in").nodes, 0]) == {0.0}
+    flat = read(save(tmp_path, SQUARE))
+    path = save_unstructured(tmp_path / "b.cgns", flat)
+    with h5py.File(path, "a") as file:
+        condition(file["Base/zone 1"], "upper wall", [[4], [6]], where="Vertex")
+    assert as_rows(read_cgns(path))[1]["upper wall"] == [(3, [6, 5]), (3, [5, 4])]
+
+
 def test_a_flat_mesh_in_space_is_2d(tmp_path):
     mesh = read(save(tmp_path, SQUARE))
     found = read_cgns(save_unstructured(tmp_path / "a.cgns", mesh, physical=3))

@@ -176,8 +176,8 @@ def _add_block(
     group["NumberOfPoints"] = np.array([len(nodes)], np.int64)
     group["NumberOfCells"] = np.array([len(cells)], np.int64)
     group["NumberOfConnectivityIds"] = np.array([len(own)], np.int64)
-    # VTK's prisms are numbered as those of SU2: so its own CGNS reader has them, and so their
-    # volumes are positive in VTK and their sides look outward.
+    # Prisms are numbered as in SU2 since VTK 9.7 (vtk!12988): so its CGNS reader gives them, their
+    # volumes are positive and their sides look outward. VTU files have the order from before.
     group["Types"] = cells.types
     group["Offsets"] = cells.offsets
     group["Connectivity"] = own
