@@ -35,6 +35,14 @@ def convert(
     MeshError
         The file cannot be read, the format cannot hold the mesh, or it has no zones and the file
         has several.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> square = sv.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], sv.Cells.from_types([9], [0, 1, 2, 3]))
+    >>> sv.write("square.su2", square)
+    >>> sv.convert("square.su2", "square.su2b")
+    Mesh('square.su2', 2D, 4 points, Cells(1 quadrilateral), markers: none)
     """
     source, target = Path(source), Path(target)
     mesh = read(source, zone) if first is None else first
