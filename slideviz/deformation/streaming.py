@@ -38,6 +38,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.skin import read_skin
 from slideviz.rbf.problem import Watch
+from slideviz.rbf.projection import Tracks
 
 CHUNK = 1 << 20
 """Nodes, or cells, that are in memory at a time."""
@@ -110,31 +111,38 @@ def stream(
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
     with watch.phase("read") as tick:
         skin = read_skin(path, case.zone, tick)
-    first = Watch(watch.report)
     with ExitStack() as stack:
         stack.enter_context(_numbered(skin))
-        with first.phase("classify"):
-            setup = make_setup(case, skin)
-        require_memory(setup, case)
         out = _Output(stack, case, output, watch, resume=resume, replaces=replaces)
-
-        def rate(steps: Sequence[Step]) -> Quality:
-            out.displace(Rest(skin, setup, steps), final=False)
-            return out.rating(0).quality()
-
-        steps = tuple(all_steps(Stepping(case, skin, setup, tell, first.seconds, rate)))
-        rest = Rest(skin, setup, steps)
+        rest = _solved(case, skin, out, tell)
         out.displace(rest, final=True)
         rating = out.rating(listed)
         folded = folded_steps(rest, out.files, rating.inverted)
     return Streamed(
         skin,
-        _of_whole(steps, skin),
+        _of_whole(rest.steps, skin),
         rating.quality(),
         rating.undeformed(),
         folded,
         watch.seconds,
     )
+
+
+def _solved(case: Case, skin: Mesh, out: _Output, tell: Tell) -> Rest:
+    """Return what displaces the rest of a mesh, after all steps of its skin."""
+    watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
+    with watch.phase("classify"):
+        setup = make_setup(case, skin)
+    require_memory(setup, case)
+    # The tracks are most of what is in memory, and needed for the skin alone.
+    lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+
+    def rate(steps: Sequence[Step]) -> Quality:
+        out.displace(Rest(skin, lean, steps), final=False)
+        return out.rating(0).quality()
+
+    steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
+    return Rest(skin, lean, steps)
 
 
 @contextmanager
@@ -285,7 +293,7 @@ def _about(case: Case, path: Path) -> str:
     return hashlib.sha256(f"{text}{state.st_size} {state.st_mtime_ns}".encode()).hexdigest()
 
 
-def _of_whole(steps: tuple[Step, ...], skin: Mesh) -> tuple[Step, ...]:
+def _of_whole(steps: Sequence[Step], skin: Mesh) -> tuple[Step, ...]:
     """Return the steps with the counts of nodes of the whole mesh."""
     assert skin.part is not None
     more = skin.part.n_points - len(skin.points)

@@ -202,9 +202,11 @@ class ClosestPoints:
         """
         self.corners = corners
         n, count, dim = corners.shape
-        self._corners: FloatArray = np.zeros((n, 3, 3))
-        self._corners[:, :count, :dim] = corners
-        self._corners[:, count:] = self._corners[:, count - 1 : count]
+        self._corners: FloatArray = corners
+        if (count, dim) != (3, 3) or not corners.flags.c_contiguous:
+            self._corners = np.zeros((n, 3, 3))
+            self._corners[:, :count, :dim] = corners
+            self._corners[:, count:] = self._corners[:, count - 1 : count]
         depth = max(0, int(np.ceil(np.log2(max(1, n / LEAF)))))
         self._bounds: FloatArray = np.empty((2 ** (depth + 1) - 1, 6))
         self._order: IntArray = np.arange(n)
