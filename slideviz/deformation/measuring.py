@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -73,8 +74,9 @@ class Rating:
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
         self._metric = metric
-        self._values, self._before = (_scratch(stack, folder, count, float) for _ in range(2))
-        self._status, self._old = (_scratch(stack, folder, count, np.uint8) for _ in range(2))
+        kinds = (float, float, np.uint8, np.uint8)
+        self._files = [_Scratch(stack, folder, count, kind) for kind in kinds]
+        self._values, self._before, self._status, self._old = (f.array for f in self._files)
         self._signs = np.zeros(0, np.int8)
         self.inverted: dict[int, tuple[int, IntArray]] = {}
 
@@ -95,22 +97,42 @@ class Rating:
             nodes = block.nodes[ends[k] : ends[k + 1]]
             self.inverted[int(block.ids[k])] = int(block.types[k]), nodes.copy()
         self.inverted = dict(sorted(self.inverted.items())[:listed])
+        self._release()
 
     def quality(self) -> Quality:
         """Return the quality of the deformed cells, without size and skew."""
-        none = np.empty(0)
-        return Quality(self._values, none, none, self._status, self._signs, self._metric)
+        return self._of(self._values, self._status)
 
     def undeformed(self) -> Quality:
         """Return the quality of the undeformed cells, without size and skew."""
+        return self._of(self._before, self._old)
+
+    def _of(self, values: FloatArray, status: NDArray[np.uint8]) -> Quality:
         none = np.empty(0)
-        return Quality(self._before, none, none, self._old, self._signs, self._metric)
+        found = Quality(values, none, none, status, self._signs, self._metric)
+        found.summary()  # it keeps the numbers that all values are looked at for
+        self._release()
+        return found
+
+    def _release(self) -> None:
+        for file in self._files:
+            file.release()
 
 
-def _scratch(stack: ExitStack, folder: Path, count: int, kind: type) -> NDArray:
-    """Return an array in a file, which is removed with ``stack``."""
-    path = stack.enter_context(draft(folder))
-    return np.memmap(path, kind, "w+", shape=(count,))
+class _Scratch:
+    """An array in a file, which is removed with ``stack``; what was looked at can be let go."""
+
+    def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
+        path = stack.enter_context(draft(folder))
+        with path.open("w+b") as file:
+            file.truncate(max(count * np.dtype(kind).itemsize, 1))
+            self._map = mmap.mmap(file.fileno(), 0)
+        self.array: NDArray = np.frombuffer(self._map, kind, count)
+
+    def release(self) -> None:
+        """Give the memory back; the numbers stay in the file."""
+        if hasattr(mmap, "MADV_DONTNEED"):  # other systems than Linux do it in their own time
+            self._map.madvise(mmap.MADV_DONTNEED)
 
 
 def folded_steps(
