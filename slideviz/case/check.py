@@ -223,7 +223,7 @@ def idle_settings(case: Case) -> tuple[str, ...]:
     idle = [
         _with_switch(key, case)
         for key in KEYS.values()
-        if key.method not in (None, case.method) and key.get(case) != key.get(usual)
+        if key.method not in (None, case.method) and key.get(case) not in (key.get(usual), "NO")
     ]
     found = [_SLIDES[case.method, case.sliding]] if (case.method, case.sliding) in _SLIDES else []
     if idle:
@@ -246,7 +246,8 @@ def idle_settings(case: Case) -> tuple[str, ...]:
 
 def _with_switch(key: Key, case: Case) -> str:
     """Return what a message calls a setting: that it is on, or its key."""
-    return f"{key.name}= YES" if key.get(case) is True else key.name
+    value = key.get(case)
+    return f"{key.name}= YES" if value is True or value == "YES" else key.name
 
 
 def effective(case: Case) -> Case:

@@ -37,12 +37,19 @@ def greedy(name: str, kind: Kind, field: str, meaning: str, **window: Any) -> Ke
             return case
         return case.change(reduction=replace(case.reduction, **{field: value}))
 
-    def get(case: Case) -> Any:
-        return None if case.reduction is None else getattr(case.reduction, field)
-
-    value = getattr(Reduction(), field)
-    default = NO_DEFAULT if value is None else kind.write(value)
+    usual = getattr(Reduction(), field)
+    default = NO_DEFAULT if usual is None else kind.write(usual)
     window = {"unless": no_reduction, **window}
+
+    def get(case: Case) -> Any:
+        given = case.reduction
+        if given is None:
+            return None
+        value = getattr(given, field)
+        # Without effect, it is said only where somebody gave one.
+        idle = given.auto and window["unless"] is no_tolerance and value == usual
+        return None if idle else value
+
     return Key(name, REDUCTION, kind, meaning, put, get, default, field=field, **window)
 
 

@@ -640,9 +640,9 @@ def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_
         assert dialog._form.isRowVisible(dialog.options["marked"])
         form = FilmForm(renderer)
         assert form.layout().isRowVisible(form.mark)
-        assert form.figure.showing(renderer.session).view.marked is None
+        assert form.picture_options.showing(renderer.session).view.marked is None
         form.mark.setChecked(True)
-        assert form.figure.showing(renderer.session).view.marked == 3
+        assert form.picture_options.showing(renderer.session).view.marked == 3
 
 
 def test_without_a_marked_cell_nothing_is_asked_about_it(ran):

@@ -184,9 +184,10 @@ class MethodPanel(Panel):
             # Once for each mesh: it takes 10 ms where there are 250,000 cells.
             self._extent = session.mesh.extent if session.mesh is not None else 0.0
         self._reduction = session.case.reduction or self._reduction
-        case, spare = session.case, Case(reduction=self._in_length(self._reduction or Reduction()))
+        given = replace(self._in_length(self._reduction or Reduction()), auto=False)
+        case, spare = session.case, Case(reduction=given)
         if case.reduction is not None:
-            case = case.change(reduction=spare.reduction)
+            case = case.change(reduction=replace(given, auto=case.reduction.auto))
         fields = self.form.fields
         fields["origin"].set_scale(self._extent)
         rotational = case.periodic_type != "translational" and "rotational" in _kinds(session)
