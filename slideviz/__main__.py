@@ -73,11 +73,12 @@ def _wait(read: int) -> None:
         number = os.read(read, 1)[0]
     try:
         # Nothing is to be cleaned up as long as this is not loaded.
-        clean_up = getattr(sys.modules.get("slideviz.mesh.io.cleanup"), "clean_up", None)
-        if clean_up is not None:
-            clean_up()
+        cleanup, left = sys.modules.get("slideviz.mesh.io.cleanup"), "nothing half-written is left"
+        if cleanup is not None and hasattr(cleanup, "left"):  # it may be being loaded
+            left = cleanup.left()
+            cleanup.clean_up()
         wipe = "\r\033[K" if os.isatty(2) else ""  # there may be a progress bar
-        words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; nothing half-written is left\n"
+        words = f"{wipe}slideviz: {_ENDS[signal.Signals(number)]}; {left}\n"
         # Past Python's streams, which another thread may hold.
         os.write(2, words.encode())
     finally:

@@ -41,7 +41,7 @@ def test_a_run_gives_the_same_mesh_from_text_and_binary(square):
         assert run([command[0], "binary.su2b", *command[1:]]) == 0
 
 
-def test_keys_say_the_format_whatever_the_ending(square):
+def test_keys_say_the_format_whatever_the_ending(square, capsys):
     Path("mesh.su2b").rename("mesh.bin")
     call = ["run", "square.cfg", "-q", "--steps", "1", "--set", "MESH_FILENAME=mesh.bin"]
     call += ["--set", "MESH_FORMAT=SU2B", "--set", "MESH_OUT_FORMAT=su2b"]
@@ -49,8 +49,10 @@ def test_keys_say_the_format_whatever_the_ending(square):
     assert is_binary("out.mesh")
     assert run([*call, "-o", "plain"]) == 0
     assert is_binary("plain")
-    assert run([*call, "-o", "text.su2"]) == 0
-    assert not is_binary("text.su2")
+    assert run([*call, "-o", "text.su2"]) == 1
+    words = "text.su2: its ending is .su2, but MESH_OUT_FORMAT says SU2B; change one of them"
+    assert words in capsys.readouterr().err
+    assert not Path("text.su2").exists()
     text = Path("square.cfg").read_text().replace("MESH_OUT_FILENAME", "% MESH_OUT_FILENAME")
     Path("square.cfg").write_text(text + "MESH_OUT_FORMAT= SU2B\n")
     assert run(["run", "square.cfg", "-q", "--steps", "1"]) == 0
@@ -78,6 +80,32 @@ def test_what_a_binary_mesh_loses_is_said_before_the_work(square, capsys):
         "a.su2b does not hold its other sections (FFD_NBOX, FFD_NLEVEL)."
     )
     assert left_out(Path("a.su2"), mesh) == left_out(Path("a.su2b"), sv.read("out.su2b")) == ""
+
+
+def test_zones_that_a_run_does_not_write_are_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("two.su2b").write_bytes(packed([TWO_D, THREE_D]))
+    marker = sv.read("two.su2b", zone=2).marker_names[0]
+    Path("a.cfg").write_text(
+        f"MESH_FILENAME= two.su2b\nZONE= 2\nMARKER_MOVING= ({marker})\n"
+        f"MOTION= ({marker}, translate, 0, 0, 0)\n"
+    )
+    for name in ("out.su2", "out.vtu"):
+        assert run(["run", "a.cfg", "-q", "-o", name]) == 0
+        words = f"{name} will have zone 2 alone, not the others of two.su2b; write a .su2b file"
+        assert words in capsys.readouterr().err
+    assert run(["run", "a.cfg", "-q", "-o", "out.su2b"]) == 0
+    assert "zone" not in capsys.readouterr().err
+
+
+def test_convert_tells_what_every_zone_loses(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("two.su2b").write_bytes(packed([TWO_D, THREE_D]))
+    assert run(["convert", "two.su2b", "two.su2"]) == 0
+    with Path("two.su2").open("a") as file:
+        file.write(FFD)
+    assert run(["convert", "two.su2", "again.su2b"]) == 0
+    assert "sections (FFD_NBOX, FFD_NLEVEL) of two.su2, zone 2; write" in capsys.readouterr().err
 
 
 def test_a_halo_is_refused_before_the_work(square, capsys):

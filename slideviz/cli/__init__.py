@@ -49,7 +49,9 @@ def _run(argv: Sequence[str]) -> int:
     except SystemExit as stop:  # argparse: --help is 0, wrong usage 2
         return int(stop.code or 0)
     except (KeyboardInterrupt, Cancelled):
-        return _fail("cancelled; nothing half-written is left", CANCELLED)
+        from slideviz.mesh.io.cleanup import left
+
+        return _fail(f"cancelled; {left()}", CANCELLED)
     except SlidevizError as problem:
         return _fail(str(problem), WRONG_INPUT)
     except MemoryError:

@@ -32,6 +32,10 @@ def convert(arguments: argparse.Namespace) -> int:
     mesh = read(arguments.mesh, zone=arguments.zone)
     # Without --zone no zone is lost.
     tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
+    if not arguments.zone and mesh.document is not None and arguments.output.suffix == ".su2b":
+        for zone in range(2, mesh.zones + 1):
+            other = read(arguments.mesh, zone=zone)
+            tell_lost(arguments.output, replace(other, zones=1, name=f"{mesh.name}, zone {zone}"))
     write_converted(arguments.mesh, arguments.output, arguments.zone, mesh)
     lost = "" if arguments.output.suffix.lower() == ".su2b" else left_out(arguments.output, mesh)
     if lost:

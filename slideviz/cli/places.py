@@ -153,7 +153,7 @@ def _require_mesh_ending(file: Path) -> None:
 
 
 def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -> None:
-    """Say before the work what an SU2 binary file will not keep of a mesh; ask for CGNS's source.
+    """Say before the work what a file will not keep of a mesh; ask for the source of CGNS.
 
     Raises
     ------
@@ -166,6 +166,11 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
 
         require_cgns(output, mesh)
     if kind != "su2b":
+        if mesh.zones > 1 and (kind != "su2" or mesh.document is None):
+            ending = ".su2" if mesh.document is not None else ".su2b"
+            words = f"{output} will have zone {mesh.zone} alone, not the others of {mesh.name}"
+            remedy = f"write a {ending} file to keep them"
+            print(f"slideviz: warning: {words}; {remedy}", file=sys.stderr, flush=True)
         return
     from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
 

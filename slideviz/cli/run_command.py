@@ -166,9 +166,17 @@ def _default_output(case: Case) -> Path:
 
 
 def _format_of(output: Path, case: Case) -> FileFormat | None:
-    """Return the format that MESH_OUT_FORMAT asks for; an ending given on the command line wins."""
-    named = output.suffix.lower() in (".su2", ".su2b") and output != case.mesh_out
-    return None if named else case.mesh_out_format
+    """Return the format that MESH_OUT_FORMAT asks for; the name of -o must not contradict it."""
+    from slideviz.errors import CaseError
+    from slideviz.session.formats import MESH_FORMATS
+
+    kind, ending = case.mesh_out_format, output.suffix.lower()
+    if kind and output != case.mesh_out and ending in MESH_FORMATS and ending != f".{kind}":
+        raise CaseError(
+            f"{output}: its ending is {ending}, but MESH_OUT_FORMAT says {kind.upper()}; change "
+            "one of them"
+        )
+    return kind
 
 
 def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:

@@ -58,6 +58,7 @@ def run_streamed(
             case,
             output,
             tell=bar.phase,
+            note=lambda text: print(f"slideviz: note: {text}", file=sys.stderr, flush=True),
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,

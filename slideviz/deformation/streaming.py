@@ -78,6 +78,7 @@ def stream(
     output: Path,
     *,
     tell: Tell = lambda _: None,
+    note: Callable[[str], object] = lambda _: None,
     resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
@@ -90,6 +91,8 @@ def stream(
         Where the deformed mesh goes: whole or not at all.
     tell : callable
         Called often with a ``Progress``; an exception it raises ends the run at once.
+    note : callable
+        Called with a sentence on what ``resume`` found.
     resume : bool
         Whether to go on where a run that was ended did.
     replaces : Path, optional
@@ -114,6 +117,8 @@ def stream(
     with ExitStack() as stack:
         stack.enter_context(_numbered(skin))
         out = _Output(stack, case, output, watch, resume=resume, replaces=replaces)
+        if resume:
+            note(out.found())
         rest = _solved(case, skin, out, tell)
         out.displace(rest, final=True)
         rating = out.rating(listed)
@@ -200,6 +205,16 @@ class _Output:
                 )
             self.files = replace(self.files, after=self.files.before.of(self._partial.file))
         return self._partial
+
+    def found(self) -> str:
+        """Return in words what a stopped run has left to go on with."""
+        done, total = self._opened().done, -(-self._place.n_points // CHUNK)
+        if done:
+            return f"{self._path.name}: goes on after {done} of {total} parts"
+        return (
+            f"{self._path.name}: there is nothing to go on with, of this case, mesh and version; "
+            "it is made from the beginning"
+        )
 
     def displace(self, rest: Rest, *, final: bool) -> None:
         """Write all points after the last step; parts that a stopped run has made are left out.

@@ -173,7 +173,9 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         monkeypatch.setattr(
             streaming._Output, "_move", lambda *a, seen=counted: (seen.append(1), move(*a))[1]
         )
-        stream(case, out, resume=True)
+        told: list[str] = []
+        stream(case, out, note=told.append, resume=True)
+        assert (f"goes on after {stop} of {parts} parts" in told[0]) == (stop > 0)
         assert len(counted) == parts - stop
         assert out.read_bytes() == whole
         assert not list(tmp_path.glob(".*"))
@@ -190,7 +192,9 @@ def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
     names_of(out)[1].write_text("no note")
     monkeypatch.setattr(streaming._Output, "_move", move)
     other = case.change(steps=1)
-    stream(other, out, resume=True)
+    told: list[str] = []
+    stream(other, out, note=told.append, resume=True)
+    assert "there is nothing to go on with" in told[0]
     again = out.read_bytes()
     stream(other, out)
     assert out.read_bytes() == again

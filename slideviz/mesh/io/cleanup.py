@@ -28,8 +28,10 @@ class Process(Protocol):
         """Return its exit code when it has ended."""
 
 
+NOTHING_LEFT = "nothing half-written is left"
 _drafts: set[Path] = set()
 _processes: set[Process] = set()
+_kept: dict[Path, str] = {}
 
 
 @contextmanager
@@ -81,6 +83,28 @@ def clean_up() -> None:
             process.kill()
     for path in list(_drafts):
         _remove(path)
+
+
+@contextmanager
+def removed_at_stop(path: Path) -> Iterator[None]:
+    """Return a context in which a file is removed at the end of the process, until it is kept."""
+    _drafts.add(path)
+    try:
+        yield
+    finally:
+        _drafts.discard(path)
+        _kept.pop(path, None)
+
+
+def keep(path: Path, words: str) -> None:
+    """Leave a partial file when the process ends, and say so in these words."""
+    _drafts.discard(path)
+    _kept[path] = words
+
+
+def left() -> str:
+    """Return in words what is left when the process ends now."""
+    return "; ".join(_kept.values()) or NOTHING_LEFT
 
 
 def is_alive(pid: str) -> bool:

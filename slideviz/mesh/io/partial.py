@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import mode_of, reason_of
+from slideviz.mesh.io.cleanup import keep, removed_at_stop
 from slideviz.mesh.io.file_checks import require_no_input
 
 HEAD = 8
@@ -39,6 +40,7 @@ class Partial:
 
     file: BinaryIO
     done: int
+    _path: Path
     _note: Path
     _about: str
 
@@ -50,6 +52,8 @@ class Partial:
         fresh = self._note.with_suffix(".new")
         fresh.write_text(json.dumps({"about": self._about, "done": done}))
         fresh.replace(self._note)
+        if done:
+            keep(self._path, _kept_words(self._path))
 
 
 def names_of(path: Path) -> tuple[Path, Path]:
@@ -90,28 +94,35 @@ def partial_copy(
         done = _noted(note, about) if resume else 0
         with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
             _lock(file, path)
-            try:
-                if not done or os.fstat(file.fileno()).st_size != source.stat().st_size:
-                    done = 0
-                    note.unlink(missing_ok=True)
-                    _copy(file, source, progress)
-                with source.open("rb") as given:
-                    head = given.read(HEAD)
-                yield Partial(file, done, note, about)
-                file.seek(0)
-                file.write(head)
-                file.flush()
-                os.fsync(file.fileno())
-            except Exception:
-                _removed(ours, note)
-                raise
-            ours.chmod(0o644 & ~_umask() if mode is None else mode)
-            ours.replace(os.path.realpath(path))
-            note.unlink(missing_ok=True)
+            with removed_at_stop(ours):
+                try:
+                    if done and os.fstat(file.fileno()).st_size == source.stat().st_size:
+                        keep(ours, _kept_words(ours))
+                    else:
+                        done = 0
+                        note.unlink(missing_ok=True)
+                        _copy(file, source, progress)
+                    with source.open("rb") as given:
+                        head = given.read(HEAD)
+                    yield Partial(file, done, ours, note, about)
+                    file.seek(0)
+                    file.write(head)
+                    file.flush()
+                    os.fsync(file.fileno())
+                except Exception:
+                    _removed(ours, note)
+                    raise
+                ours.chmod(0o644 & ~_umask() if mode is None else mode)
+                ours.replace(os.path.realpath(path))
+                note.unlink(missing_ok=True)
     except OSError as problem:
         if problem.filename is not None and Path(str(problem.filename)) not in (ours, note, path):
             raise
         raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+
+
+def _kept_words(ours: Path) -> str:
+    return f"what is done is kept in {ours.name}; go on with --resume"
 
 
 def _noted(note: Path, about: str) -> int:
