@@ -30,14 +30,15 @@ def convert(arguments: argparse.Namespace) -> int:
 
     require_places(arguments, Output(arguments.output, "OUT", is_mesh=True))
     mesh = read(arguments.mesh, zone=arguments.zone)
+    binary = arguments.output.suffix.lower() == ".su2b"
     # Without --zone no zone is lost.
     tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
-    if not arguments.zone and mesh.document is not None and arguments.output.suffix == ".su2b":
+    if not arguments.zone and mesh.document is not None and binary:
         for zone in range(2, mesh.zones + 1):
             other = read(arguments.mesh, zone=zone)
             tell_lost(arguments.output, replace(other, zones=1, name=f"{mesh.name}, zone {zone}"))
     write_converted(arguments.mesh, arguments.output, arguments.zone, mesh)
-    lost = "" if arguments.output.suffix.lower() == ".su2b" else left_out(arguments.output, mesh)
+    lost = "" if binary else left_out(arguments.output, mesh)
     if lost:
         print(f"slideviz: note: {lost}", file=sys.stderr)
     print(arguments.output)

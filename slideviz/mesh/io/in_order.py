@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
+from slideviz.mesh.threads import cores
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -17,9 +19,7 @@ def in_order(work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[
     It is done in as many threads as Numba uses, a few tasks ahead, so that many large results do
     not pile up.
     """
-    from numba import get_num_threads
-
-    threads = min(get_num_threads(), len(tasks))
+    threads = min(cores(), len(tasks))
     if threads < 2:
         yield from map(work, tasks)
         return
