@@ -4,6 +4,7 @@ import os
 import platform
 from pathlib import Path
 
+from tests.benchmarks import bench_peers
 from tests.benchmarks.rbf_slide import GROUP
 
 LONG = 0.3
@@ -13,7 +14,7 @@ LONG = 0.3
 def pytest_terminal_summary(terminalreporter, config):
     session = getattr(config, "_benchmarksession", None)
     found = [bench for bench in session.benchmarks if bench.extra_info] if session else []
-    rows = [bench for bench in found if bench.group != GROUP]
+    rows = [bench for bench in found if bench.group not in (GROUP, bench_peers.GROUP)]
     if rows:
         terminalreporter.section("what this is in pairs, cells and bytes")
         load = os.getloadavg()[0]
@@ -21,11 +22,36 @@ def pytest_terminal_summary(terminalreporter, config):
     for bench in rows:
         told = ", ".join(f"{name} {value:.4g}" for name, value in bench.extra_info.items())
         terminalreporter.write_line(f"{bench.name}: {bench.stats.min:.3f} s; {told}")
+    peers = [bench for bench in found if bench.group == bench_peers.GROUP]
+    if peers:
+        terminalreporter.section("beside what a user would take instead")
+        for line in _peers(peers, terminalreporter.stats.get("skipped", [])):
+            terminalreporter.write_line(line)
     beside = [bench for bench in found if bench.group == GROUP]
     if beside:
         terminalreporter.section("beside RBF-SliDe at the same tolerance")
         for line in _beside(beside):
             terminalreporter.write_line(line)
+
+
+def _peers(benches, skipped):
+    """Yield a line for each peer, and one for each that was left out."""
+    yield f"{'':52} {'seconds':>8} {'GB':>6} {'min':>7} {'mean':>7} {'inverted':>8}"
+    for bench in sorted(benches, key=lambda bench: bench.extra_info["cells"]):
+        told = bench.extra_info
+        yield (
+            f"{bench.name.removeprefix('test_'):52} {bench.stats.min:8.2f} "
+            f"{told['memory_gb']:6.2f} {told['min_quality']:7.4f} {told['mean_quality']:7.4f} "
+            f"{told['inverted']:8d}"
+        )
+        if "rbf_slide_seconds" in told:
+            yield (
+                f"{'rbf_slide[thesis], its own table, deformation alone':52} "
+                f"{told['rbf_slide_seconds']:8.2f} {'':6} {told['rbf_slide_quality']:7.4f}"
+            )
+    for report in skipped:
+        if "bench_peers" in report.nodeid:
+            yield f"{report.nodeid.partition('::test_')[2]:52} left out: {report.longrepr[2]}"
 
 
 def _beside(benches):
