@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tests.benchmarks import bench_peers
 from tests.benchmarks.rbf_slide import GROUP
+from tests.benchmarks.size_plot import draw_sizes
 
 LONG = 0.3
 """RBF-SliDe's seconds from which its processor time means something."""
@@ -22,6 +23,9 @@ def pytest_terminal_summary(terminalreporter, config):
     for bench in rows:
         told = ", ".join(f"{name} {value:.4g}" for name, value in bench.extra_info.items())
         terminalreporter.write_line(f"{bench.name}: {bench.stats.min:.3f} s; {told}")
+    picture = draw_sizes(found)
+    if picture:
+        terminalreporter.write_line(f"time and memory against cells: {picture}")
     peers = [bench for bench in found if bench.group == bench_peers.GROUP]
     if peers:
         terminalreporter.section("beside what a user would take instead")
