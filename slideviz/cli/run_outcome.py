@@ -76,6 +76,11 @@ def _print_run(
     print(quality_lines(found, before))
     rows = [(name.replace("_", " ") + " nodes", count) for name, count in counts.items()]
     rows.append(("control nodes", report["control_nodes"][-1]))
+    rows.append(("control candidates", report["control_candidates"]))
+    reduction = report["data_reduction"]
+    if reduction["used"]:
+        chosen = " (AUTO)" if reduction["asked"] == "AUTO" else ""
+        rows.append((f"tolerance{chosen}", float(reduction["tolerance"])))
     if report["periodic_misfit"] is not None:
         rows.append(("periodic misfit", report["periodic_misfit"]))
     print(table(rows))

@@ -17,6 +17,7 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
     call.add_argument("--size", type=count, metavar="N", help="size; what it counts is in the list")
     call.add_argument(
         "--format",
+        type=str.lower,
         choices=tuple(FILE_FORMATS),
         default="su2",
         help="of the mesh; su2b (binary) for a stator of up to 200 million cells (default: su2)",

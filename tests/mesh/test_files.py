@@ -400,7 +400,7 @@ def test_meshio_arrays_that_make_no_sense(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["a.xyz", "a.png", "b", "a.su2.bak"])
 def test_unknown_endings(tmp_path, name):
-    with pytest.raises(MeshError, match=r"no mesh format has the ending .*; known are .su2, .vtu"):
+    with pytest.raises(MeshError, match=r"no mesh format has the ending .*; known are .su2, .su2b"):
         read(save(tmp_path, "hello", name))
     mesh = read(save(tmp_path, SQUARE))
     with pytest.raises(MeshError, match="no mesh format has the ending"):

@@ -44,8 +44,8 @@ def formats_of(path: Path) -> list[str]:
         raise path_error(path, "is written for ParaView, but not read; use the mesh it is made of")
     raise path_error(
         path,
-        f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .vtu, "
-        ".vtk, .msh, .med, .inp and others of meshio",
+        f"no mesh format has the ending {path.suffix or '(none)'}; known are .su2, .su2b, "
+        ".cgns, .vtu, .vtk, .msh, .med, .inp and others of meshio, and for writing .vtkhdf",
     )
 
 

@@ -38,8 +38,8 @@ def scan(raw: Source, progress: Progress) -> Lines:
         text = text_of(raw, *bounds)
         if b"\0" in text:
             raise MeshError(
-                f"{printable(raw.path)}: this is not a text file; slideviz reads the ASCII form of "
-                "SU2 meshes, so write the mesh as ASCII"
+                f"{printable(raw.path)}: this is not a text file; write the mesh as ASCII, or "
+                "name SU2's binary form (ending .su2b, or MESH_FORMAT= SU2B)"
             )
         runs = np.empty((text.count(b"\n"), RUN_COLUMNS), np.int64)
         n_runs, n_lines = scan_block(np.frombuffer(text, np.uint8), runs)
