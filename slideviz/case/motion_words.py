@@ -142,7 +142,7 @@ def box_words(mesh: Mesh) -> tuple[str, str]:
     """Return the size of a mesh along each axis, and the ends of it, a line for each axis."""
     if not len(mesh.points):
         return "", ""
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    low, high = mesh.bounds
     size = " × ".join(f"{value:.4g}" for value in high - low)
     rows = zip("xyz", low, high, high - low, strict=False)
     ends = (f"{axis} from {a:.6g} to {b:.6g}: {c:.6g}" for axis, a, b, c in rows)

@@ -230,10 +230,17 @@ class Mesh:
         return int(self.points.shape[1])
 
     @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest and the largest coordinates of all points: (d,), (d,)."""
+        return column_bounds(self.points)
+
+    @cached_property
     def extent(self) -> float:
         """Return the largest extent over the Cartesian axes, without the halo."""
-        points = self.points if self.halo is None else np.delete(self.points, self.halo.outer, 0)
-        low, high = column_bounds(points)
+        if self.halo is None:
+            low, high = self.bounds
+        else:
+            low, high = column_bounds(np.delete(self.points, self.halo.outer, 0))
         return float((high - low).max())
 
     @property

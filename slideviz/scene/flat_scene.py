@@ -86,7 +86,8 @@ class FlatScene:
         if key != self._made_of:
             self._made_of = key
             self._place(cut, only, section, session)
-        self._shown.colour(self.stage.values(session) if by_value else None)
+        cells = self._shown.polygons.cells
+        self._shown.colour(self.stage.values_of(session, cells) if by_value else None)
         self._style(section)
         self._draw_neighbours(section)
         self._draw_mark()

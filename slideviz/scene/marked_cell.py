@@ -60,7 +60,8 @@ class MarkLayer(Layer):
         self.cell = cell
         if FACES in self._drawn:
             shape = self._shapes[FACES]
-            shape.cell_data[VALUES] = np.full(shape.n_cells, self.stage.values(new)[cell])
+            value = self.stage.values_of(new, np.array([cell]))[0]
+            shape.cell_data[VALUES] = np.full(shape.n_cells, value)
             self._drawn[FACES].mapper.scalar_visibility = True
 
     def _add(self, mesh: Mesh, cell: int) -> None:

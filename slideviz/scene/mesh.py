@@ -92,9 +92,10 @@ class CellLayer(Layer):
         if old is None or old.frame is not new.frame:
             actors.place(self.shape, self.points(new.frame.mesh))
         if by_value and recoloured(old, new):
-            values = self.stage.values(new)
             if new.mesh.dim == 3:
-                values = values[self.shape.cell_data[CELL]]
+                values = self.stage.values_of(new, self.shape.cell_data[CELL])
+            else:
+                values = self.stage.values(new)
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.look.cell
@@ -172,9 +173,8 @@ class BoundaryLayer(Layer):
             self._place(new.frame.mesh.points)
         by_value = new.view.colour_by != "role" and new.mesh.dim == 3
         if by_value and recoloured(old, new):
-            values = self.stage.values(new)
             for one in self.drawn.values():
-                one.shape.cell_data[VALUES] = values[one.surface.owner]
+                one.shape.cell_data[VALUES] = self.stage.values_of(new, one.surface.owner)
         self.glass, self._buried = self._glass(new), self._hides_mark(new)
         for name, one in self.drawn.items():
             self._style(name, one, new, by_value)

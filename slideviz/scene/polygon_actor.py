@@ -52,9 +52,9 @@ class PolygonActor:
         self.actor.visibility = len(polygons) > 0
 
     def colour(self, values: FloatArray | None) -> None:
-        """Give the polygons the values of their cells, (m,) for all of the mesh; None: none."""
+        """Give the polygons the values of their cells, (q,); None: none."""
         if values is not None:
-            self.shape.cell_data[VALUES] = values[self.polygons.cells]
+            self.shape.cell_data[VALUES] = values
         self.mapper.scalar_visibility = values is not None
 
 

@@ -173,7 +173,7 @@ class SectionLayer(Layer):
         if not by_value:
             one.shown.colour(None)
         elif again:
-            one.shown.colour(self.stage.values(session))
+            one.shown.colour(self.stage.values_of(session, one.polygons.cells))
         self._style(kind, one.shown, section, session)
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:

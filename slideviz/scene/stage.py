@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
@@ -119,6 +119,14 @@ class Stage:
         if self._values is None or self._values[0] != key:
             self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
+
+    def values_of(self, session: Session, cells: IntArray) -> FloatArray:
+        """Return the values of some cells (k,) only, (k,): what nobody sees is not computed."""
+        frame, what = session.frame, session.view.colour_by
+        assert frame is not None
+        if self._values is not None and self._values[0] == (frame, what):
+            return self._values[1][cells]
+        return frame.shown_values(what, session.mesh, cells)
 
     def in_threshold(self, session: Session) -> CellsInRange | None:
         """Return the cells within the threshold of the view, None where there is no threshold."""

@@ -63,8 +63,8 @@ class Cone(AboutAxis):
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the half angles (n,) in degrees under which the apex sees points."""
-        local = section.frame(points)
-        angle = np.degrees(np.arctan2(np.hypot(local[:, 0], local[:, 1]), local[:, 2]))
+        radius = np.hypot(section.along(points, 0), section.along(points, 1))
+        angle = np.degrees(np.arctan2(radius, section.along(points, 2)))
         return np.asarray(np.clip(angle, *_ENDS))
 
     def first(self, section: Section, points: FloatArray) -> Section:

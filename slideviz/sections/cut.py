@@ -8,9 +8,11 @@ from functools import cache
 import numpy as np
 
 from slideviz.errors import CaseError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS, ElementType
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import padded
+from slideviz.mesh.threads import in_parts
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons, offsets_of
 from slideviz.sections.threshold import CellsInRange
@@ -18,12 +20,11 @@ from slideviz.sections.threshold import CellsInRange
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Cells of one type: VTK identifier, ids (m,), nodes (m, k), and the same by column."""
+    """Cells of one type: VTK identifier, ids (m,) and nodes (m, k)."""
 
     vtk: int
     ids: IntArray
     nodes: IntArray
-    columns: tuple[IntArray, ...]
 
 
 class Cutter:
@@ -38,10 +39,7 @@ class Cutter:
     def __init__(self, cells: Cells) -> None:
         self.dim = max((ELEMENTS[vtk].dim for vtk in cells.by_type), default=3)
         self._cells = cells
-        self._blocks = [
-            _Block(vtk, ids, nodes, tuple(np.ascontiguousarray(nodes.T)))
-            for vtk, (ids, nodes) in cells.by_type.items()
-        ]
+        self._blocks = [_Block(vtk, *found) for vtk, found in cells.by_type.items()]
 
     @classmethod
     def of(cls, mesh: Mesh) -> Cutter:
@@ -152,21 +150,20 @@ class Cutter:
 
         A corner at a node has this node as both ends.
         """
-        negative = (level < 0).view(np.uint8)
+        negative = level < 0
         parts = []
         for block in self._blocks:
-            pattern = np.zeros(len(block.ids), np.uint8)
-            for bit, column in enumerate(block.columns):
-                pattern |= negative[column] << bit
-            cut = np.flatnonzero((pattern > 0) & (pattern < 2 ** len(block.columns) - 1))
+            pattern = _patterns(block.nodes, negative)
+            cut = np.flatnonzero(pattern)
             loops = cut_cases(block.vtk)[pattern[cut]]
             cell, loop = np.nonzero(loops[:, :, 0] >= 0)
             edges = loops[cell, loop]
             ends = block.nodes[cut[cell][:, None, None], _EDGES[block.vtk][edges]]
-            ends = np.where((edges < 0)[..., None], -1, np.sort(ends, axis=2))
-            at_node = (level[ends] == 0) & (ends >= 0)
-            low = np.where(at_node[..., 1], ends[..., 1], ends[..., 0])
-            high = np.where(at_node[..., 0], ends[..., 0], ends[..., 1])
+            ends[edges < 0] = -1
+            a, b = ends[..., 0], ends[..., 1]
+            first, last = np.minimum(a, b), np.maximum(a, b)
+            on_first, on_last = ((level[one] == 0) & (one >= 0) for one in (first, last))
+            low, high = np.where(on_last, last, first), np.where(on_first, first, last)
             parts.append((block.ids[cut[cell]], low, high))
         width = max((part[1].shape[1] for part in parts), default=0)
         none = np.empty((0, width), np.int64)
@@ -175,6 +172,24 @@ class Cutter:
             np.concatenate([none, *(_wide(part[1], width) for part in parts)]),
             np.concatenate([none, *(_wide(part[2], width) for part in parts)]),
         )
+
+
+def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
+    """Return which nodes of each cell (m, k) are negative, a bit each (m,); 0 where all are."""
+    found = np.empty(len(nodes), np.uint8)
+    in_parts(lambda part: _write_patterns(nodes[part], negative, found[part]), len(nodes))
+    return found
+
+
+@njit(nogil=True, cache=True)
+def _write_patterns(nodes, negative, found):  # type: ignore[no-untyped-def]
+    whole = 2 ** nodes.shape[1] - 1
+    for cell in range(len(nodes)):
+        pattern = 0
+        for bit in range(nodes.shape[1]):
+            if negative[nodes[cell, bit]]:
+                pattern |= 1 << bit
+        found[cell] = 0 if pattern == whole else pattern
 
 
 _EDGES = {vtk: np.array(row.edges) for vtk, row in ELEMENTS.items() if row.dim > 1}

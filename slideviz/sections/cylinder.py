@@ -109,8 +109,7 @@ class Cylinder(AboutAxis):
 
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the radii (n,) of points."""
-        local = section.frame(points)
-        return np.asarray(np.hypot(local[:, 0], local[:, 1]))
+        return np.asarray(np.hypot(section.along(points, 0), section.along(points, 1)))
 
     def keeps(self, section: Section, turned: FloatArray, step: FloatArray) -> float:
         """Return how far a transformation moves the axis sideways."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from slideviz.errors import CaseError
+from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import axis_basis
 from slideviz.mesh.surfaces import padded
+from slideviz.mesh.threads import in_parts
 from slideviz.sections.cone import Cone
 from slideviz.sections.cylinder import Cylinder
 from slideviz.sections.plane import Plane
@@ -121,7 +124,7 @@ class Section:
         assert size is not None
         return replace(self, **{size.field: float(value)})  # type: ignore[arg-type]
 
-    @property
+    @cached_property
     def basis(self) -> FloatArray:
         """Return rows e1, e2, e3 (3, 3), right-handed, e3 along the normal or the axis.
 
@@ -136,19 +139,23 @@ class Section:
         """Return points (n, 2 or 3) as coordinates (n, 3) along e1, e2, e3 from the origin."""
         return (padded(points) - np.asarray(self.origin)) @ self.basis.T
 
+    def along(self, points: FloatArray, row: int) -> FloatArray:
+        """Return the coordinates (n,) of points (n, 2 or 3) along e1, e2 or e3 (row 0, 1, 2)."""
+        found = np.empty(len(points))
+        _project(points, self.basis[row], float(np.asarray(self.origin) @ self.basis[row]), found)
+        return found
+
     def distance(self, points: FloatArray) -> FloatArray:
         """Return signed distances (n,): along the normal, or outwards from the axis.
 
         What is on the section up to rounding is at 0 exactly (see `ON_SECTION`).
         """
-        base, origin = self.basis, np.asarray(self.origin)
-        dim = points.shape[1]
+        gap = np.empty(len(points))
 
-        def along(row: int) -> FloatArray:
-            # Not by BLAS, whose threads wait for each other when the machine is busy.
-            return np.einsum("nd,d->n", points, base[row, :dim]) - origin @ base[row]
+        def of_part(part: slice) -> None:
+            gap[part] = self.shape.distance(self, lambda row: self.along(points[part], row))
 
-        gap = self.shape.distance(self, along)
+        in_parts(of_part, len(points))
         size = np.abs(gap)
         gap[size <= ON_SECTION * size.max(initial=0.0)] = 0.0
         return gap
@@ -170,3 +177,13 @@ class Section:
     def brief(self, dim: int = 3) -> str:
         """Return the section in few words, for a list with `describe` beside them."""
         return self.describe(dim) if dim == 2 else self.shape.brief(self)
+
+
+@njit(nogil=True, cache=True)
+def _project(points, direction, start, found):  # type: ignore[no-untyped-def]
+    """Write how far points (n, d) are along a direction (3,), counted from ``start``."""
+    for i in range(len(points)):
+        total = 0.0
+        for axis in range(points.shape[1]):
+            total += points[i, axis] * direction[axis]
+        found[i] = total - start

@@ -92,7 +92,7 @@ class Plane(Shape):
     def positions(self, section: Section, points: FloatArray) -> FloatArray:
         """Return the distances of points from the origin along the normal, (n,)."""
         # Measured along the basis, whose normal has no other sign than the section's.
-        return np.asarray(section.frame(points)[:, 2] + self.position(section))
+        return section.along(points, 2) + self.position(section)
 
     def first(self, section: Section, points: FloatArray) -> Section:
         """Return a plane across the longest extent of points (n, 3), at a round number."""

@@ -14,7 +14,10 @@ from slideviz.mesh.io.source import Source
 from slideviz.mesh.io.su2 import read_su2
 from slideviz.mesh.io.su2_write import su2_blocks
 from slideviz.samples.table import sample
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
 from slideviz.session.jobs import Stopped, require_going
+from slideviz.session.results import cell_displacement
 
 _RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     # The first compiles nearly everything: curved boundaries, and angles in the distance.
@@ -54,6 +57,7 @@ def warm_up(compiling: Callable[[], None], stopped: Stopped) -> None:
         event.install_listener("numba:compile", Listener()),
     ):
         _write_and_read()
+        _look()
         for name, settings in _RUNS:
             require_going(stopped)
             _deform(name, settings, stopped)
@@ -65,6 +69,13 @@ def _write_and_read() -> None:
     text = Source(Path(mesh.name), b"".join(su2_blocks(replace(mesh, document=None))))
     read = read_su2(text, None, lambda _: None)
     b"".join(su2_blocks(read.with_points(read.points / 3.0)))
+
+
+def _look() -> None:
+    """Cut a mesh, and colour it by its displacement."""
+    mesh = sample("cylindrical", size=4).mesh
+    Cutter.of(mesh).cut(mesh.points, Section("plane", tuple(mesh.points.mean(axis=0)), (0, 0, 1)))
+    cell_displacement(mesh.with_points(mesh.points / 3.0), mesh)
 
 
 def _deform(name: str, settings: Mapping[str, Any], stopped: Stopped) -> None:

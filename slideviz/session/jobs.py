@@ -107,12 +107,20 @@ def prepare(
     metric = case.quality_metric if case is not None else "knupp"
     first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
     going_on()
+    _look_ahead(first)
     session = open_mesh(first, path, pairs, case)
     ghosts = Ghosts(mesh)
     ghosts.moved(session.case)
     if case is None:
         return Opened(session, surfaces, ghosts)
     return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case))
+
+
+def _look_ahead(frame: Frame) -> None:
+    """Find what is kept of a frame and asked for at once: of many cells it takes a while."""
+    mesh, measured = frame.mesh, frame.quality
+    _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
+    _ = measured.min, measured.mean, measured.inverted, measured.cells
 
 
 def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
@@ -147,7 +155,9 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         unfinished = step.index < step.total
         report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        report(Frame(step.mesh, measured, step))
+        frame = Frame(step.mesh, measured, step)
+        _look_ahead(frame)
+        report(frame)
         going_on()
 
 

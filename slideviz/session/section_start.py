@@ -9,6 +9,7 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.surfaces import padded
+from slideviz.mesh.threads import in_parts
 from slideviz.sections.model import SHAPES, Section, Triple
 from slideviz.sections.round_number import round_middle
 from slideviz.sections.shape import triple
@@ -17,7 +18,9 @@ from slideviz.session.state import Session
 
 def cell_points(mesh: Mesh) -> FloatArray:
     """Return the nodes (u, 3) of the cells, which a section can reach."""
-    return padded(mesh.points[mesh.cells.nodes])
+    nodes = mesh.cells.nodes
+    # Mostly cells have all nodes, and nothing has to be copied.
+    return padded(mesh.points if len(nodes) == len(mesh.points) else mesh.points[nodes])
 
 
 def first_section(kind: str, session: Session, pair: Pair | None = None) -> Section:
@@ -60,8 +63,14 @@ def _middle_of_moving(session: Session) -> FloatArray:
 
 def span(section: Section, points: FloatArray) -> tuple[float, float]:
     """Return the range of positions at which a section cuts cells with these nodes (n, 3)."""
-    found = section.shape.positions(section, points)
-    return float(found.min()), float(found.max())
+    ends: list[float] = []
+
+    def of_part(part: slice) -> None:
+        found = section.shape.positions(section, points[part])
+        ends.extend((float(found.min()), float(found.max())))
+
+    in_parts(of_part, len(points))
+    return min(ends), max(ends)
 
 
 def turned(section: Section, direction: Triple, points: FloatArray) -> Section:

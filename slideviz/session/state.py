@@ -252,9 +252,8 @@ class Session:
         """Return the largest displacement of a node in the last steps of all runs."""
         if self.mesh is None:
             return 0.0
-        lasts = [run.last.mesh.points for run in self.runs if run.last is not None]
-        shifts = (np.linalg.norm(points - self.mesh.points, axis=1).max() for points in lasts)
-        return max((float(shift) for shift in shifts), default=0.0)
+        lasts = (run.last for run in self.runs if run.last is not None)
+        return max((last.furthest(self.mesh) for last in lasts), default=0.0)
 
     def role(self, marker: str) -> Role:
         """Return the role of a boundary; boundaries without one are fixed."""

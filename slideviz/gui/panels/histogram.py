@@ -194,7 +194,7 @@ class HistogramPanel(Panel):
             self._described = None
 
     def _sync_words(self, session: Session) -> None:
-        if session.frame is None:
+        if session.frame is None or session.mesh is None:
             return
         self._described = session.frame
         what = shown_measure(session)
@@ -203,8 +203,8 @@ class HistogramPanel(Panel):
         bad = session.frame.quality.inverted
         low = "highest" if what == "displacement" else "min"
         # Of a node: the values of cells are means of theirs.
-        shifts = session.frame.mesh.points - session.mesh.points
-        ends = np.linalg.norm(shifts, axis=1).max() if what == "displacement" else plain.min()
+        far = what == "displacement"
+        ends = session.frame.furthest(session.mesh) if far else plain.min()
         form = ".4g" if what == "displacement" else ".4f"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
