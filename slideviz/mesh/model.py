@@ -197,6 +197,8 @@ class Mesh:
         Of which mesh it is a part: only what is needed of one that is larger than memory.
     cgns : CgnsForm or None
         Where a CGNS file has the coordinates, for writing.
+    ffd : bytes or None
+        The boxes for free-form deformation that an SU2 file gets in place of those it had.
     """
 
     points: FloatArray
@@ -212,6 +214,7 @@ class Mesh:
     binary: BinaryForm | None = None
     part: Part | None = None
     cgns: CgnsForm | None = None
+    ffd: bytes | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

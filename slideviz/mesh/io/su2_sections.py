@@ -17,6 +17,11 @@ _COUNT = re.compile(rb"\+?\d{1,18}")
 KNOWN = ("NZONE", "IZONE", "NDIME", "NELEM", "NPOIN", "NMARK", "MARKER_TAG", "MARKER_ELEMS")
 
 
+def is_ffd(text: bytes) -> bool:
+    """Tell whether a section is one of the boxes for free-form deformation."""
+    return text.lstrip()[:14].upper().startswith((b"FFD_", b"BSPLINE_ORDER_"))
+
+
 @dataclass(frozen=True)
 class Section:
     """A keyword line and the lines up to ``stop``, the next keyword line."""

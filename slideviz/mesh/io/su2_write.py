@@ -17,6 +17,7 @@ from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.su2 import Document
 from slideviz.mesh.io.su2_lines import Piece
 from slideviz.mesh.io.su2_scan import BLOCK_BYTES
+from slideviz.mesh.io.su2_sections import is_ffd
 from slideviz.mesh.io.su2_zone import SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
@@ -40,7 +41,7 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     document = mesh.document
     if document is not None and _only_points_differ(mesh, document):
         check_points(mesh)
-        yield from _patched(document, mesh.points)
+        yield from _patched(document, mesh.points, mesh.ffd)
         return
     check_mesh(mesh)
     for marker in mesh.markers:
@@ -48,13 +49,16 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     if document is None:
         yield from _zone(mesh)
         yield from _markers(mesh.markers, 0)
+        yield mesh.ffd or b""
         return
     raw, (begin, end) = document.raw, document.zone
     raw.require_same()
     yield from (raw[a:b] for a, b in _ranges(0, begin))
     yield from _zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
-    yield from (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
+    kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
+    yield from (text for text in kept if mesh.ffd is None or not is_ffd(text))
+    yield mesh.ffd or b""
     yield from (raw[a:b] for a, b in _ranges(end, raw.size))
     raw.require_same()
 
@@ -70,21 +74,45 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
     )
 
 
-def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
-    """Yield the file with every coordinate that changed, in any bit, in its place."""
+def _patched(document: Document, points: FloatArray, ffd: bytes | None) -> Iterator[bytes]:
+    """Yield the file with every coordinate that changed, in any bit, and other boxes in place."""
     raw = document.raw
     raw.require_same()
+    edits = [] if ffd is None else _edits(document, ffd)
     done = 0
-    tasks: list[tuple[int, int] | Piece] = []
+    tasks: list[tuple[int, int] | Piece | bytes] = []
     for piece in document.rows:
-        tasks += [*_ranges(done, piece.begin), piece]
+        tasks += [*_around(edits, done, piece.begin), piece]
         done = piece.end
 
-    def text(task: tuple[int, int] | Piece) -> bytes:
+    def text(task: tuple[int, int] | Piece | bytes) -> bytes:
+        if isinstance(task, bytes):
+            return task
         return raw[slice(*task)] if isinstance(task, tuple) else _piece(document, points, task)
 
-    yield from in_order(text, [*tasks, *_ranges(done, raw.size)])
+    yield from in_order(text, [*tasks, *_around(edits, done, raw.size + 1)])
     raw.require_same()
+
+
+def _edits(document: Document, ffd: bytes) -> list[tuple[int, int, bytes]]:
+    """Return the bytes ``begin:end`` of a file and what stands there instead: other boxes."""
+    raw, end = document.raw, document.zone[1]
+    old = [(a, b) for a, b in document.kept if is_ffd(raw[a:b])]
+    if old:
+        return [(a, b, b"" if at else ffd) for at, (a, b) in enumerate(old)]
+    return [(end, end, ffd if raw[end - 1 : end] == b"\n" else b"\n" + ffd)]
+
+
+def _around(
+    edits: list[tuple[int, int, bytes]], begin: int, end: int
+) -> Iterator[tuple[int, int] | bytes]:
+    """Yield blocks of a range of bytes, and the texts that stand in place of some."""
+    for first, after, text in edits:
+        if begin <= first < end:
+            yield from _ranges(begin, first)
+            yield text
+            begin = after
+    yield from _ranges(begin, end)
 
 
 def _ranges(begin: int, end: int) -> list[tuple[int, int]]:

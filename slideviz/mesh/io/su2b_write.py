@@ -110,7 +110,7 @@ def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
     """Return what an SU2 binary file does not keep of the text file of a mesh, in words."""
     document = mesh.document
     if document is None:
-        return ()
+        return ("its FFD boxes",) if mesh.ffd else ()
     keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
     named = ", ".join(dict.fromkeys(key.upper() for key in keys))
     lost = [f"its other sections ({named})"] if keys else []

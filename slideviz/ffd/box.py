@@ -1,0 +1,201 @@
+"""A box of control points, and surface points embedded in it.
+
+Sederberg and Parry 1986, *Free-form deformation of solid geometric models*: a point of the box is
+the sum of its control points, each times the product of one blending function in each direction,
+at the point's parametric coordinates (u, v, w). In 2D the box is one cell thick, from z = -1/2 to
+1/2, and its points lie in the middle, w = 1/2, as SU2 has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from slideviz.errors import CaseError
+from slideviz.ffd.blending import blending
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+
+Index = tuple[int, int, int]
+"""A control point (i, j, k); -1 stands for all of that direction."""
+
+HALF = 0.5
+"""Half the thickness of a box in 2D."""
+CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+)
+"""SU2's order of the corners, by their (u, v, w)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Points in a box: what of each control point they take.
+
+    Attributes
+    ----------
+    nodes : (m,) int64
+        Sorted.
+    uvw : (m, 3) float64
+        Their parametric coordinates.
+    factors : tuple of (m, I), (m, J), (m, K) float64
+        Their blending functions in each direction.
+    """
+
+    nodes: IntArray
+    uvw: FloatArray
+    factors: tuple[FloatArray, FloatArray, FloatArray]
+
+    def sums(self, lattice: FloatArray) -> FloatArray:
+        """Return the sums of values at the control points, (I, J, K, c), for each point, (m, c)."""
+        return _sums(*self.factors, lattice)
+
+    def gathered(self, values: FloatArray) -> FloatArray:
+        """Return the transposed: of values at the points, (m, c), those of the lattice."""
+        u, v, w = self.factors
+        return np.einsum("mi,mj,mk,mc->ijkc", u, v, w, values, optimize=True)
+
+    def matrix(self) -> csr_array:
+        """Return the derivative of the points for control points, (m, I J K): each axis alike."""
+        u, v, w = self.factors
+        return csr_array(np.einsum("mi,mj,mk->mijk", u, v, w).reshape(len(u), -1))
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A box for free-form deformation.
+
+    Attributes
+    ----------
+    name : str
+    points : (I, J, K, 3) float64
+        The control points, in the mesh's length unit.
+    orders : (int, int, int) or None
+        Orders of the uniform B-splines; None: Bézier.
+    corners : (8, 3) float64
+        Of the undeformed box, in SU2's order.
+    embedded : mapping of str to (nodes, uvw)
+        Nodes (m,) and parametric coordinates (m, 3) on each marker that a mesh file names.
+    """
+
+    name: str
+    points: FloatArray
+    orders: Index | None
+    corners: FloatArray
+    embedded: Mapping[str, tuple[IntArray, FloatArray]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen_array(self.points, np.float64))
+        object.__setattr__(self, "corners", frozen_array(self.corners, np.float64))
+
+    @property
+    def degrees(self) -> Index:
+        """Return the number of control points of each direction, less one."""
+        i, j, k = (count - 1 for count in self.points.shape[:3])
+        return i, j, k
+
+    def factors(self, uvw: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Return the blending functions of each direction and their slopes, (m, count) each."""
+        counts = self.points.shape[:3]
+        orders = self.orders or counts
+        return [blending(n, o, t) for n, o, t in zip(counts, orders, uvw.T, strict=True)]
+
+    def embed(self, nodes: IntArray, uvw: FloatArray) -> Embedding:
+        """Return nodes (m,) at parametric coordinates (m, 3)."""
+        (u, _), (v, _), (w, _) = self.factors(uvw)
+        return Embedding(nodes, uvw, (u, v, w))
+
+    def at(self, uvw: FloatArray) -> FloatArray:
+        """Return the points (m, 3) at parametric coordinates (m, 3)."""
+        return self.embed(np.arange(len(uvw)), uvw).sums(self.points)
+
+    def slopes(self, uvw: FloatArray) -> FloatArray:
+        """Return the derivatives (m, 3, 3) of the points for u, v and w, which come last."""
+        functions = self.factors(uvw)
+        columns = []
+        for axis in range(3):
+            u, v, w = (both[axis == k] for k, both in enumerate(functions))
+            columns.append(_sums(u, v, w, self.points))
+        return np.stack(columns, axis=-1)
+
+    def change(self, index: Index, vector: tuple[float, ...]) -> FloatArray:
+        """Return the change (I, J, K, 3) of the control points that moves some of them.
+
+        Raises
+        ------
+        CaseError
+            The box has no such control point.
+        """
+        problem = self.problem(index)
+        if problem:
+            raise CaseError(problem)
+        out = np.zeros(self.points.shape)
+        i, j, k = (slice(None) if at < 0 else at for at in index)
+        out[i, j, k] = vector
+        return out
+
+    def problem(self, index: Index) -> str:
+        """Return why there is no such control point; empty where there is."""
+        for name, at, most in zip("ijk", index, self.degrees, strict=True):
+            if not -1 <= at <= most:
+                return (
+                    f"the box {self.name!r} has no control point with {name} = {at}; {name} goes "
+                    f"from 0 to {most}, and -1 is all"
+                )
+        return ""
+
+    def moved(self, change: FloatArray) -> Box:
+        """Return the box with other control points, by their change (I, J, K, 3)."""
+        return replace(self, points=self.points + change)
+
+
+def _sums(u: FloatArray, v: FloatArray, w: FloatArray, lattice: FloatArray) -> FloatArray:
+    """Return the sums (m, c) of values (I, J, K, c) times the factors of each direction."""
+    m, (i, j, k, c) = len(u), lattice.shape
+    plane = (u @ lattice.reshape(i, -1)).reshape(m, j, k * c)
+    line = np.einsum("mj,mjx->mx", v, plane).reshape(m, k, c)
+    return np.einsum("mk,mkc->mc", w, line)
+
+
+def lattice(corners: FloatArray, degrees: Index) -> FloatArray:
+    """Return the regular control points (I, J, K, 3) between corners (8, 3), trilinear."""
+    u, v, w = (np.linspace(0.0, 1.0, degree + 1) for degree in degrees)
+    out = np.zeros((len(u), len(v), len(w), 3))
+    for (a, b, c), corner in zip(CORNERS.tolist(), corners, strict=True):
+        part = [t if side else 1.0 - t for side, t in zip((a, b, c), (u, v, w), strict=True)]
+        out += np.einsum("i,j,k,c->ijkc", *part, corner)
+    return out
+
+
+def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | None) -> Box:
+    """Return the undeformed box between corners (8, 3).
+
+    Raises
+    ------
+    CaseError
+        A degree or an order is not possible, or the corners enclose no volume in their order.
+    """
+    for letter, degree in zip("ijk", degrees, strict=True):
+        if degree < 1:
+            raise CaseError(f"the degree of {letter} is {degree}; needed is 1 or more")
+    for letter, order, degree in zip("ijk", orders or (2, 2, 2), degrees, strict=True):
+        if not 2 <= order <= degree + 1:
+            raise CaseError(
+                f"the B-splines of {letter} have the order {order}, and {degree + 1} control "
+                f"points; needed is an order from 2 to {degree + 1}"
+            )
+    box = Box(name, lattice(corners, degrees), orders, corners)
+    ends = np.array(list(product((0.0, 0.5, 1.0), repeat=3)))
+    if np.linalg.det(box.slopes(ends)).min() <= 0.0:
+        raise CaseError(
+            "the corners enclose no volume in their order; needed are those of the bottom "
+            "counter-clockwise, then those above them"
+        )
+    return box
+
+
+def plane_corners(corners: FloatArray) -> FloatArray:
+    """Return the corners (8, 3) of a box in 2D, of its corners in the plane (4, 2)."""
+    return np.concatenate([np.column_stack([corners, np.full(4, z)]) for z in (-HALF, HALF)])

@@ -1,0 +1,216 @@
+"""The boxes of SU2 mesh files: read, moved, written back."""
+
+import numpy as np
+import pytest
+from ffd_samples import DESIGN, REAL, square, unpacked
+
+import slideviz as sv
+from slideviz.errors import MeshError
+from slideviz.ffd.box import CORNERS, plane_corners, regular_box
+from slideviz.ffd.section import boxes_of, with_boxes
+
+NAMES = ["naca0012_two_ffd_boxes.su2", "burner_hx.su2"]
+WITH_BOXES = [
+    "deformation_brick_tets_mesh_brick_tets_ffd.su2",
+    "deformation_brick_prism_mesh_brick_prism_ffd.su2",
+    "disc_adj_euler_naca0012_pitching_mesh_NACA0012_inv_FFD.su2",
+    "coupled_cht_disc_adj_unsteadyCHT_cylinder_MeshCHT.su2",
+]
+
+SECTION = """\
+FFD_NBOX= 1
+FFD_NLEVEL= 1
+FFD_TAG= MAIN
+FFD_LEVEL= 0
+FFD_DEGREE_I= 2
+FFD_DEGREE_J= 1
+FFD_BLENDING= BEZIER
+FFD_PARENTS= 0
+FFD_CHILDREN= 0
+FFD_CORNER_POINTS= 4
+-0.1 -0.1
+1.1 -0.1
+1.1 0.1
+-0.1 0.1
+FFD_CONTROL_POINTS= 0
+FFD_SURFACE_POINTS= 0
+"""
+
+
+def written(tmp_path, section=SECTION):
+    path = tmp_path / "square.su2"
+    sv.write(path, square())
+    path.write_text(path.read_text() + section)
+    return path
+
+
+def check_reproduced(mesh, boxes):
+    for box in boxes:
+        assert box.embedded
+        for marker, (nodes, uvw) in box.embedded.items():
+            assert set(nodes) <= set(mesh.marker(marker).nodes)
+            size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
+            off = np.abs(box.at(uvw)[:, : mesh.dim] - mesh.points[nodes]) / size
+            assert off.max() < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_control_points_of_design_cases_reproduce_their_surface_points(name, tmp_path):
+    mesh = sv.read(unpacked(name, tmp_path))
+    boxes = boxes_of(mesh)
+    assert [box.name for box in boxes] == (["UPPER", "LOWER"] if "naca" in name else ["BOX"])
+    check_reproduced(mesh, boxes)
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the real meshes are not here")
+@pytest.mark.parametrize("name", WITH_BOXES)
+def test_control_points_of_real_meshes_reproduce_their_surface_points(name):
+    zone = 2 if "CHT" in name else None
+    mesh = sv.read(REAL / name, zone=zone)
+    boxes = boxes_of(mesh)
+    assert len(boxes) == 1
+    if zone is None:
+        check_reproduced(mesh, boxes)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mesh_whose_boxes_do_not_change_keeps_its_bytes(name, tmp_path):
+    path = unpacked(name, tmp_path)
+    mesh = sv.read(path)
+    sv.write(tmp_path / "again.su2", with_boxes(mesh, boxes_of(mesh)))
+    assert (tmp_path / "again.su2").read_bytes() == path.read_bytes()
+
+
+@pytest.mark.skipif(not DESIGN.is_dir(), reason="the design cases are not here")
+def test_moved_control_point_changes_its_rows_only(tmp_path):
+    path = unpacked(NAMES[0], tmp_path)
+    mesh = sv.read(path)
+    upper, lower = boxes_of(mesh)
+    moved = lower.moved(lower.change((2, 1, -1), (0.0, 0.25, 0.0)))
+    sv.write(tmp_path / "moved.su2", with_boxes(mesh, [moved]))
+    old = path.read_text().splitlines()
+    new = (tmp_path / "moved.su2").read_text().splitlines()
+    changed = [line for line, before in zip(new, old, strict=True) if line != before]
+    assert [line.split()[:3] for line in changed] == [["2", "1", "0"], ["2", "1", "1"]]
+    again = boxes_of(sv.read(tmp_path / "moved.su2"))
+    assert np.array_equal(again[1].points, moved.points)
+    assert np.array_equal(again[0].points, upper.points)
+
+
+def test_counts_of_zero_mean_the_regular_lattice_and_are_filled(tmp_path):
+    mesh = sv.read(written(tmp_path))
+    (box,) = boxes_of(mesh)
+    assert box.degrees == (2, 1, 1)
+    assert box.points[1, 0, 0].tolist() == pytest.approx([0.5, -0.1, -0.5])
+    assert not box.embedded
+    nodes = mesh.marker("y_low").nodes
+    uvw = np.column_stack([(mesh.points[nodes] + 0.1) / [1.2, 0.2], np.full(len(nodes), 0.5)])
+    filled = type(box)(box.name, box.points, None, box.corners, {"y_low": (nodes, uvw)})
+    sv.write(tmp_path / "out.su2", with_boxes(mesh, [filled]))
+    again = sv.read(tmp_path / "out.su2")
+    (read,) = boxes_of(again)
+    assert np.array_equal(read.points, box.points)
+    assert np.array_equal(read.embedded["y_low"][1], uvw)
+    assert np.array_equal(again.points, mesh.points)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("orders", [None, (3, 2, 2)])
+def test_new_boxes_are_written_and_read(dim, orders, tmp_path):
+    mesh = square(3, dim)
+    corners = plane_corners(CORNERS[:4, :2] * 2.0 - 0.5) if dim == 2 else CORNERS * 2.0 - 0.5
+    boxes = [regular_box(name, corners, (4, 2, 1), orders) for name in ("A", "B")]
+    for target in (mesh, sv.read(_kept(mesh, tmp_path))):
+        sv.write(tmp_path / "out.su2", with_boxes(target, boxes))
+        again = boxes_of(sv.read(tmp_path / "out.su2"))
+        assert [box.name for box in again] == ["A", "B"]
+        assert all(box.orders == orders for box in again)
+        assert all(np.array_equal(a.points, b.points) for a, b in zip(again, boxes, strict=True))
+
+
+def _kept(mesh, tmp_path):
+    sv.write(tmp_path / "in.su2", mesh)
+    # A last line without its end.
+    (tmp_path / "in.su2").write_text((tmp_path / "in.su2").read_text().rstrip("\n"))
+    return tmp_path / "in.su2"
+
+
+def test_box_is_added_to_others_or_takes_their_place(tmp_path):
+    mesh = sv.read(written(tmp_path))
+    new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
+    both, alone = with_boxes(mesh, [new]), with_boxes(mesh, [new], anew=True)
+    assert [box.name for box in boxes_of(both)] == ["MAIN", "NEW"]
+    assert [box.name for box in boxes_of(alone)] == ["NEW"]
+    sv.write(tmp_path / "both.su2", both)
+    assert "FFD_NBOX= 2\n" in (tmp_path / "both.su2").read_text()
+    sv.write(tmp_path / "alone.su2", alone)
+    assert "MAIN" not in (tmp_path / "alone.su2").read_text()
+
+
+def test_boxes_of_other_cells_and_of_one_zone_stay_in_place(tmp_path):
+    mesh = sv.read(written(tmp_path))
+    new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
+    fewer = sv.Mesh(mesh.points, mesh.cells, mesh.markers[:2], document=mesh.document)
+    sv.write(tmp_path / "fewer.su2", with_boxes(fewer, [new], anew=True))
+    text = (tmp_path / "fewer.su2").read_text()
+    assert text.count("FFD_NBOX") == 1
+    assert boxes_of(sv.read(tmp_path / "fewer.su2"))[0].name == "NEW"
+    body = written(tmp_path).read_text()
+    zones = tmp_path / "zones.su2"
+    zones.write_text(f"NZONE= 2\nIZONE= 1\n{body}IZONE= 2\n{body}")
+    first = sv.read(zones)
+    sv.write(tmp_path / "zones_out.su2", with_boxes(first, [new], anew=True))
+    for zone, name in ((1, "NEW"), (2, "MAIN")):
+        assert boxes_of(sv.read(tmp_path / "zones_out.su2", zone=zone))[0].name == name
+
+
+def test_lines_of_windows_keep_their_ends(tmp_path):
+    path = written(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    mesh = sv.read(path)
+    sv.write(tmp_path / "again.su2", with_boxes(mesh, boxes_of(mesh)[:0]))
+    assert (tmp_path / "again.su2").read_bytes() == path.read_bytes()
+
+
+def test_mesh_without_boxes_has_none():
+    assert boxes_of(square()) == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("FFD_LEVEL= 0", "FFD_LEVEL= 1", "FFD box 'MAIN': FFD_LEVEL is 1: nested boxes are not"),
+        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= x", "FFD_DEGREE_J= x is no whole number from 0"),
+        ("FFD_DEGREE_J= 1\n", "", "FFD_DEGREE_J= is missing"),
+        ("FFD_DEGREE_J= 1", "FFD_DEGREE_J= 0", "the degree of j is 0; needed is 1 or more"),
+        ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; needed is BEZIER or BSPLINE_UNIFORM"),
+        ("POINTS= 4", "POINTS= 8", "FFD_CORNER_POINTS is 8; needed is 4"),
+        ("1.1 0.1\n", "", "3 rows follow FFD_CORNER_POINTS= 4; correct the count"),
+        ("1.1 0.1\n", "1.1 wide\n", "a row of FFD_CORNER_POINTS has not the numbers"),
+        ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; needed is 12"),
+        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which is none"),
+    ],
+)
+def test_mistakes_are_told_with_box_and_remedy(old, new, message, tmp_path):
+    assert old in SECTION
+    mesh = sv.read(written(tmp_path, SECTION.replace(old, new)))
+    with pytest.raises(MeshError, match=message):
+        boxes_of(mesh)
+
+
+def test_double_control_points_and_boxes_are_told(tmp_path):
+    rows = "".join(f"{i} {j} 0 0 0 0\n" for i in range(3) for j in (0, 1)) * 2
+    twice = SECTION.replace("CONTROL_POINTS= 0", "CONTROL_POINTS= 12\n" + rows.rstrip())
+    mesh = sv.read(written(tmp_path, twice))
+    with pytest.raises(MeshError, match=r"must have each \(i, j, k\) from \(0, 0, 0\) to \(2, 1"):
+        boxes_of(mesh)
+    mesh = sv.read(written(tmp_path, SECTION + SECTION))
+    with pytest.raises(MeshError, match="the FFD box 'MAIN' stands twice; rename one"):
+        boxes_of(mesh)
+
+
+def test_binary_mesh_loses_its_boxes_and_says_so():
+    from slideviz.mesh.io.su2b_write import lost_in_binary
+
+    box = regular_box("B", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
+    assert lost_in_binary(with_boxes(square(), [box])) == ("its FFD boxes",)
