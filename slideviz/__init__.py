@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from slideviz.mesh.io.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
     from slideviz.mesh.quality import Quality, quality
+    from slideviz.mesh.quality_derivative import QualityDerivative
 
 _HOME = {
     "Case": "case.model",
@@ -26,6 +27,7 @@ _HOME = {
     "Marker": "mesh.model",
     "Mesh": "mesh.model",
     "Quality": "mesh.quality",
+    "QualityDerivative": "mesh.quality_derivative",
     "Radial": "case.model",
     "Reduction": "case.model",
     "Rotate": "case.model",
@@ -47,6 +49,7 @@ __all__ = [
     "Marker",
     "Mesh",
     "Quality",
+    "QualityDerivative",
     "Radial",
     "Reduction",
     "Rotate",

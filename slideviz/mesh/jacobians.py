@@ -56,7 +56,7 @@ def check_cells(mesh: Mesh) -> None:
 
 
 @njit(**OPTIONS)
-def _gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
+def gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
     """Write the coordinates of ``count`` cells from ``first`` on into ``at`` (d, n, LANES)."""
     for c in range(count):
         for j in range(nodes.shape[1]):
@@ -66,7 +66,8 @@ def _gather(points, nodes, first, count, at):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **OPTIONS)
-def _edge(at, start, stop, c):  # type: ignore[no-untyped-def]
+def edge(at, start, stop, c):  # type: ignore[no-untyped-def]
+    """Return the edge between two nodes of one cell, a triple."""
     return (
         at[0, stop, c] - at[0, start, c],
         at[1, stop, c] - at[1, start, c],
@@ -87,12 +88,13 @@ def dot3(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", **OPTIONS)
-def _half_sum(a, b):  # type: ignore[no-untyped-def]
+def half_sum(a, b):  # type: ignore[no-untyped-def]
+    """Return the mean of two triples."""
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
 @njit(**OPTIONS)
-def _corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
+def corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
     """Write the corner Jacobians (thesis Eq. 2.39 to 2.42, Table 2.3) into ``alpha`` (k, ...).
 
     They are the determinants of the edges that leave each corner.
@@ -107,12 +109,12 @@ def _corners(at, table, count, alpha):  # type: ignore[no-untyped-def]
         else:
             h = table[k, 3]
             for c in range(count):
-                normal = cross3(_edge(at, o, i, c), _edge(at, o, j, c))
-                alpha[k, c] = dot3(normal, _edge(at, o, h, c))
+                normal = cross3(edge(at, o, i, c), edge(at, o, j, c))
+                alpha[k, c] = dot3(normal, edge(at, o, h, c))
 
 
 @njit(**OPTIONS)
-def _spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
+def spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
     """Write what the skew compares each corner Jacobian with into ``spread`` (k, ...).
 
     What that is for each type, `slideviz.mesh.metrics` says.
@@ -128,13 +130,13 @@ def _spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
             continue
         h = table[k, 3]
         for c in range(count):
-            x, y, z = _edge(at, o, i, c), _edge(at, o, j, c), _edge(at, o, h, c)
+            x, y, z = edge(at, o, i, c), edge(at, o, j, c), edge(at, o, h, c)
             xx, yy, zz = dot3(x, x), dot3(y, y), dot3(z, z)
             if vtk == 10:
                 squares = 1.5 * (xx + yy + zz)
                 spread[k, c] = squares - dot3(x, y) - dot3(y, z) - dot3(z, x)
             elif vtk == 14:
-                half = _half_sum(x, y)
+                half = half_sum(x, y)
                 axis = z[0] - half[0], z[1] - half[1], z[2] - half[2]
                 spread[k, c] = xx + yy + 2 * dot3(axis, axis)
             else:
@@ -145,12 +147,12 @@ def _spreads(vtk, at, table, count, spread):  # type: ignore[no-untyped-def]
 def _prism(at, count, found):  # type: ignore[no-untyped-def]
     """Write what `prism_coefficients` returns into ``found`` (3, 3, ...)."""
     for c in range(count):
-        a, b = _edge(at, 0, 1, c), _edge(at, 0, 2, c)
-        p, q = _edge(at, 3, 4, c), _edge(at, 3, 5, c)
+        a, b = edge(at, 0, 1, c), edge(at, 0, 2, c)
+        p, q = edge(at, 3, 4, c), edge(at, 3, 5, c)
         low, top = cross3(a, b), cross3(p, q)
-        middle = _half_sum(cross3(a, q), cross3(p, b))
+        middle = half_sum(cross3(a, q), cross3(p, b))
         for i in range(3):
-            height = _edge(at, i, i + 3, c)
+            height = edge(at, i, i + 3, c)
             found[0, i, c] = dot3(low, height)
             found[1, i, c] = dot3(middle, height)
             found[2, i, c] = dot3(top, height)
@@ -167,17 +169,17 @@ def _hexahedron(at, count, found):  # type: ignore[no-untyped-def]
     for i in range(2):
         for j in range(2):
             for c in range(count):
-                u0 = _edge(at, _NODE[0, j, 0], _NODE[1, j, 0], c)
-                u1 = _edge(at, _NODE[0, j, 1], _NODE[1, j, 1], c)
-                v0 = _edge(at, _NODE[i, 0, 0], _NODE[i, 1, 0], c)
-                v1 = _edge(at, _NODE[i, 0, 1], _NODE[i, 1, 1], c)
+                u0 = edge(at, _NODE[0, j, 0], _NODE[1, j, 0], c)
+                u1 = edge(at, _NODE[0, j, 1], _NODE[1, j, 1], c)
+                v0 = edge(at, _NODE[i, 0, 0], _NODE[i, 1, 0], c)
+                v1 = edge(at, _NODE[i, 0, 1], _NODE[i, 1, 1], c)
                 low, top = cross3(u0, v0), cross3(u1, v1)
-                middle = _half_sum(cross3(u0, v1), cross3(u1, v0))
+                middle = half_sum(cross3(u0, v1), cross3(u1, v0))
                 for p in range(2):
                     for q in range(2):
                         # 1 / binomial(2, a) for the sum of two linear Bernstein factors, each way.
                         weight = (0.5 if i != p else 1.0) * (0.5 if j != q else 1.0)
-                        w = _edge(at, _NODE[p, q, 0], _NODE[p, q, 1], c)
+                        w = edge(at, _NODE[p, q, 0], _NODE[p, q, 1], c)
                         found[i + p, j + q, 0, c] += weight * dot3(low, w)
                         found[i + p, j + q, 1, c] += weight * dot3(middle, w)
                         found[i + p, j + q, 2, c] += weight * dot3(top, w)
@@ -189,8 +191,8 @@ def write_corners(points, nodes, table, alpha):  # type: ignore[no-untyped-def]
     at = np.empty((points.shape[1], nodes.shape[1], LANES))
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
-        _gather(points, nodes, first, count, at)
-        _corners(at, table, count, alpha[:, first : first + count])
+        gather(points, nodes, first, count, at)
+        corners(at, table, count, alpha[:, first : first + count])
 
 
 @njit(**OPTIONS)
@@ -212,9 +214,9 @@ def measure(vtk, points, nodes, table, turn, alpha, spread, status):  # type: ig
     for first in range(0, len(nodes), LANES):
         count = min(LANES, len(nodes) - first)
         here = slice(first, first + count)
-        _gather(points, nodes, first, count, at)
-        _corners(at, table, count, alpha[:, here])
-        _spreads(vtk, at, table, count, spread[:, here])
+        gather(points, nodes, first, count, at)
+        corners(at, table, count, alpha[:, here])
+        spreads(vtk, at, table, count, spread[:, here])
         sides, states = turn[here], status[here]
         states[:] = VALID
         if vtk == 12:

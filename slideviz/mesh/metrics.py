@@ -83,3 +83,22 @@ METRICS: Mapping[Metric, Mapping[int, Skew]] = {
     "rbf-slide": {**KNUPP, 12: _hexahedron_rbf_slide},
 }
 """Formula by metric and VTK identifier."""
+
+_THIRDS = 2 / 3
+_EXPONENTS: dict[int, tuple[float, float]] = {
+    5: (1, 1),
+    9: (1, 1),
+    10: (1, _THIRDS),
+    12: (_THIRDS, _THIRDS),
+    13: (_THIRDS, _THIRDS),
+    14: (1, _THIRDS),
+}
+EXPONENTS: Mapping[Metric, Mapping[int, tuple[float, float]]] = {
+    "knupp": _EXPONENTS,
+    "rbf-slide": {**_EXPONENTS, 12: (1, 1)},
+}
+"""Exponents a, b of the same formulas: each is a constant divided by ``Σ_k spread_kᵃ / alpha_kᵇ``.
+
+With them the derivative of the skew needs no formula of its own
+(`slideviz.mesh.quality_derivative`).
+"""

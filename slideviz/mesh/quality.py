@@ -8,7 +8,7 @@ Jacobians. ``f_skew`` is that of `slideviz.mesh.metrics`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,7 @@ from slideviz.mesh.jacobians import (
 from slideviz.mesh.metrics import METRICS, total
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.mesh.orientation import reference_of
+from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.threads import in_parts
 from slideviz.mesh.validity import decide
 from slideviz.terms import Metric
@@ -59,6 +60,8 @@ class Quality:
     halo : (m,) bool or None
         The cells of the halo. They have values like all others, but are copies: numbers of the
         whole mesh (minimum, mean, counts, histogram, worst cells) leave them out.
+    derivative : QualityDerivative or None
+        By the points, if it was asked for.
     """
 
     values: FloatArray
@@ -68,6 +71,7 @@ class Quality:
     signs: NDArray[np.int8]
     metric: Metric
     halo: NDArray[np.bool_] | None = None
+    derivative: QualityDerivative | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -146,6 +150,9 @@ def quality(
     reference: Mesh | None = None,
     metric: Metric = "knupp",
     going_on: Callable[[], object] = lambda: None,
+    *,
+    derivative: bool = False,
+    p: float = 50.0,
 ) -> Quality:
     """Return the quality of each cell, compared with the undeformed mesh.
 
@@ -160,14 +167,22 @@ def quality(
         See `Quality`.
     going_on : callable
         Called every few thousand cells; what it raises ends the work.
+    derivative : bool
+        Find the derivatives of minimum and mean by the points too (`QualityDerivative`), for an
+        optimiser. Give the undeformed mesh then: without it a mesh that is wholly inverted is taken
+        for one numbered the other way round.
+    p : float
+        The exponent of the smooth minimum that is differentiated, at least 1: higher is closer to
+        the minimum, and less smooth.
 
     Raises
     ------
     MeshError
         The mesh has no cells or unusable ones, coordinates too large, or the reference is another
-        mesh.
+        mesh. With ``derivative`` also: a point is no number, or the reference has cells without a
+        positive volume.
     CaseError
-        The metric is unknown.
+        The metric is unknown, or the exponent below 1.
 
     Examples
     --------
@@ -180,6 +195,12 @@ def quality(
     >>> folded = square.with_points([[0, 0], [1, 0], [0.4, 0.4], [0, 1]])
     >>> sv.quality(folded, reference=square).summary()["inverted"]
     1
+
+    The way that the drawn corner must go for the minimum to rise:
+
+    >>> slope = sv.quality(folded, reference=square, derivative=True).derivative
+    >>> slope.of_minimum[2] > 0
+    array([ True,  True])
     """
     if metric not in METRICS:
         raise CaseError(f"quality metric {metric!r} is unknown; use {' or '.join(METRICS)}")
@@ -197,7 +218,7 @@ def quality(
             values[here] = np.sqrt(found[0]) * found[1]
 
         in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
-    return Quality(
+    found = Quality(
         values=frozen_array(values, np.float64),
         size=frozen_array(size, np.float64),
         skew=frozen_array(skew, np.float64),
@@ -206,6 +227,10 @@ def quality(
         metric=metric,
         halo=None if mesh.halo is None else mesh.halo.cells,
     )
+    if not derivative:
+        return found
+    before = None if reference is None else sums
+    return replace(found, derivative=derivative_of(mesh, found, before, p, going_on))
 
 
 def _of_cells(

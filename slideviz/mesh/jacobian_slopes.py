@@ -1,0 +1,181 @@
+"""Derivatives of the skew and size of cells by their nodes, compiled.
+
+Arrays have the cells last inside of the loops, as in `slideviz.mesh.jacobians`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slideviz.mesh.caching import njit
+from slideviz.mesh.jacobians import (
+    LANES,
+    OPTIONS,
+    corners,
+    cross3,
+    dot3,
+    edge,
+    gather,
+    half_sum,
+    spreads,
+)
+
+
+@njit(**OPTIONS)
+def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: ignore[no-untyped-def]
+    """Write the derivative of ln f_ss by the nodes of each cell into ``out`` (m, n, d).
+
+    Parameters
+    ----------
+    points, nodes, table
+        (N, d), (m, n), and ``CORNERS[vtk]``.
+    turn : (m,) int8
+        1, or -1 for a cell that is numbered the other way round: a factor of its Jacobians.
+    powers : (2,)
+        Exponents of spread and Jacobian, ``EXPONENTS`` of the metric and type.
+    sums : (m,)
+        Sums of the corner Jacobians of the undeformed cells; infinity for no factor of size.
+    out : (m, n, d)
+        No numbers where a corner Jacobian is not positive.
+    """
+    at = np.empty((points.shape[1], nodes.shape[1], LANES))
+    slope = np.empty_like(at)
+    alpha, spread = np.empty((len(table), LANES)), np.empty((len(table), LANES))
+    for first in range(0, len(nodes), LANES):
+        count = min(LANES, len(nodes) - first)
+        gather(points, nodes, first, count, at)
+        corners(at, table, count, alpha)
+        spreads(vtk, at, table, count, spread)
+        here = slice(first, first + count)
+        _weights(alpha, spread, turn[here], powers, sums[here])
+        slope[:] = 0.0
+        if points.shape[1] == 2:
+            _pull_plane(vtk, at, table, count, alpha, spread, slope)
+        else:
+            _pull_solid(vtk, at, table, count, alpha, spread, slope)
+        for c in range(count):
+            for j in range(nodes.shape[1]):
+                for axis in range(points.shape[1]):
+                    out[first + c, j, axis] = slope[axis, j, c]
+
+
+@njit(**OPTIONS)
+def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
+    """Replace Jacobians and spreads (k, ...) by the derivatives of ln f_ss by each of them."""
+    for c in range(len(turn)):
+        total = whole = 0.0
+        for k in range(len(alpha)):
+            now = alpha[k, c] * turn[c]
+            total += now
+            whole += spread[k, c] ** powers[0] / now ** powers[1]
+        size = 0.0
+        if sums[c] < np.inf and total != sums[c]:
+            size = (0.5 if total < sums[c] else -0.5) / total
+        for k in range(len(alpha)):
+            now = alpha[k, c] * turn[c]
+            share = spread[k, c] ** powers[0] / now ** powers[1] / whole
+            alpha[k, c] = (powers[1] * share / now + size) * turn[c]
+            spread[k, c] = -powers[0] * share / spread[k, c]
+
+
+@njit(**OPTIONS)
+def _pull_plane(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives by nodes (2, n, ...), from those by Jacobians and spreads (k, ...)."""
+    for k in range(len(table)):
+        o, i, j = table[k, 0], table[k, 1], table[k, 2]
+        for c in range(count):
+            ax, ay = at[0, i, c] - at[0, o, c], at[1, i, c] - at[1, o, c]
+            bx, by = at[0, j, c] - at[0, o, c], at[1, j, c] - at[1, o, c]
+            if vtk == 5:
+                aa, ab, bb = 2.0, -1.0, 2.0
+            else:
+                one, two = ax * ax + ay * ay, bx * bx + by * by
+                length = np.sqrt(one * two)
+                aa, ab, bb = length / one, 0.0, length / two
+            w, s = alpha[k, c], spread[k, c]
+            by_a = w * by + s * (aa * ax + ab * bx), -w * bx + s * (aa * ay + ab * by)
+            by_b = -w * ay + s * (ab * ax + bb * bx), w * ax + s * (ab * ay + bb * by)
+            for axis in range(2):
+                slope[axis, i, c] += by_a[axis]
+                slope[axis, j, c] += by_b[axis]
+                slope[axis, o, c] -= by_a[axis] + by_b[axis]
+
+
+@njit(**OPTIONS)
+def _pull_solid(vtk, at, table, count, alpha, spread, slope):  # type: ignore[no-untyped-def]
+    """Add the derivatives by nodes (3, n, ...), as `_pull_plane`."""
+    for k in range(len(table)):
+        o, i, j, h = table[k, 0], table[k, 1], table[k, 2], table[k, 3]
+        for c in range(count):
+            x, y, z = edge(at, o, i, c), edge(at, o, j, c), edge(at, o, h, c)
+            yz, zx, xy = cross3(y, z), cross3(z, x), cross3(x, y)
+            by_x, by_y, by_z = _spread_slopes(vtk, x, y, z)
+            w, s = alpha[k, c], spread[k, c]
+            for axis in range(3):
+                one = w * yz[axis] + s * by_x[axis]
+                two = w * zx[axis] + s * by_y[axis]
+                three = w * xy[axis] + s * by_z[axis]
+                slope[axis, i, c] += one
+                slope[axis, j, c] += two
+                slope[axis, h, c] += three
+                slope[axis, o, c] -= one + two + three
+
+
+@njit(inline="always", **OPTIONS)
+def _spread_slopes(vtk, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the derivatives of a corner's spread by its three edges."""
+    if vtk == 10:
+        return (
+            (3 * x[0] - y[0] - z[0], 3 * x[1] - y[1] - z[1], 3 * x[2] - y[2] - z[2]),
+            (3 * y[0] - x[0] - z[0], 3 * y[1] - x[1] - z[1], 3 * y[2] - x[2] - z[2]),
+            (3 * z[0] - x[0] - y[0], 3 * z[1] - x[1] - y[1], 3 * z[2] - x[2] - y[2]),
+        )
+    if vtk == 14:
+        half = half_sum(x, y)
+        u, v, w = z[0] - half[0], z[1] - half[1], z[2] - half[2]
+        return (
+            (2 * (x[0] - u), 2 * (x[1] - v), 2 * (x[2] - w)),
+            (2 * (y[0] - u), 2 * (y[1] - v), 2 * (y[2] - w)),
+            (4 * u, 4 * v, 4 * w),
+        )
+    xx, yy, zz = dot3(x, x), dot3(y, y), dot3(z, z)
+    product = np.sqrt(xx * yy * zz)
+    a, b, c = product / xx, product / yy, product / zz
+    return (
+        (a * x[0], a * x[1], a * x[2]),
+        (b * y[0], b * y[1], b * y[2]),
+        (c * z[0], c * z[1], c * z[2]),
+    )
+
+
+@njit(**OPTIONS)
+def add_to_points(nodes, weights, slopes, lane, lanes, out):  # type: ignore[no-untyped-def]
+    """Add the weighted slopes of cells to their points, to those of one lane of many.
+
+    Lanes share no point, so that threads can add at once, and each point gets its terms in the
+    order of the cells however many there are.
+
+    Parameters
+    ----------
+    nodes, slopes : (m, n), (m, n, d)
+        The nodes of cells of one type, and derivatives by them.
+    weights : (w, m)
+        Cells whose weights are all zero are passed over.
+    lane, lanes : int
+        Which share of the points, of how many.
+    out : (w, N, d)
+        What is added to.
+    """
+    for c in range(nodes.shape[0]):
+        wanted = False
+        for r in range(weights.shape[0]):
+            wanted |= weights[r, c] != 0.0
+        if not wanted:
+            continue
+        for j in range(nodes.shape[1]):
+            node = nodes[c, j]
+            if (node >> 6) % lanes != lane:
+                continue
+            for r in range(weights.shape[0]):
+                for axis in range(out.shape[2]):
+                    out[r, node, axis] += weights[r, c] * slopes[c, j, axis]

@@ -1,0 +1,289 @@
+"""Derivatives of the smooth minimum and of the mean of the quality by the points of a mesh.
+
+Where all corners are positive, each metric is a constant divided by ``Σ_k t_k``, with
+``t_k = s_kᵃ / α_kᵇ`` of the spread s and the Jacobian α of corner k
+(`slideviz.mesh.metrics.EXPONENTS`). So, with ``θ_k = t_k / Σ t``, the logarithm of size-skew
+changes by
+
+    d ln f_ss = Σ_k θ_k (b dα_k / α_k - a ds_k / s_k) ± ½ Σ_k dα_k / Σ_k α_k
+
++ for a cell that is smaller than the undeformed one, - for one that is larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.errors import CaseError, MeshError
+from slideviz.mesh.jacobian_slopes import add_to_points, write_slopes
+from slideviz.mesh.jacobians import (
+    CORNERS,
+    INVERTED,
+    corners,
+    hexahedron_coefficients,
+    prism_coefficients,
+)
+from slideviz.mesh.metrics import EXPONENTS
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.threads import PART, cores, in_parts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from slideviz.mesh.quality import Quality
+
+FOLDED_AT_ONCE = 4096
+"""Inverted cells whose coefficients are worked on together; each has up to 27."""
+
+
+@dataclass(frozen=True, eq=False)
+class QualityDerivative:
+    """The smooth minimum and the mean of the quality, and their derivatives by the points.
+
+    The *smooth minimum* of the qualities q of all cells is ``(Σ q^-p)^(-1/p)``. It is never above
+    the minimum, and not below it by more than the factor ``n^(-1/p)``, n the number of cells
+    about as bad as the worst (0.96 for ten and p = 50).
+
+    While cells are inverted, the quality is 0 and tells no way out. There it is
+    ``-(Σ |b|^p)^(1/p)`` instead: b are the corner Jacobians that are not positive, as multiples of
+    the undeformed cell's mean one; of a prism or hexahedron that is folded inside, between
+    positive corners, the coefficients of its proof of validity that are not positive. So it is
+    finite, 0 or below as long as a cell is inverted, steeper the further it is folded, and its
+    derivative points to where it unfolds. It is continuous where a corner folds.
+
+    Attributes
+    ----------
+    p : float
+        The exponent.
+    minimum, mean : float
+        The smooth minimum, and the mean as `Quality` has it, where inverted cells count as 0.
+    of_minimum, of_mean : (n, d) float64
+        Their derivatives by the points, per unit of length. Inverted cells have none in the mean.
+        A cell that is as large as the undeformed one has ``min(τ, 1/τ)`` at its kink: its
+        derivative is 0 there, the mean of both sides. Else all are exact.
+    """
+
+    p: float
+    minimum: float
+    mean: float
+    of_minimum: FloatArray
+    of_mean: FloatArray
+
+
+def derivative_of(
+    mesh: Mesh,
+    found: Quality,
+    sums: FloatArray | None,
+    p: float,
+    going_on: Callable[[], object] = lambda: None,
+) -> QualityDerivative:
+    """Return the derivatives of a mesh's quality.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The deformed mesh.
+    found : Quality
+        Its quality.
+    sums : (m,) or None
+        Sums of the corner Jacobians of the undeformed cells; None if there is no undeformed mesh:
+        there is no factor of size then, and Jacobians are not made multiples of any other.
+    p : float
+        The exponent of the smooth minimum.
+    going_on : callable
+        Called every few thousand cells; what it raises ends the work.
+
+    Raises
+    ------
+    MeshError
+        A point is no number, or an undeformed cell has no positive volume to compare with.
+    CaseError
+        The exponent is below 1 or no number.
+    """
+    if not 1 <= p < np.inf:
+        raise CaseError(f"the exponent of the smooth minimum is {p}; give one of 1 or more, as 50")
+    _check(mesh, found, sums)
+    counted = np.zeros(len(found), bool)
+    counted[found.counted] = True
+    folded = counted & (found.status == INVERTED)
+    counted &= ~folded
+    gradients = np.zeros((2, *mesh.points.shape))
+    if folded.any():
+        minimum = _unfold(mesh, found, sums, folded, p, gradients[0])
+        shares = np.zeros(len(found))
+    else:
+        minimum, shares = _smooth_minimum(found.values, counted, p)
+    weights = np.array([shares, np.where(counted, found.values / found.cells, 0.0)])
+    _add_slopes(mesh, found, sums, weights, gradients, going_on)
+    if not np.isfinite(gradients).all():
+        raise MeshError(
+            f"the derivative of the quality of {mesh.name} is too large for a number: a cell is "
+            f"flat to rounding (lowest quality {found.min:g}); move its nodes apart"
+        )
+    return QualityDerivative(
+        p=float(p),
+        minimum=minimum,
+        mean=found.mean,
+        of_minimum=frozen_array(gradients[0], np.float64),
+        of_mean=frozen_array(gradients[1], np.float64),
+    )
+
+
+def _check(mesh: Mesh, found: Quality, sums: FloatArray | None) -> None:
+    """Raise MeshError where there is nothing to differentiate."""
+    wrong = ~np.isfinite(mesh.points).all(axis=1)
+    if wrong.any():
+        node = int(wrong.argmax())
+        raise MeshError(
+            f"point {node} of {mesh.name} is {mesh.points[node].tolist()}; the derivative of the "
+            "quality needs numbers"
+        )
+    if sums is not None:
+        flat = np.zeros(len(sums), bool)
+        flat[found.counted] = ~(sums[found.counted] > 0)
+        if flat.any():
+            raise MeshError(
+                f"cell {int(flat.argmax())} of the undeformed mesh has no positive volume that "
+                f"the one of {mesh.name} could be compared with; repair it, or leave the "
+                "reference away"
+            )
+
+
+def _smooth_minimum(
+    values: FloatArray, counted: NDArray[np.bool_], p: float
+) -> tuple[float, FloatArray]:
+    """Return ``(Σ q^-p)^(-1/p)``, and its derivatives by ln q (m,)."""
+    # A product of tiny factors may have become 0.
+    q = np.maximum(values[counted], np.finfo(float).tiny)
+    least = float(q.min())
+    ratio = (least / q) ** p
+    minimum = least * float(ratio.sum()) ** (-1 / p)
+    shares = np.zeros(len(values))
+    shares[counted] = minimum * (ratio / ratio.sum())
+    return minimum, shares
+
+
+def _add_slopes(
+    mesh: Mesh,
+    found: Quality,
+    sums: FloatArray | None,
+    weights: FloatArray,
+    gradients: FloatArray,
+    going_on: Callable[[], object],
+) -> None:
+    """Add the derivatives of ln f_ss of all cells, times ``weights`` (w, m), to (w, n, d)."""
+    lanes = cores()
+    batch = PART * max(8, 2 * lanes)
+    with ThreadPoolExecutor(lanes) as pool:
+        for vtk, (ids, nodes) in mesh.cells.by_type.items():
+            for first in range(0, len(ids), batch):
+                going_on()
+                here, of_these = ids[first : first + batch], nodes[first : first + batch]
+                slopes = _slopes(mesh, found, sums, vtk, here, of_these)
+                add = partial(add_to_points, of_these, weights[:, here], slopes)
+                list(pool.map(add, range(lanes), [lanes] * lanes, [gradients] * lanes))
+
+
+def _slopes(
+    mesh: Mesh, found: Quality, sums: FloatArray | None, vtk: int, ids: IntArray, nodes: IntArray
+) -> FloatArray:
+    """Return the derivatives (m, n, d) of ln f_ss of some cells of one type by their nodes."""
+    table, powers = CORNERS[vtk], np.array(EXPONENTS[found.metric][vtk], float)
+    turn = found.signs[ids]
+    before = np.full(len(ids), np.inf) if sums is None else sums[ids]
+    out = np.empty((*nodes.shape, mesh.dim))
+
+    def write(part: slice) -> None:
+        of_part = turn[part], powers, before[part], out[part]
+        write_slopes(vtk, mesh.points, nodes[part], table, *of_part)
+
+    in_parts(write, len(ids))
+    return out
+
+
+def _unfold(
+    mesh: Mesh,
+    found: Quality,
+    sums: FloatArray | None,
+    folded: NDArray[np.bool_],
+    p: float,
+    gradient: FloatArray,
+) -> float:
+    """Return the smooth minimum while ``folded`` (m,) cells are, and add its derivative (n, d)."""
+    parts = []
+    for vtk, (ids, nodes) in mesh.cells.by_type.items():
+        of_type = np.flatnonzero(folded[ids])
+        for first in range(0, len(of_type), FOLDED_AT_ONCE):
+            some = of_type[first : first + FOLDED_AT_ONCE]
+            scale = found.signs[ids[some]].astype(float)
+            if sums is not None:
+                scale *= len(CORNERS[vtk]) / sums[ids[some]]
+            parts.append((vtk, nodes[some], scale))
+    # Factors of ``scale`` are signs and positive numbers: what is not positive stays so.
+    depths = [_depths(vtk, _at(mesh, nodes), scale) for vtk, nodes, scale in parts]
+    deepest = max(float(depth.max()) for depth in depths)
+    if deepest > 0:
+        shares = [np.where(depth > 0, depth / deepest, 0.0) for depth in depths]
+        norm = sum(float((share**p).sum()) for share in shares) ** (1 / p)
+        shares = [np.where(share > 0, (share / norm) ** (p - 1), 0.0) for share in shares]
+    else:  # all flat to the last bit: none goes before the others
+        norm = 1.0
+        flat = sum(int((depth == 0).sum()) for depth in depths)
+        shares = [(depth == 0) / flat for depth in depths]
+    for (vtk, nodes, scale), share in zip(parts, shares, strict=True):
+        np.add.at(gradient, nodes, _pull(vtk, _at(mesh, nodes), share * scale))
+    return -deepest * norm
+
+
+def _at(mesh: Mesh, nodes: IntArray) -> FloatArray:
+    """Return the coordinates (d, n, m) of the nodes (m, n) of cells."""
+    return np.ascontiguousarray(mesh.points[nodes].T)
+
+
+def _coefficients(vtk: int, at: FloatArray) -> FloatArray:
+    """Return (k, m): the corner Jacobians first, then the inner coefficients of the proof."""
+    count = at.shape[2]
+    jacobians = np.empty((len(CORNERS[vtk]), count))
+    corners(at, CORNERS[vtk], count, jacobians)
+    if vtk == 12:
+        inner = hexahedron_coefficients(at).reshape(27, count)
+        return np.concatenate((jacobians, np.delete(inner, [0, 2, 6, 8, 18, 20, 24, 26], axis=0)))
+    if vtk == 13:
+        return np.concatenate((jacobians, prism_coefficients(at)[1]))
+    return jacobians
+
+
+def _depths(vtk: int, at: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return how far below zero each coefficient of inverted cells is, (k, m); -1 if it is not.
+
+    Inner coefficients count only where all corners are positive: they may be negative in a valid
+    cell, and would make a step where the first corner folds.
+    """
+    found = -scale * _coefficients(vtk, at)
+    found[~(found >= 0)] = -1.0
+    outer = len(CORNERS[vtk])
+    found[outer:, (found[:outer] >= 0).any(axis=0)] = -1.0
+    return found
+
+
+def _pull(vtk: int, at: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the derivatives (m, n, d) of ``Σ_k weights_k coefficients_k`` by the nodes.
+
+    A determinant has one factor of each coordinate in each of its terms. So its derivative by one
+    coordinate of a node is the determinant with that coordinate 1 there and 0 at the others.
+    """
+    d, n, m = at.shape
+    out = np.empty((m, n, d))
+    for axis in range(d):
+        unit = at.copy()
+        for j in range(n):
+            unit[axis] = 0.0
+            unit[axis, j] = 1.0
+            out[:, j, axis] = (weights * _coefficients(vtk, unit)).sum(axis=0)
+    return out
