@@ -54,7 +54,7 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
     for first in range(0, len(chosen), CHUNK):
         rows = chosen[first : first + CHUNK]
         uvw[rows] = _solved(box, whole[rows], size)
-    inside: np.ndarray = ((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1)
+    inside = np.asarray(((uvw >= -INSIDE) & (uvw <= 1.0 + INSIDE)).all(axis=1))
     uvw[~inside] = np.nan
     return np.clip(uvw, 0.0, 1.0), inside
 
@@ -115,7 +115,7 @@ def _newton(
 def _step(slopes: FloatArray, rest: FloatArray) -> FloatArray:
     """Return Newton's step (m, 3); where the derivative is singular, the shortest that helps."""
     try:
-        step: FloatArray = np.linalg.solve(slopes, rest[..., None])[..., 0]
+        step = np.linalg.solve(slopes, rest[..., None])[..., 0]
     except np.linalg.LinAlgError:
         step = np.einsum("mij,mj->mi", np.linalg.pinv(slopes), rest)
-    return step
+    return np.asarray(step)
