@@ -18,6 +18,7 @@ from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, Drawn
 from slideviz.scene.camera import SLACK, Camera
+from slideviz.scene.coarse import CoarseLayer
 from slideviz.scene.ghosts import GhostLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cell import MarkLayer
@@ -56,6 +57,7 @@ class Scene:
         self._chosen = ThresholdLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
         self.sections = SectionLayer(self.stage)
+        self._coarse = CoarseLayer(self.stage, self._boundaries)
         self.layers: tuple[Layer, ...] = (
             self._cells,
             self._boundaries,
@@ -67,6 +69,7 @@ class Scene:
             PointLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
+            self._coarse,
         )
         self.camera = Camera(self.stage, self._shapes)
         self.session = Session()
@@ -154,6 +157,21 @@ class Scene:
     def _again(self) -> None:
         if self.session.mesh is not None:
             tell_all((layer.update for layer in self.layers), self.session, self.session)
+
+    # While the camera moves --------------------------------------------------------------
+
+    @property
+    def coarse(self) -> bool:
+        """Tell whether boundaries are drawn with fewer facets."""
+        return self._coarse.on
+
+    def draw_coarse(self, on: bool) -> bool:
+        """Draw boundaries with fewer facets, or all again; tell whether that was a change."""
+        return self._coarse.switch(on)
+
+    def set_coarse(self, surfaces: Sequence[Surface]) -> None:
+        """Set the coarse boundaries of the mesh that is opened next; none is a choice."""
+        self._coarse.surfaces = {one.name: one for one in surfaces}
 
     # Ghosts -----------------------------------------------------------------------------
 

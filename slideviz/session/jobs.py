@@ -13,6 +13,7 @@ from pathlib import Path
 
 from slideviz.case.model import Case
 from slideviz.errors import Cancelled, CaseError
+from slideviz.mesh.coarse import coarse_surfaces
 from slideviz.mesh.io.private import private_folder
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
@@ -51,7 +52,8 @@ class Opened:
     """The result of `open_file`: the session, and the boundaries ready to be drawn.
 
     ``kept`` tells whether the case says how it was looked at; ``camera`` is from where.
-    ``ghosts`` has read the displacement files.
+    ``ghosts`` has read the displacement files; ``coarse`` are the boundaries of a large mesh with
+    fewer facets.
     """
 
     session: Session
@@ -59,6 +61,7 @@ class Opened:
     ghosts: Ghosts
     kept: bool = False
     camera: Camera | None = None
+    coarse: tuple[Surface, ...] = ()
 
 
 def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) -> Opened:
@@ -111,9 +114,10 @@ def prepare(
     session = open_mesh(first, path, pairs, case)
     ghosts = Ghosts(mesh)
     ghosts.moved(session.case)
+    coarse = coarse_surfaces(surfaces, mesh.points)
     if case is None:
-        return Opened(session, surfaces, ghosts)
-    return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case))
+        return Opened(session, surfaces, ghosts, coarse=coarse)
+    return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case), coarse)
 
 
 def _look_ahead(frame: Frame) -> None:

@@ -50,6 +50,12 @@ TICK_MS = 33
 
 Where drawing takes longer, too, steps are left out.
 """
+SLOW_FRAME_S = 0.04
+"""A picture that takes longer is drawn with fewer facets while the mouse moves the camera.
+
+Two such in a row, and what Qt does with them, are felt."""
+STILL_MS = 250
+"""A camera that the mouse has not moved for so long is at rest, and everything is drawn again."""
 NEWS_S = 0.1
 """Between two news of a job, at least: each time the whole window goes to the screen again."""
 COUNTING_MS = 300

@@ -41,6 +41,8 @@ class ViewSignals(QObject):
         The wheel was turned at a place, by a factor.
     resized(), unveiled()
         The view has another size; all that is new in the scene is drawn.
+    moving(), released()
+        The mouse, or its wheel, moves the camera; the button that did so is up again.
     """
 
     clicked = Signal(QPoint, Qt.KeyboardModifier)
@@ -49,6 +51,8 @@ class ViewSignals(QObject):
     zoomed = Signal(QPoint, float)
     resized = Signal()
     unveiled = Signal()
+    moving = Signal()
+    released = Signal()
 
 
 class View3D(QtInteractor):
@@ -64,6 +68,15 @@ class View3D(QtInteractor):
         self._repaints = RepaintCoalescer(self)
         self._veiled: list[list[vtkProp]] = []
         self._resizing = False
+        self.frame_s = 0.0
+        # Each movement of the mouse would be drawn at once, and then once more by Qt.
+        self._Iren.EnableRenderOff()
+        event, wanted = "RenderEvent", self._drawing_wanted
+        self._Iren.AddObserver(event, lambda *_: wanted())  # type: ignore[arg-type]  # a name, too
+
+    def _drawing_wanted(self) -> None:
+        if not self._in_paint:
+            self.render()
 
     def render(self) -> None:  # type: ignore[override]  # pyvista's, not Qt's
         """Schedule one repaint; pyvista calls this everywhere."""
@@ -84,6 +97,11 @@ class View3D(QtInteractor):
         self._veiled = portions(self.renderer.actors.values(), PART_CELLS)[1:]
         self.render()
 
+    @property
+    def veiled(self) -> bool:
+        """Tell whether something new is still to be drawn."""
+        return bool(self._veiled)
+
     def _veil(self) -> None:
         for actor in chain(*self._veiled):
             actor.SetVisibility(False)
@@ -103,7 +121,12 @@ class View3D(QtInteractor):
             return
         # What changed the scene meanwhile knows nothing of the veil.
         self._veil()
-        super().paintGL()
+        self._Iren.EnableRenderOn()
+        try:
+            super().paintGL()
+        finally:
+            self._Iren.EnableRenderOff()
+        self.frame_s = self.renderer.GetLastRenderTimeInSeconds()
         if self._veiled:
             QTimer.singleShot(0, self._unveil_next)
 
@@ -160,6 +183,12 @@ class View3D(QtInteractor):
             return
         super().mousePressEvent(event)
 
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        before = self.camera.GetMTime()
+        super().mouseMoveEvent(event)
+        if event.buttons() and self.camera.GetMTime() != before:
+            self.signals.moving.emit()
+
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         where = event.position().toPoint()
         pressed, self._pressed = self._pressed, None
@@ -171,6 +200,7 @@ class View3D(QtInteractor):
                 self.signals.menu_wanted.emit(where)
             return
         super().mouseReleaseEvent(event)
+        self.signals.released.emit()
         if not still or event.button() != Qt.MouseButton.LeftButton:
             return
         if event.modifiers() & Qt.KeyboardModifier.AltModifier:
@@ -189,6 +219,7 @@ class View3D(QtInteractor):
     def wheelEvent(self, event: QWheelEvent) -> None:
         steps = event.angleDelta().y() / 120.0
         if steps:
+            self.signals.moving.emit()
             self.signals.zoomed.emit(event.position().toPoint(), 1.2**steps)
         event.accept()
 

@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 from slideviz.color_scheme import Look
 from slideviz.gui.viewport.beside import CameraLink, TitleBar
 from slideviz.gui.viewport.canvas import View3D
+from slideviz.gui.viewport.coarse_moving import CoarseWhileMoving
 from slideviz.gui.viewport.view_mouse import BoundaryMouse, CellMouse
 from slideviz.gui.widgets.runs_menu import fill_pane
 from slideviz.scene.color_legend import STRIP
@@ -50,6 +51,7 @@ class Viewing(QWidget):
         self._multi_samples = multi_samples
         self._ghosts: Ghosts | None = None
         self.surfaces: tuple = ()
+        self.coarse: tuple = ()
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(2)
@@ -88,6 +90,7 @@ class Viewing(QWidget):
     def _connect(self, view: View3D, scene: Scene) -> None:
         view.signals.resized.connect(lambda: self._resized(scene))
         view.signals.unveiled.connect(lambda: scene.update(scene.session))
+        CoarseWhileMoving(view, scene)
         CellMouse(view, scene, self.store)
         BoundaryMouse(view, scene, self.store)
         view.signals.zoomed.connect(lambda where, factor: self._zoomed(view, scene, where, factor))
@@ -103,6 +106,7 @@ class Viewing(QWidget):
         self._connect(self.second, self.second_scene)
         self.second.spare_software()
         self.second.set_flat(session.mesh.dim == 2)
+        self.second_scene.set_coarse(self.coarse)
         self.second_scene.open(changes.seen_beside(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
         self.second_scene.take_camera(self.scene)
@@ -196,6 +200,8 @@ class Viewing(QWidget):
         self._ghosts = opened.ghosts
         self.view.spare_software()
         self.view.set_flat(session.mesh.dim == 2)
+        self.coarse = opened.coarse
+        self.scene.set_coarse(opened.coarse)
         self.scene.open(session, opened.surfaces)
         if opened.camera is not None:
             self.scene.camera.go(opened.camera)

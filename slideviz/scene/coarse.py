@@ -1,0 +1,89 @@
+"""Coarse boundaries in the scene, drawn while the camera moves and all facets take too long."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from slideviz.mesh.surfaces import Surface
+from slideviz.scene import actors
+from slideviz.scene.actors import VALUES, Drawn, see_through
+from slideviz.scene.mesh import BoundaryLayer
+from slideviz.scene.stage import Layer, Stage
+from slideviz.session.state import Session
+
+
+class CoarseLayer(Layer):
+    """The coarse boundaries, in place of the others while it is `on`.
+
+    Parameters
+    ----------
+    stage : Stage
+    boundaries : BoundaryLayer
+        Draws them with all facets, and says how they look.
+
+    Attributes
+    ----------
+    surfaces : mapping of str to Surface
+        By name; set before a mesh is opened, none for small meshes.
+    on : bool
+    """
+
+    def __init__(self, stage: Stage, boundaries: BoundaryLayer) -> None:
+        self.stage = stage
+        self.surfaces: Mapping[str, Surface] = {}
+        self._boundaries = boundaries
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the mesh."""
+        self.on = False
+        self.drawn: dict[str, Drawn] = {}
+        self._made_of: tuple[object, ...] = ()
+        self._session = Session()
+
+    def update(self, _old: Session | None, new: Session) -> None:
+        """Draw another state of the session, in place of what the boundaries have just drawn."""
+        self._session = new
+        if self.on:
+            self._draw()
+
+    def switch(self, on: bool) -> bool:
+        """Draw the coarse boundaries, or the others again; tell whether that was a change."""
+        if on == self.on or (on and not self.surfaces):
+            return False
+        self.on = on
+        if on:
+            self._draw()
+            return True
+        for name, one in self.drawn.items():
+            self._boundaries.drawn[name].actor.visibility = one.actor.visibility
+            one.actor.visibility = False
+        return True
+
+    def _draw(self) -> None:
+        session = self._session
+        assert session.mesh is not None
+        assert session.frame is not None
+        if not self.drawn:
+            self.drawn = {name: self._add(one) for name, one in self.surfaces.items()}
+        made_of = session.frame, session.view.colour_by
+        again, self._made_of = made_of != self._made_of, made_of
+        for name, one in self.drawn.items():
+            whole = self._boundaries.drawn[name].actor
+            if again:
+                actors.place(one.shape, session.frame.mesh.points[one.surface.nodes])
+            if again and session.view.colour_by != "role":
+                one.shape.cell_data[VALUES] = self.stage.values_of(session, one.surface.owner)
+            one.actor.prop.DeepCopy(whole.prop)
+            one.actor.prop.show_edges = False
+            see_through(one.actor, whole.prop.opacity)
+            one.actor.mapper.scalar_visibility = whole.mapper.scalar_visibility
+            one.actor.visibility, whole.visibility = whole.visibility, False
+
+    def _add(self, surface: Surface) -> Drawn:
+        assert self._session.mesh is not None
+        shape: Any = actors.surface_shape(surface, self._session.mesh.points)
+        return Drawn(
+            surface, shape, self.stage.add(shape, f"coarse:{surface.name}", pickable=False)
+        )

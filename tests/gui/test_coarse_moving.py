@@ -1,0 +1,109 @@
+"""While the mouse turns a large mesh, boundaries have fewer facets; at rest all of them."""
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
+
+from slideviz.gui.viewport import coarse_moving
+from slideviz.mesh import coarse
+from slideviz.samples.table import write_sample
+from slideviz.scene.actors import VALUES
+from slideviz.session import changes
+
+
+@pytest.fixture(scope="module")
+def stator_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stator")
+    write_sample("stator", folder, 6000)
+    return folder / "stator.cfg"
+
+
+@pytest.fixture
+def stator(driver, stator_file, monkeypatch, qtbot):
+    monkeypatch.setattr(coarse, "LEAST", 0)
+    monkeypatch.setattr(coarse, "CUBES", 10)
+    monkeypatch.setattr(coarse_moving, "SLOW_FRAME_S", -1.0)
+    driver.open(stator_file)
+    qtbot.waitUntil(lambda: not driver.window.view.veiled)
+    return driver
+
+
+def shown(scene):
+    """Return the boundaries drawn with all facets, and those with fewer."""
+    every = scene.plotter.renderer.actors.items()
+    names = [name for name, actor in every if actor.GetVisibility()]
+    return [{n[7:] for n in names if n.startswith(kind)} for kind in ("marker:", "coarse:")]
+
+
+def press_and_move(view):
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(150, 150))
+    for k in range(1, 4):
+        QTest.mouseMove(view, QPoint(150 + 20 * k, 150))
+
+
+def test_turning_draws_fewer_facets_until_the_button_is_up(stator):
+    view, scene = stator.window.view, stator.window.scene
+    names = set(stator.session.mesh.marker_names)
+    whole = view.snapshot()
+    assert shown(scene) == [names, set()]
+    press_and_move(view)
+    assert scene.coarse
+    assert shown(scene) == [set(), names]
+    moving = view.snapshot()
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
+    assert shown(scene) == [names, set()]
+    after = view.snapshot()
+    assert np.abs(after.astype(int) - whole).mean() > 1.0  # it was turned
+    # Without holes and without a jump: nearly the same picture, but for the edges of the cells.
+    assert np.abs(after.astype(int) - moving).mean() < 25.0
+
+
+def test_a_mouse_that_rests_shows_all_facets(stator, qtbot):
+    scene = stator.window.scene
+    press_and_move(stator.window.view)
+    assert scene.coarse
+    qtbot.waitUntil(lambda: not scene.coarse)
+    QTest.mouseRelease(stator.window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
+
+
+def test_what_changes_meanwhile_is_drawn(stator):
+    window, scene = stator.window, stator.window.scene
+    press_and_move(window.view)
+    name = stator.session.mesh.marker_names[0]
+    window.store.change(changes.set_view, colour_by="size-skew")
+    window.store.change(changes.show, (name,), shown=False)
+    every, some = shown(scene)
+    assert not every
+    assert name not in some
+    one = next(iter(scene._coarse.drawn.values()))
+    values = stator.session.frame.quality.values[one.surface.owner]
+    np.testing.assert_array_equal(one.shape.cell_data[VALUES], values)
+    QTest.mouseRelease(window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
+    every, some = shown(scene)
+    assert not some
+    assert name not in every
+
+
+def test_a_quick_picture_is_never_made_coarse(stator, monkeypatch):
+    monkeypatch.setattr(coarse_moving, "SLOW_FRAME_S", 1e9)
+    press_and_move(stator.window.view)
+    assert not stator.window.scene.coarse
+    QTest.mouseRelease(stator.window.view, Qt.MouseButton.LeftButton, pos=QPoint(210, 150))
+
+
+def test_a_movement_of_the_mouse_is_drawn_once(stator, qtbot):
+    view = stator.window.view
+    qtbot.wait(50)
+    drawn = []
+    tag = view.renderer.AddObserver("EndEvent", lambda *_: drawn.append(1))
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=QPoint(150, 150))
+    qtbot.wait(50)
+    drawn.clear()
+    QTest.mouseMove(view, QPoint(180, 150))
+    assert not drawn
+    qtbot.waitUntil(lambda: bool(drawn))
+    qtbot.wait(30)
+    assert len(drawn) == 1
+    view.renderer.RemoveObserver(tag)
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(180, 150))
