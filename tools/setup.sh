@@ -10,12 +10,13 @@ VENV=.venv
 EXTRAS=test,dev${1:+,$1}
 STAMP=$VENV/.installed${1:+-$1}
 # What the Qt and VTK wheels expect of the system, a screen that is not there (Xvfb) for the
-# tests of the window, and a font.
+# tests of the window, a font, and MPI, which mpi4py has not, for the tests of runs on several ranks.
 PACKAGES=(
     xvfb xauth xdotool fonts-dejavu-core
     libgl1 libegl1 libglx-mesa0 libopengl0 libglib2.0-0 libdbus-1-3 libfontconfig1 libxrender1
     libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0
     libxcb-render-util0 libxcb-shape0 libxcb-xinerama0 libxcb-xfixes0
+    openmpi-bin
 )
 
 say() { printf 'setup: %s\n' "$*"; }

@@ -11,16 +11,22 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from slideviz.cli.exit_codes import CANCELLED, DONE, WRONG_INPUT
+from slideviz.cli.processes import launched, run_shared
 from slideviz.cli.terminal import terminal
 from slideviz.errors import Cancelled, SlidevizError
+
+if TYPE_CHECKING:
+    from slideviz.mesh.ranks import Ranks
 
 
 def run(argv: Sequence[str]) -> int:
     """Run one command and return its exit code; errors become one clear message."""
     with terminal():
-        code = _run(argv)
+        variable = launched()
+        code = _shared(argv, variable) if variable else _run(argv, None)
         try:
             sys.stdout.flush()  # here, where a failure can still be reported
         except BrokenPipeError:
@@ -30,7 +36,14 @@ def run(argv: Sequence[str]) -> int:
         return code
 
 
-def _run(argv: Sequence[str]) -> int:
+def _shared(argv: Sequence[str], variable: str) -> int:
+    try:
+        return run_shared(argv, variable, lambda ranks: _run(argv, ranks))
+    except SlidevizError as problem:
+        return _fail(str(problem), WRONG_INPUT)
+
+
+def _run(argv: Sequence[str], ranks: Ranks | None) -> int:
     # It reports fonts for formulas that it replaces, a line for each, where its cache is new.
     logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
     try:  # also around the imports, which take long enough to be interrupted
@@ -40,7 +53,7 @@ def _run(argv: Sequence[str]) -> int:
         from slideviz.mesh.io.file_checks import protected
 
         arguments = parse(argv)
-        arguments.inputs = inputs_of(arguments)
+        arguments.inputs, arguments.ranks = inputs_of(arguments), ranks
         with (
             protected(lambda: arguments.inputs),
             note_compilation(getattr(arguments, "quiet", False)),

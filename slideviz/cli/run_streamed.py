@@ -52,6 +52,7 @@ def run_streamed(
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
     from slideviz.deformation.streaming import stream
+    from slideviz.mesh.ranks import ALONE
 
     with Bar(not arguments.quiet) as bar:
         done = stream(
@@ -62,6 +63,7 @@ def run_streamed(
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,
+            ranks=arguments.ranks or ALONE,
         )
     seconds = dict(done.seconds)
     if qualities:

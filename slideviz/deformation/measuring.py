@@ -19,6 +19,7 @@ from slideviz.mesh.io.su2b_elements import Block
 from slideviz.mesh.io.su2b_layout import Source, ZonePlace
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality, quality
+from slideviz.mesh.skin import Index, index_of
 from slideviz.terms import Metric
 
 READ = 1 << 20
@@ -63,6 +64,60 @@ class PointFiles:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The quality of a block of cells, before and after.
+
+    Attributes
+    ----------
+    name : str
+        The mesh.
+    first : int
+        Number of the first element by its place in the file.
+    ids : index of (k,)
+        The numbers of the cells.
+    values, before : (k,) float64
+        Quality of the deformed and the undeformed cells.
+    status, old : (k,) uint8
+        Their states.
+    signs : (s,) int8
+        Which ways round they are numbered.
+    inverted : dict of int to (int, (n,) int64)
+        Type and nodes of the inverted cells with the lowest numbers.
+    """
+
+    name: str
+    first: int
+    ids: Index
+    values: FloatArray
+    before: FloatArray
+    status: NDArray[np.uint8]
+    old: NDArray[np.uint8]
+    signs: NDArray[np.int8]
+    inverted: dict[int, tuple[int, IntArray]]
+
+
+def measured(block: Block, base: Mesh, moved: Mesh, metric: Metric, listed: int) -> Measured:
+    """Return the quality of a block; of inverted cells the ``listed`` with the lowest numbers."""
+    one, other = quality(base, metric=metric), quality(moved, base, metric)
+    ends, inverted = moved.cells.offsets, np.flatnonzero(other.status == INVERTED)
+    lowest = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
+    return Measured(
+        base.name,
+        block.first,
+        index_of(block.ids),
+        other.values,
+        one.values,
+        other.status,
+        one.status,
+        np.unique(one.signs),
+        {
+            int(block.ids[k]): (int(block.types[k]), block.nodes[ends[k] : ends[k + 1]].copy())
+            for k in lowest
+        },
+    )
+
+
 class Rating:
     """The quality of all cells, block by block; it is kept in files, which end with ``stack``.
 
@@ -80,23 +135,19 @@ class Rating:
         self._signs = np.zeros(0, np.int8)
         self.inverted: dict[int, tuple[int, IntArray]] = {}
 
-    def add(self, block: Block, base: Mesh, moved: Mesh, listed: int) -> None:
-        """Measure a block; of inverted cells the ``listed`` with the lowest numbers are kept."""
-        one, other = quality(base, metric=self._metric), quality(moved, base, self._metric)
-        self._signs = np.unique(np.concatenate([self._signs, one.signs]))
+    def add(self, found: Measured, listed: int) -> None:
+        """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
+        self._signs = np.unique(np.concatenate([self._signs, found.signs]))
         if len(self._signs) > 1:
             raise MeshError(
-                f"{base.name}: some cells are numbered the other way round than others (near "
-                f"element {block.first}), which only the whole mesh can tell from folded ones; run "
+                f"{found.name}: some cells are numbered the other way round than others (near "
+                f"element {found.first}), which only the whole mesh can tell from folded ones; run "
                 "it without --stream, or mesh again"
             )
-        self._values[block.ids], self._status[block.ids] = other.values, other.status
-        self._before[block.ids], self._old[block.ids] = one.values, one.status
-        ends = moved.cells.offsets
-        for k in np.flatnonzero(other.status == INVERTED).tolist():
-            nodes = block.nodes[ends[k] : ends[k + 1]]
-            self.inverted[int(block.ids[k])] = int(block.types[k]), nodes.copy()
-        self.inverted = dict(sorted(self.inverted.items())[:listed])
+        ids = found.ids
+        self._values[ids], self._status[ids] = found.values, found.status
+        self._before[ids], self._old[ids] = found.before, found.old
+        self.inverted = dict(sorted((self.inverted | found.inverted).items())[:listed])
         self._release()
 
     def quality(self) -> Quality:

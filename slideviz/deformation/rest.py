@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from slideviz.deformation.setup import Setup
 from slideviz.deformation.stepping import cartesian, shifted
 from slideviz.deformation.steps import Step
 from slideviz.errors import DeformError, MeshError, UnsoundError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.rbf.axis import on_axis
 
 
@@ -33,6 +33,13 @@ class Rest:
     skin: Mesh
     setup: Setup
     steps: Sequence[Step]
+
+    def bare(self) -> Rest:
+        """Return the same without cells, boundaries and all else that no node needs to move."""
+        none = Cells.from_blocks([])
+        skin = replace(self.skin, cells=none, markers=())
+        steps = [replace(step, mesh=skin.with_points(step.mesh.points)) for step in self.steps]
+        return replace(self, skin=skin, steps=steps)
 
     def after_steps(self, nodes: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """Yield the points (m, d) of nodes (m,), by their numbers and ascending, after each step.

@@ -13,11 +13,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from slideviz import __version__
 from slideviz.case.model import Case
-from slideviz.deformation.measuring import PointFiles, Rating, folded_steps
+from slideviz.deformation.measuring import folded_steps
+from slideviz.deformation.output import Output
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.solver import (
@@ -30,18 +29,13 @@ from slideviz.deformation.solver import (
 from slideviz.deformation.stepping import Stepping
 from slideviz.errors import CaseError, MeshError, NodeError
 from slideviz.mesh.io.files import format_of
-from slideviz.mesh.io.partial import Partial, partial_copy
-from slideviz.mesh.io.su2b import chosen_zone
-from slideviz.mesh.io.su2b_elements import element_blocks
-from slideviz.mesh.io.su2b_layout import Source, find_zones
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import read_skin
 from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
 
-CHUNK = 1 << 20
-"""Nodes, or cells, that are in memory at a time."""
 NEEDED = 5.0
 """Memory of a run that is not streamed over the size of its file: 4.2 on hexahedra."""
 Tell = Callable[[Progress], None]
@@ -82,6 +76,7 @@ def stream(
     resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
+    ranks: Alone = ALONE,
 ) -> Streamed:
     """Deform the mesh of a case from file to file; what is in memory is its boundary.
 
@@ -99,6 +94,8 @@ def stream(
         The input that may be written over.
     listed : int
         Inverted cells that are followed through the steps.
+    ranks : Alone or Ranks
+        The processes that share the work; this one is rank 0.
 
     Raises
     ------
@@ -113,10 +110,11 @@ def stream(
     total = max(1, case.steps)
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
     with watch.phase("read") as tick:
-        skin = read_skin(path, case.zone, tick)
+        skin = read_skin(path, case.zone, tick, ranks)
     with ExitStack() as stack:
         stack.enter_context(_numbered(skin))
-        out = _Output(stack, case, output, watch, resume=resume, replaces=replaces)
+        about = _about(case, path)
+        out = Output(stack, case, output, watch, ranks, about, resume=resume, replaces=replaces)
         if resume:
             note(out.found())
         rest = _solved(case, skin, out, tell)
@@ -133,7 +131,7 @@ def stream(
     )
 
 
-def _solved(case: Case, skin: Mesh, out: _Output, tell: Tell) -> Rest:
+def _solved(case: Case, skin: Mesh, out: Output, tell: Tell) -> Rest:
     """Return what displaces the rest of a mesh, after all steps of its skin."""
     watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
     with watch.phase("classify"):
@@ -158,105 +156,6 @@ def _numbered(skin: Mesh) -> Iterator[None]:
     except NodeError as problem:
         nodes = (skin.number(node) for node in problem.nodes)
         raise NodeError(problem.sentence, *nodes) from problem
-
-
-class _Output:
-    """The deformed mesh in the making, and the quality of its cells.
-
-    Attributes
-    ----------
-    files : PointFiles
-        The points before and after.
-    """
-
-    def __init__(
-        self,
-        stack: ExitStack,
-        case: Case,
-        output: Path,
-        watch: Watch,
-        *,
-        resume: bool,
-        replaces: Path | None,
-    ) -> None:
-        assert case.mesh_file is not None
-        self._stack, self._case, self._path, self._watch = stack, case, output, watch
-        self._resume, self._replaces = resume, replaces
-        source = Source(case.mesh_file, stack.enter_context(case.mesh_file.open("rb")))
-        self._place = chosen_zone(case.mesh_file, find_zones(source), case.zone)
-        self.files = PointFiles(source, source, self._place)
-        self._partial: Partial | None = None
-        self._rating: Rating | None = None
-
-    def _opened(self) -> Partial:
-        """Return the copy that is changed; it is made when it is needed first."""
-        assert self._case.mesh_file is not None
-        if self._partial is None:
-            with self._watch.phase("write") as tick:
-                self._partial = self._stack.enter_context(
-                    partial_copy(
-                        self._path,
-                        self._case.mesh_file,
-                        _about(self._case, self._case.mesh_file),
-                        resume=self._resume,
-                        replaces=self._replaces,
-                        progress=tick,
-                    )
-                )
-            self.files = replace(self.files, after=self.files.before.of(self._partial.file))
-        return self._partial
-
-    def found(self) -> str:
-        """Return in words what a stopped run has left to go on with."""
-        done, total = self._opened().done, -(-self._place.n_points // CHUNK)
-        if done:
-            return f"{self._path.name}: goes on after {done} of {total} parts"
-        return (
-            f"{self._path.name}: there is nothing to go on with, of this case, mesh and version; "
-            "it is made from the beginning"
-        )
-
-    def displace(self, rest: Rest, *, final: bool) -> None:
-        """Write all points after the last step; parts that a stopped run has made are left out.
-
-        Points that are not ``final`` are those of a trial, and none to go on with.
-        """
-        partial, total = self._opened(), self._place.n_points
-        if not final and partial.done:
-            partial.note(0)
-        with self._watch.phase("evaluate") as tick:
-            for part in range(partial.done, -(-total // CHUNK)):
-                self._move(rest, partial, slice(part * CHUNK, min((part + 1) * CHUNK, total)))
-                if final:
-                    partial.note(part + 1)
-                tick(min(1.0, (part + 1) * CHUNK / total))
-
-    def _move(self, rest: Rest, partial: Partial, part: slice) -> None:
-        """Write the points of a part."""
-        source, dim = self.files.before, self._place.dim
-        kind = source.point(dim)
-        at = self._place.points + part.start * kind.itemsize
-        rows = source.array(at, part.stop - part.start, kind, "the points")
-        points = rows["x"].astype(np.float64)
-        for now in rest.after_steps(np.arange(part.start, part.stop), points):
-            points = now
-        rows["x"] = points
-        partial.file.seek(at)
-        partial.file.write(rows.tobytes())
-
-    def rating(self, listed: int) -> Rating:
-        """Return the quality of all cells; of inverted ones ``listed`` are kept."""
-        self._opened().file.flush()
-        source, place = self.files.before, self._place
-        if self._rating is None:
-            metric = self._case.quality_metric
-            self._rating = Rating(self._stack, self._path.parent, place.cells.count, metric)
-        self._rating.inverted.clear()
-        with self._watch.phase("quality") as tick:
-            for block in element_blocks(source, place, place.cells, place.dim, CHUNK):
-                self._rating.add(block, *self.files.cells_of(block), listed)
-                tick((block.first + len(block.types)) / place.cells.count)
-        return self._rating
 
 
 def _require_streamable(case: Case, path: Path) -> None:
@@ -297,7 +196,6 @@ def _about(case: Case, path: Path) -> str:
     text = repr(
         (
             __version__,
-            CHUNK,
             replace(case, mesh_out=None, view={}, warnings=()),
         )
     )

@@ -7,21 +7,31 @@ that of the whole. It has the outermost nodes too, by which the extent is the sa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
-from slideviz.mesh.io.su2b import chosen_zone, point_blocks, read_elements
-from slideviz.mesh.io.su2b_elements import Block, element_blocks, taken
+from slideviz.mesh.io.su2b import chosen_zone, point_block, read_elements
+from slideviz.mesh.io.su2b_elements import BLOCK, Block, element_block, require_used, taken
 from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
+from slideviz.mesh.ranks import ALONE, Alone
 
 Tick = Callable[[float], object]
+Index = slice | IntArray
+"""Numbers of cells, as an index of an array."""
 
 
-def read_skin(path: Path, zone: int | None, progress: Tick = lambda _: None) -> Mesh:
+def read_skin(
+    path: Path, zone: int | None, progress: Tick = lambda _: None, ranks: Alone = ALONE
+) -> Mesh:
     """Return the skin of a zone of an SU2 binary mesh; the whole of it is read and checked.
 
     Raises
@@ -44,11 +54,23 @@ def read_skin(path: Path, zone: int | None, progress: Tick = lambda _: None) -> 
         used = np.zeros(place.n_points, bool)
         for marker in markers:
             used[marker.nodes] = True
-        cells, ids = _cells_at(source, place, used, lambda done: progress(0.6 * done))
+        with ranks.sharing(_cells_near, path, zone, np.flatnonzero(used)) as do:
+            tasks = range(0, place.cells.count, BLOCK)
+            cells, ids = _cells_at(
+                source, place, map(_told(progress, 0.0, 0.6, len(tasks)), do(tasks))
+            )
         used[cells.connectivity] = True
-        numbers, points = _points_of(
-            source, place, np.flatnonzero(used), lambda done: progress(0.6 + 0.4 * done)
-        )
+        numbers = np.flatnonzero(used)
+        with ranks.sharing(_points_near, path, zone) as do:
+            starts = range(0, place.n_points, BLOCK)
+            ends = np.searchsorted(numbers, [*starts, place.n_points])
+            parts = [
+                (first, numbers[a:b])
+                for first, a, b in zip(starts, ends[:-1], ends[1:], strict=True)
+            ]
+            numbers, points = _points_of(
+                source, place, numbers, map(_told(progress, 0.6, 1.0, len(parts)), do(parts))
+            )
     return Mesh(
         points,
         _renumbered(cells, numbers),
@@ -66,70 +88,157 @@ def read_skin(path: Path, zone: int | None, progress: Tick = lambda _: None) -> 
     )
 
 
-def _cells_at(
-    source: Source, place: ZonePlace, on: np.ndarray, tick: Tick
-) -> tuple[Cells, IntArray]:
-    """Return the cells that may have a side on the boundary ``on`` (n,) bool, and their numbers."""
-    kept: list[tuple[Cells, IntArray]] = []
+def _told(tick: Tick, begin: float, end: float, count: int) -> Callable[[Any], Any]:
+    """Return what passes on each of ``count`` things, and tells that it came."""
+    done = 0
+
+    def passed(thing: Any) -> Any:
+        nonlocal done
+        done += 1
+        tick(begin + (end - begin) * done / count)
+        return thing
+
+    return passed
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """The cells of a block, from the ``first`` on, that may have a side on the boundary.
+
+    ``types`` (k,), ``nodes`` and ``ids`` (k,) are theirs; ``every`` has the numbers of all cells.
+    """
+
+    first: int
+    types: NDArray[np.uint8]
+    nodes: IntArray
+    ids: IntArray
+    every: Index
+
+
+@contextmanager
+def _cells_near(
+    path: Path, zone: int | None, boundary: IntArray
+) -> Iterator[Callable[[int], _Near]]:
+    """Return what reads the cells at a boundary (nodes, (k,)), a block at a time."""
+    with path.open("rb") as file:
+        source = Source(path, file)
+        place = chosen_zone(path, find_zones(source), zone)
+        on = np.zeros(place.n_points, bool)
+        on[boundary] = True
+
+        def read(first: int) -> _Near:
+            block = element_block(source, place, place.cells, place.dim, first, BLOCK)
+            cells = Cells.from_types(block.types, block.nodes)
+            _check_block(source, place, block, cells)
+            near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
+            chosen = np.flatnonzero(near >= place.dim)
+            kept = taken(cells, chosen)
+            return _Near(
+                first, kept.types, kept.connectivity, block.ids[chosen], index_of(block.ids)
+            )
+
+        yield read
+
+
+def index_of(ids: IntArray) -> Index:
+    """Return numbers (k,) as a slice where they follow each other: it is short and quick."""
+    first = int(ids[0])
+    if np.array_equal(ids, np.arange(first, first + len(ids))):
+        return slice(first, first + len(ids))
+    return ids
+
+
+def _cells_at(source: Source, place: ZonePlace, found: Iterator[_Near]) -> tuple[Cells, IntArray]:
+    """Return the cells that may have a side on the boundary, and their numbers."""
+    kept: list[_Near] = []
     seen = np.zeros(place.cells.count, bool)
-    for block in element_blocks(source, place, place.cells, place.dim):
-        cells = Cells.from_types(block.types, block.nodes)
-        _check_block(source, place, block, cells, seen)
-        near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
-        chosen = np.flatnonzero(near >= place.dim)
-        kept.append((taken(cells, chosen), block.ids[chosen]))
-        tick((block.first + len(block.types)) / place.cells.count)
+    for near in found:
+        if seen[near.every].any():
+            k = int(np.argmax(seen[near.every]))
+            every = near.every
+            index = every.start + k if isinstance(every, slice) else int(every[k])
+            raise _twice(source, place, near.first + k, index)
+        seen[near.every] = True
+        kept.append(near)
     if not kept:
+        require_used(source, place.cells, 0)
         return Cells.from_blocks([]), np.empty(0, np.int64)
-    types = np.concatenate([cells.types for cells, _ in kept])
-    nodes = np.concatenate([cells.connectivity for cells, _ in kept])
-    ids = np.concatenate([part for _, part in kept])
+    types = np.concatenate([near.types for near in kept])
+    nodes = np.concatenate([near.nodes for near in kept])
+    ids = np.concatenate([near.ids for near in kept])
     order = np.argsort(ids, kind="stable")
     return taken(Cells.from_types(types, nodes), order), ids[order]
 
 
-def _check_block(
-    source: Source, place: ZonePlace, block: Block, cells: Cells, seen: np.ndarray
-) -> None:
-    """Raise where a cell of a block has a node or an index twice; note the indices ``seen``."""
-    fault = first_fault(cells, place.n_points)
-    k = -1 if fault is None else fault[0]
-    message = "" if fault is None else fault[1]
-    inside = block.ids.view(np.uint64) < len(seen)
-    seen_before = np.zeros(len(inside), bool)
-    seen_before[inside] = seen[block.ids[inside]]
+def _check_block(source: Source, place: ZonePlace, block: Block, cells: Cells) -> None:
+    """Raise where a cell of a block has a node twice, or its index is no number or another's."""
+    wrong = block.ids.view(np.uint64) >= place.cells.count
     _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
-    wrong = ~inside | seen_before
     if wrong.any() or (count > 1).any():
         k = int(np.argmax(wrong)) if wrong.any() else int(first[np.argmax(count)])
-        message = (
-            f"its index {int(block.ids[k]) % 2**64} is not below the number of elements, "
-            f"{len(seen)}, or stands twice; write the mesh again"
-        )
-    if k >= 0:
-        at = source.count(place.cells.offsets + (block.first + k) * source.width, "an offset")
-        raise source.error(
-            place.cells.entries + at * source.width, f"element {block.first + k}: {message}"
-        )
-    seen[block.ids] = True
+        raise _twice(source, place, block.first + k, int(block.ids[k]))
+    fault = first_fault(cells, place.n_points)
+    if fault is not None:
+        raise _cell_error(source, place, block.first + fault[0], fault[1])
+
+
+def _twice(source: Source, place: ZonePlace, element: int, index: int) -> MeshError:
+    return _cell_error(
+        source,
+        place,
+        element,
+        f"its index {index % 2**64} is not below the number of elements, {place.cells.count}, or "
+        "stands twice; write the mesh again",
+    )
+
+
+def _cell_error(source: Source, place: ZonePlace, element: int, message: str) -> MeshError:
+    at = source.count(place.cells.offsets + element * source.width, "an offset")
+    return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
+
+
+Outer = dict[tuple[int, str], tuple[int, FloatArray]]
+"""The outermost points: number and place, by axis and side."""
+
+
+@contextmanager
+def _points_near(
+    path: Path, zone: int | None
+) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
+    """Return what reads a block of points: those of some nodes (k,) in it, and the outermost."""
+    with path.open("rb") as file:
+        source = Source(path, file)
+        place = chosen_zone(path, find_zones(source), zone)
+
+        def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
+            first, nodes = task
+            block = point_block(source, place, first, BLOCK)
+            outer: Outer = {}
+            for axis in range(place.dim):
+                low, high = int(block[:, axis].argmin()), int(block[:, axis].argmax())
+                outer[axis, "low"] = first + low, block[low].copy()
+                outer[axis, "high"] = first + high, block[high].copy()
+            return block[nodes - first], outer
+
+        yield read
 
 
 def _points_of(
-    source: Source, place: ZonePlace, numbers: IntArray, tick: Tick
+    source: Source,
+    place: ZonePlace,
+    numbers: IntArray,
+    found: Iterator[tuple[FloatArray, Outer]],
 ) -> tuple[IntArray, FloatArray]:
     """Return the numbers of nodes with the outermost ones among them, and their points (k, d)."""
-    found = np.empty((len(numbers), place.dim))
-    outer: dict[tuple[int, str], tuple[int, FloatArray]] = {}
-    for first, block in point_blocks(source, place):
-        a, b = np.searchsorted(numbers, [first, first + len(block)])
-        found[a:b] = block[numbers[a:b] - first]
-        for axis in range(place.dim):
-            for side, at in (("low", block[:, axis].argmin()), ("high", block[:, axis].argmax())):
-                old = outer.get((axis, side))
-                sign = -1.0 if side == "low" else 1.0
-                if old is None or sign * block[at, axis] > sign * old[1][axis]:
-                    outer[axis, side] = first + int(at), block[at].copy()
-        tick((first + len(block)) / max(place.n_points, 1))
+    blocks: list[FloatArray] = [np.empty((0, place.dim))]
+    outer: Outer = {}
+    for block, ends in found:
+        blocks.append(block)
+        for (axis, side), (node, point) in ends.items():
+            old = outer.get((axis, side))
+            sign = -1.0 if side == "low" else 1.0
+            if old is None or sign * point[axis] > sign * old[1][axis]:
+                outer[axis, side] = node, point
     for (axis, _), (node, point) in outer.items():
         if abs(point[axis]) > LARGEST:
             raise source.error(
@@ -140,9 +249,9 @@ def _points_of(
     more = dict(outer.values())
     extra = np.setdiff1d(np.array(list(more), np.int64), numbers)
     every = np.concatenate([numbers, extra])
-    points = np.concatenate([found, np.array([more[n] for n in extra]).reshape(-1, place.dim)])
+    blocks.append(np.array([more[n] for n in extra]).reshape(-1, place.dim))
     order = np.argsort(every)
-    return every[order], points[order]
+    return every[order], np.concatenate(blocks)[order]
 
 
 def _renumbered(cells: Cells, numbers: IntArray) -> Cells:

@@ -6,18 +6,31 @@ leave the interpreter to others meanwhile. What a part gives must not depend on 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 PART = 16384
 """Rows of a part."""
+_most = [sys.maxsize]
 
 
 def cores() -> int:
-    """Return the number of threads to work with: as many as Numba uses."""
+    """Return the number of threads to work with: as many as Numba uses, unless fewer are left."""
     from numba import get_num_threads
 
-    return int(get_num_threads())
+    return min(int(get_num_threads()), _most[-1])
+
+
+@contextmanager
+def at_most(threads: int) -> Iterator[None]:
+    """Return a context in which `cores` is not above that, for other processes need theirs."""
+    _most.append(threads)
+    try:
+        yield
+    finally:
+        _most.pop()
 
 
 def in_parts(

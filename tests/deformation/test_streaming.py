@@ -15,7 +15,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import rest, streaming
+from slideviz.deformation import output, rest, streaming
 from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
@@ -64,7 +64,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
     found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
     ids = found.inverted_cells(100)
     for chunk in (37, 1000, 1 << 20):
-        monkeypatch.setattr(streaming, "CHUNK", chunk)
+        monkeypatch.setattr(output, "CHUNK", chunk)
         done = stream(case, tmp_path / "out.su2b")
         moved = sv.read(tmp_path / "out.su2b")
         assert np.array_equal(bits(moved.points), bits(steps[-1].mesh.points))
@@ -82,7 +82,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
 
 
 def test_folded_cells_are_followed_through_the_steps(tmp_path, monkeypatch):
-    monkeypatch.setattr(streaming, "CHUNK", 50)
+    monkeypatch.setattr(output, "CHUNK", 50)
     case = made(tmp_path, "square", 25, ("STEPS=3", "SLIDING_MODE=none", "PERIODIC_MODE=none"))
     case = case.change(motions=(sv.Rotate(case.markers_with("moving")[0], 170.0),))
     mesh = sv.read(case.mesh_file)
@@ -98,7 +98,7 @@ def test_folded_cells_are_followed_through_the_steps(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("kind", ["mixed", "prism"])
 def test_cells_in_another_order_and_other_zones_stay(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(streaming, "CHUNK", 40)
+    monkeypatch.setattr(output, "CHUNK", 40)
     mesh = grid((5, 4, 4), kind=kind)
     assert kind == "prism" or len(mesh.cells.by_type) > 1
     path = tmp_path / "mesh.su2b"
@@ -145,11 +145,11 @@ class KilledError(BaseException):
 
 
 def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(streaming, "CHUNK", 60)
+    monkeypatch.setattr(output, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
     out = tmp_path / "out.su2b"
     stream(case, out)
-    whole, move = out.read_bytes(), streaming._Output._move
+    whole, move = out.read_bytes(), output.move
     parts = -(-len(sv.read(case.mesh_file).points) // 60)
     out.write_bytes(b"older")
     for stop in range(parts):
@@ -159,9 +159,9 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
             if len(calls) == stop:
                 raise KilledError
             calls.append(1)
-            move(*arguments)
+            return move(*arguments)
 
-        monkeypatch.setattr(streaming._Output, "_move", stopping)
+        monkeypatch.setattr(output, "move", stopping)
         with pytest.raises(KilledError):
             stream(case, out)
         assert out.read_bytes() == b"older"
@@ -170,9 +170,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
         with pytest.raises(MeshError, match="this is no SU2 binary mesh"):
             sv.read(ours, file_format="su2b")
         counted = []
-        monkeypatch.setattr(
-            streaming._Output, "_move", lambda *a, seen=counted: (seen.append(1), move(*a))[1]
-        )
+        monkeypatch.setattr(output, "move", lambda *a, seen=counted: (seen.append(1), move(*a))[1])
         told: list[str] = []
         stream(case, out, note=told.append, resume=True)
         assert (f"goes on after {stop} of {parts} parts" in told[0]) == (stop > 0)
@@ -183,14 +181,14 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
 
 
 def test_another_case_or_a_changed_mesh_begins_anew(tmp_path, monkeypatch):
-    monkeypatch.setattr(streaming, "CHUNK", 60)
+    monkeypatch.setattr(output, "CHUNK", 60)
     case = made(tmp_path, "square", 25, ("STEPS=2",))
-    out, move = tmp_path / "out.su2b", streaming._Output._move
-    monkeypatch.setattr(streaming._Output, "_move", lambda *a: (_ for _ in ()).throw(KilledError()))
+    out, move = tmp_path / "out.su2b", output.move
+    monkeypatch.setattr(output, "move", lambda *a: (_ for _ in ()).throw(KilledError()))
     with pytest.raises(KilledError):
         stream(case, out)
     names_of(out)[1].write_text("no note")
-    monkeypatch.setattr(streaming._Output, "_move", move)
+    monkeypatch.setattr(output, "move", move)
     other = case.change(steps=1)
     told: list[str] = []
     stream(other, out, note=told.append, resume=True)
@@ -223,12 +221,12 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 import slideviz as sv
-from slideviz.deformation import streaming
-move = streaming._Output._move
+from slideviz.deformation import output, streaming
+move = output.move
 def slow(*a):
     time.sleep(0.05)
-    move(*a)
-streaming._Output._move, streaming.CHUNK = slow, 30
+    return move(*a)
+output.move, output.CHUNK = slow, 30
 streaming.stream(sv.Case.read(sys.argv[1]), Path(sys.argv[2]), resume=sys.argv[3] == "resume")
 """
 
@@ -244,13 +242,13 @@ def test_killing_it_leaves_no_half_mesh(tmp_path):
         process = subprocess.Popen(call, cwd=Path(sv.__file__).parents[1])
         until = time.monotonic() + 100
         while process.poll() is None and time.monotonic() < until:
-            if note.exists() and json.loads(note.read_text())["done"] >= goal:
+            if note.exists() and len(json.loads(note.read_text())["sums"]) >= goal:
                 break
             time.sleep(0.01)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         assert not out.exists()
-        assert json.loads(note.read_text())["done"] >= goal
+        assert len(json.loads(note.read_text())["sums"]) >= goal
     subprocess.run(call, check=True, cwd=Path(sv.__file__).parents[1])
     assert out.read_bytes() == reference.read_bytes()
     assert not list(tmp_path.glob(".*"))
@@ -286,13 +284,13 @@ def test_cells_numbered_both_ways_are_told(tmp_path):
         roles={"x_p": "moving"},
         motions=(sv.Translate("x_p", (0.1, 0.0)),),
     )
-    whole = streaming.CHUNK
-    streaming.CHUNK = 8
+    whole = output.CHUNK
+    output.CHUNK = 8
     try:
         with pytest.raises(MeshError, match=r"numbered the other way round .* without --stream"):
             stream(case, tmp_path / "out.su2b")
     finally:
-        streaming.CHUNK = whole
+        output.CHUNK = whole
     assert not (tmp_path / "out.su2b").exists()
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import mode_of, reason_of
 from slideviz.mesh.io.cleanup import keep, removed_at_stop
 from slideviz.mesh.io.file_checks import require_no_input
+from slideviz.mesh.ranks import ALONE, Alone
 
 HEAD = 8
 """Bytes that are zeros until the end."""
@@ -34,26 +35,32 @@ class Partial:
     ----------
     file : BinaryIO
         Open for reading and writing.
-    done : int
-        How many parts are made, of those that the caller counts.
+    path : Path
+        Its name meanwhile.
+    sums : list of int
+        The checksums of the parts that are made, of those that the caller counts.
     """
 
     file: BinaryIO
-    done: int
-    _path: Path
+    path: Path
+    sums: list[int]
     _note: Path
     _about: str
 
-    def note(self, done: int) -> None:
-        """Keep that so many parts are made, after they are on the disk."""
-        self.file.flush()
+    @property
+    def done(self) -> int:
+        """Return how many parts are made."""
+        return len(self.sums)
+
+    def note(self, sums: Iterable[int]) -> None:
+        """Keep that parts with these checksums are made, after they are on the disk."""
         os.fsync(self.file.fileno())
-        self.done = done
+        self.sums = list(sums)
         fresh = self._note.with_suffix(".new")
-        fresh.write_text(json.dumps({"about": self._about, "done": done}))
+        fresh.write_text(json.dumps({"about": self._about, "sums": self.sums}))
         fresh.replace(self._note)
-        if done:
-            keep(self._path, _kept_words(self._path))
+        if self.sums:
+            keep(self.path, _kept_words(self.path))
 
 
 def names_of(path: Path) -> tuple[Path, Path]:
@@ -71,6 +78,7 @@ def partial_copy(
     resume: bool,
     replaces: Path | None,
     progress: Callable[[float], object],
+    ranks: Alone = ALONE,
 ) -> Iterator[Partial]:
     """Return a copy of ``source`` to be changed; it takes the place of ``path`` at the end.
 
@@ -81,6 +89,8 @@ def partial_copy(
     ----------
     about : str
         What is made of what: another text begins anew.
+    ranks : Alone or Ranks
+        Those that copy.
 
     Raises
     ------
@@ -91,20 +101,20 @@ def partial_copy(
     ours, note = names_of(path)
     try:
         mode = mode_of(Path(os.path.realpath(path)))
-        done = _noted(note, about) if resume else 0
+        sums = _noted(note, about) if resume else []
         with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
             _lock(file, path)
             with removed_at_stop(ours):
                 try:
-                    if done and os.fstat(file.fileno()).st_size == source.stat().st_size:
+                    if sums and os.fstat(file.fileno()).st_size == source.stat().st_size:
                         keep(ours, _kept_words(ours))
                     else:
-                        done = 0
+                        sums = []
                         note.unlink(missing_ok=True)
-                        _copy(file, source, progress)
+                        _copy(file, source, ours, progress, ranks)
                     with source.open("rb") as given:
                         head = given.read(HEAD)
-                    yield Partial(file, done, ours, note, about)
+                    yield Partial(file, ours, sums, note, about)
                     file.seek(0)
                     file.write(head)
                     file.flush()
@@ -125,13 +135,13 @@ def _kept_words(ours: Path) -> str:
     return f"what is done is kept in {ours.name}; go on with --resume"
 
 
-def _noted(note: Path, about: str) -> int:
-    """Return how many parts of the same work a stopped process has made."""
+def _noted(note: Path, about: str) -> list[int]:
+    """Return the checksums of the parts of the same work that a stopped process has made."""
     try:
         kept = json.loads(note.read_text())
-        return int(kept["done"]) if kept["about"] == about else 0
+        return [int(one) for one in kept["sums"]] if kept["about"] == about else []
     except (OSError, ValueError, KeyError, TypeError):
-        return 0
+        return []
 
 
 def _lock(file: BinaryIO, path: Path) -> None:
@@ -147,16 +157,34 @@ def _lock(file: BinaryIO, path: Path) -> None:
         ) from problem
 
 
-def _copy(file: BinaryIO, source: Path, progress: Callable[[float], object]) -> None:
+def _copy(
+    file: BinaryIO, source: Path, ours: Path, progress: Callable[[float], object], ranks: Alone
+) -> None:
     """Copy the source but for its head."""
-    with source.open("rb") as given:
-        size = os.fstat(given.fileno()).st_size
-        os.ftruncate(file.fileno(), 0)
-        os.ftruncate(file.fileno(), size)
-        at = HEAD
-        while at < size:
-            at += _copied(given, file, at, min(_PIECE, size - at))
-            progress(at / size)
+    size = source.stat().st_size
+    os.ftruncate(file.fileno(), 0)
+    os.ftruncate(file.fileno(), size)
+    # Each ends where a page does, which only one rank writes then.
+    ends = [*range(_PIECE, size, _PIECE), size]
+    tasks = list(zip([HEAD, *ends[:-1]], ends, strict=True))
+    with ranks.sharing(_copying, source, ours, ranks.size > 1) as do:
+        for (_, end), _ in zip(tasks, do(tasks), strict=True):
+            progress(end / size)
+
+
+@contextmanager
+def _copying(source: Path, ours: Path, synced: bool) -> Iterator[Callable[[tuple[int, int]], None]]:
+    """Return what copies the bytes of a file from one place to another."""
+    with source.open("rb") as given, ours.open("r+b") as file:
+
+        def copy(task: tuple[int, int]) -> None:
+            at, end = task
+            while at < end:
+                at += _copied(given, file, at, end - at)
+            if synced:
+                os.fsync(file.fileno())
+
+        yield copy
 
 
 def _copied(given: BinaryIO, file: BinaryIO, at: int, count: int) -> int:

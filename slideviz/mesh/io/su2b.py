@@ -135,29 +135,40 @@ def point_blocks(
     MeshError
         A coordinate is not finite, or a point has another index than its place.
     """
-    kind = source.point(place.dim)
     for first in range(0, place.n_points, size):
-        count = min(size, place.n_points - first)
-        at = place.points + first * kind.itemsize
-        block = source.array(at, count, kind, "the points")
-        wrong = block["i"] != np.arange(first, first + count, dtype=np.uint64)
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            raise source.error(
-                at + k * kind.itemsize + 8 * place.dim,
-                f"point {first + k} has the index {block['i'][k]}; points are numbered from 0 in "
-                "the order of the file, so write the mesh again",
-            )
-        points = block["x"].astype(np.float64)
-        bad = ~np.isfinite(points)
-        if bad.any():
-            k, axis = np.argwhere(bad)[0].tolist()
-            raise source.error(
-                at + k * kind.itemsize + 8 * axis,
-                f"point {first + k} has the coordinate {points[k, axis]}, which is not finite; "
-                "correct it or mesh again",
-            )
-        yield first, points
+        yield first, point_block(source, place, first, size)
+
+
+def point_block(source: Source, place: ZonePlace, first: int, size: int) -> FloatArray:
+    """Return the coordinates (k, d) of the points from the ``first`` on, at most ``size``.
+
+    Raises
+    ------
+    MeshError
+        A coordinate is not finite, or a point has another index than its place.
+    """
+    kind = source.point(place.dim)
+    count = min(size, place.n_points - first)
+    at = place.points + first * kind.itemsize
+    block = source.array(at, count, kind, "the points")
+    wrong = block["i"] != np.arange(first, first + count, dtype=np.uint64)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise source.error(
+            at + k * kind.itemsize + 8 * place.dim,
+            f"point {first + k} has the index {block['i'][k]}; points are numbered from 0 in "
+            "the order of the file, so write the mesh again",
+        )
+    points = block["x"].astype(np.float64)
+    bad = ~np.isfinite(points)
+    if bad.any():
+        k, axis = np.argwhere(bad)[0].tolist()
+        raise source.error(
+            at + k * kind.itemsize + 8 * axis,
+            f"point {first + k} has the coordinate {points[k, axis]}, which is not finite; "
+            "correct it or mesh again",
+        )
+    return points
 
 
 def read_elements(

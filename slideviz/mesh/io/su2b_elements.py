@@ -48,32 +48,52 @@ def element_blocks(
     MeshError
         An element is not what it should be; the message has its byte.
     """
-    what, start, width = "the elements", 0, source.width
     for first in range(0, table.count, size):
-        count = min(size, table.count - first)
-        at = table.offsets + first * width
-        offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
-        steps = np.diff(offsets)
-        wrong = (steps <= 0) | (offsets[1:] > table.length) | (offsets[:-1] < start)
-        if wrong.any() or int(offsets[0]) != start:
-            k = 0 if int(offsets[0]) != start else int(np.argmax(wrong)) + 1
-            raise source.error(
-                at + k * width,
-                f"the offset of element {first + k} is {int(offsets[k]) % 2**64}, which must be "
-                f"{'0' if first + k == 0 else 'above the one before it'} and at most "
-                f"{table.length}, the last; the file is damaged, so write the mesh again",
-            )
-        begin = table.entries + start * width
-        numbers = source.array(begin, int(offsets[-1]) - start, source.conn, what)
-        block = _taken_apart(source, table, first, begin, _whole_numbers(numbers), offsets - start)
-        _check_nodes(source, place, block, begin, offsets - start)
-        _check_dim(source, block, dim, begin, offsets - start)
-        start = int(offsets[-1])
-        yield block
-    if start != table.length:
+        yield element_block(source, place, table, dim, first, size)
+    if not table.count:
+        require_used(source, table, 0)
+
+
+def element_block(
+    source: Source, place: ZonePlace, table: Elements, dim: int, first: int, size: int
+) -> Block:
+    """Return the elements of a table from the ``first`` on, at most ``size``.
+
+    Raises
+    ------
+    MeshError
+        An element is not what it should be; the message has its byte.
+    """
+    width, count = source.width, min(size, table.count - first)
+    at = table.offsets + first * width
+    offsets = _whole_numbers(source.array(at, count + 1, source.conn, "the offsets"))
+    start = int(offsets[0]) if first else 0
+    steps = np.diff(offsets)
+    wrong = (steps <= 0) | (offsets[1:] > table.length) | (offsets[:-1] < start)
+    if wrong.any() or int(offsets[0]) != start or start < 0:
+        k = 0 if int(offsets[0]) != start or start < 0 else int(np.argmax(wrong)) + 1
         raise source.error(
-            table.entries + start * width,
-            f"the list of elements has {table.length} numbers, of which the elements use {start}; "
+            at + k * width,
+            f"the offset of element {first + k} is {int(offsets[k]) % 2**64}, which must be "
+            f"{'0' if first + k == 0 else 'above the one before it'} and at most "
+            f"{table.length}, the last; the file is damaged, so write the mesh again",
+        )
+    begin = table.entries + start * width
+    numbers = source.array(begin, int(offsets[-1]) - start, source.conn, "the elements")
+    block = _taken_apart(source, table, first, begin, _whole_numbers(numbers), offsets - start)
+    _check_nodes(source, place, block, begin, offsets - start)
+    _check_dim(source, block, dim, begin, offsets - start)
+    if first + count == table.count:
+        require_used(source, table, int(offsets[-1]))
+    return block
+
+
+def require_used(source: Source, table: Elements, used: int) -> None:
+    """Raise where the elements of a table use ``used`` numbers, and its list has more."""
+    if used != table.length:
+        raise source.error(
+            table.entries + used * source.width,
+            f"the list of elements has {table.length} numbers, of which the elements use {used}; "
             "the file is damaged, so write the mesh again",
         )
 

@@ -1,0 +1,213 @@
+"""The deformed mesh of a streamed run in the making: points are written, and cells measured.
+
+Ranks write the parts of one file, each of them to the disk before it is noted as done. That is
+``pwrite`` and not MPI-IO, whose promise that others see what was written is one of all ranks
+together (``MPI_File_sync``): no rank could vouch for its part alone, as going on after a stop
+needs. Parts are long and next to each other, so there is nothing to gather before writing either.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
+from slideviz.deformation.rest import Rest
+from slideviz.mesh.io.partial import Partial, partial_copy
+from slideviz.mesh.io.su2b import chosen_zone
+from slideviz.mesh.io.su2b_elements import element_block
+from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
+from slideviz.mesh.ranks import Alone
+from slideviz.rbf.problem import Watch
+from slideviz.terms import Metric
+
+CHUNK = 1 << 20
+"""Nodes, or cells, that are in memory at a time."""
+Part = tuple[int, int]
+"""The first of some nodes or cells, and the one after the last."""
+
+
+class Output:
+    """The deformed mesh in the making, and the quality of its cells.
+
+    Attributes
+    ----------
+    files : PointFiles
+        The points before and after.
+    """
+
+    def __init__(
+        self,
+        stack: ExitStack,
+        case: Case,
+        output: Path,
+        watch: Watch,
+        ranks: Alone,
+        about: str,
+        *,
+        resume: bool,
+        replaces: Path | None,
+    ) -> None:
+        assert case.mesh_file is not None
+        self._stack, self._case, self._path, self._watch = stack, case, output, watch
+        self._ranks, self._about = ranks, about
+        self._resume, self._replaces = resume, replaces
+        self._mesh_file = case.mesh_file
+        source = Source(case.mesh_file, stack.enter_context(case.mesh_file.open("rb")))
+        self._place = chosen_zone(case.mesh_file, find_zones(source), case.zone)
+        self.files = PointFiles(source, source, self._place)
+        self._partial: Partial | None = None
+        self._rating: Rating | None = None
+
+    def _opened(self) -> Partial:
+        """Return the copy that is changed; it is made when it is needed first."""
+        if self._partial is None:
+            with self._watch.phase("write") as tick:
+                self._partial = self._stack.enter_context(
+                    partial_copy(
+                        self._path,
+                        self._mesh_file,
+                        f"{self._about} {CHUNK}",
+                        resume=self._resume,
+                        replaces=self._replaces,
+                        progress=tick,
+                        ranks=self._ranks,
+                    )
+                )
+                self._check(self._partial, tick)
+            after = self.files.before.of(self._partial.file)
+            self.files = PointFiles(self.files.before, after, self._place)
+        return self._partial
+
+    def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
+        """Forget the parts from the first one on that is not as it was written."""
+        done = parts(self._place.n_points)[: partial.done]
+        given = self._mesh_file, self._case.zone, partial.path
+        with self._ranks.sharing(checking, *given) as do:
+            for k, found in enumerate(do(done)):
+                if found != partial.sums[k]:
+                    partial.note(partial.sums[:k])
+                    break
+                tick((k + 1) / len(done))
+
+    def found(self) -> str:
+        """Return in words what a stopped run has left to go on with."""
+        done, total = self._opened().done, -(-self._place.n_points // CHUNK)
+        if done:
+            return f"{self._path.name}: goes on after {done} of {total} parts"
+        return (
+            f"{self._path.name}: there is nothing to go on with, of this case, mesh and version; "
+            "it is made from the beginning"
+        )
+
+    def displace(self, rest: Rest, *, final: bool) -> None:
+        """Write all points after the last step; parts that a stopped run has made are left out.
+
+        Points that are not ``final`` are those of a trial, and none to go on with.
+        """
+        partial, total = self._opened(), self._place.n_points
+        if not final and partial.done:
+            partial.note([])
+        # What others write must be seen by all, and no page be written that has old bytes of it.
+        synced = final or self._ranks.size > 1
+        given = self._mesh_file, self._case.zone, partial.path, rest.bare(), synced
+        with self._watch.phase("evaluate") as tick, self._ranks.sharing(moving, *given) as do:
+            todo = parts(total, partial.done)
+            for (_, end), checksum in zip(todo, do(todo), strict=True):
+                if final:
+                    partial.note([*partial.sums, checksum])
+                tick(end / total)
+
+    def rating(self, listed: int) -> Rating:
+        """Return the quality of all cells; of inverted ones ``listed`` are kept."""
+        partial, count = self._opened(), self._place.cells.count
+        metric = self._case.quality_metric
+        if self._rating is None:
+            self._rating = Rating(self._stack, self._path.parent, count, metric)
+        self._rating.inverted.clear()
+        given = self._mesh_file, self._case.zone, partial.path, metric, listed
+        with self._watch.phase("quality") as tick, self._ranks.sharing(measuring, *given) as do:
+            for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
+                self._rating.add(found, listed)
+                tick(end / count)
+        return self._rating
+
+
+def parts(count: int, done: int = 0) -> list[Part]:
+    """Return the parts of so many nodes or cells, without the first that are done."""
+    return [(first, min(first + CHUNK, count)) for first in range(done * CHUNK, count, CHUNK)]
+
+
+@contextmanager
+def moving(
+    path: Path, zone: int | None, partial: Path, rest: Rest, synced: bool
+) -> Iterator[Callable[[Part], int]]:
+    """Return what writes the points of a part, and returns the checksum of its bytes."""
+    with path.open("rb") as file:
+        source, place = _zone(path, file, zone)
+        out = os.open(partial, os.O_WRONLY | (os.O_DSYNC if synced else 0))
+        try:
+            yield lambda part: move(source, place, rest, out, part)
+        finally:
+            os.close(out)
+
+
+def move(source: Source, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
+    """Write the points of a part to an open file, and return the checksum of its bytes."""
+    kind = source.point(place.dim)
+    at = place.points + part[0] * kind.itemsize
+    rows = source.array(at, part[1] - part[0], kind, "the points")
+    points = rows["x"].astype(np.float64)
+    for now in rest.after_steps(np.arange(*part), points):
+        points = now
+    rows["x"] = points
+    left = rows.view(np.uint8).data
+    found = zlib.crc32(left)
+    while left:
+        written = os.pwrite(out, left, at)
+        at, left = at + written, left[written:]
+    return found
+
+
+@contextmanager
+def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[Part], int]]:
+    """Return what finds the checksum of a part that was written."""
+    with path.open("rb") as file, partial.open("rb") as other:
+        source, place = _zone(path, file, zone)
+        kind, written = source.point(place.dim), source.of(other)
+
+        def check(part: Part) -> int:
+            at = place.points + part[0] * kind.itemsize
+            rows = written.array(at, part[1] - part[0], kind, "the points")
+            return zlib.crc32(rows.view(np.uint8).data)
+
+        yield check
+
+
+@contextmanager
+def measuring(
+    path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
+) -> Iterator[Callable[[Part], Measured]]:
+    """Return what measures the cells of a part."""
+    with path.open("rb") as file, partial.open("rb") as other:
+        source, place = _zone(path, file, zone)
+        files = PointFiles(source, source.of(other), place)
+
+        def measure(part: Part) -> Measured:
+            size = part[1] - part[0]
+            block = element_block(source, place, place.cells, place.dim, part[0], size)
+            return measured(block, *files.cells_of(block), metric, listed)
+
+        yield measure
+
+
+def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[Source, ZonePlace]:
+    source = Source(path, file)
+    return source, chosen_zone(path, find_zones(source), zone)

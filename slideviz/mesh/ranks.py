@@ -1,0 +1,264 @@
+"""Ranks: processes, also of several machines, that share the work on the parts of large files.
+
+Rank 0 is the program; it alone decides, prints and names files. Where it works part by part, all
+ranks open the files and take the next part whenever they are free. What they find comes back in
+the order of the parts, so that nothing depends on how many there are: one alone runs the same
+code. Between such work the others wait, without taking time of a processor.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from slideviz.errors import MeshError, SlidevizError
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm, Intracomm
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+Make = Callable[..., AbstractContextManager[Callable[[Task], Result]]]
+Do = Callable[[Sequence[Task]], Iterator[Result]]
+
+AHEAD = 4
+"""Parts for each rank whose results may wait for one before them."""
+PIECE = 1 << 30
+"""Bytes of one message: MPI counts them in 32 bits."""
+
+
+class Alone:
+    """One process, which does all parts by itself."""
+
+    size = 1
+
+    @contextmanager
+    def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
+        """Return what does tasks, and yields their results in order.
+
+        Parameters
+        ----------
+        make : callable
+            A function of a module, called with ``given`` by each rank: a context with what does
+            one task. It opens files itself; ``given``, tasks and results go from rank to rank.
+        """
+        with make(*given) as work:
+            yield lambda tasks: map(work, tasks)
+
+
+ALONE = Alone()
+
+
+@dataclass(eq=False)
+class Ranks(Alone):
+    """Processes that MPI connects; ``with`` it, rank 0 works and lets the others go at the end.
+
+    Attributes
+    ----------
+    comm : Intracomm
+        Of slideviz alone.
+    threads : int
+        Of each rank, while all work: the cores of its machine, divided by the ranks there.
+    """
+
+    comm: Intracomm
+    threads: int
+    _owing: set[int] = field(default_factory=set)
+
+    @classmethod
+    def joined(cls, launched: int) -> Ranks:
+        """Return the processes that were launched, this one of them.
+
+        Raises
+        ------
+        SlidevizError
+            They are not connected: no mpi4py, or one of another MPI than the launcher.
+        """
+        how = "is needed for several processes; install it with `pip install 'slideviz[mpi]'`"
+        try:
+            from mpi4py import MPI
+        except ImportError as problem:
+            raise SlidevizError(
+                f"mpi4py {how}, and MPI, or start one process (cannot be loaded: {problem})"
+            ) from problem
+        except RuntimeError as problem:
+            raise SlidevizError(
+                f"the MPI library cannot be loaded, which {how.partition(';')[0]}; install it "
+                f"(Debian: openmpi-bin): {problem}"
+            ) from problem
+        comm = MPI.COMM_WORLD.Dup()
+        if comm.size != launched:
+            library = MPI.Get_library_version().partition(",")[0].strip("\0 \n")
+            raise SlidevizError(
+                f"{launched} processes were started, but mpi4py, with {library}, sees {comm.size}; "
+                "start them with the mpirun of that MPI, or build mpi4py for yours"
+            )
+        return cls(comm, _threads_of(comm.Split_type(MPI.COMM_TYPE_SHARED)))
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """Return the number of processes."""
+        return int(self.comm.size)
+
+    @property
+    def rank(self) -> int:
+        """Return the number of this one, from 0."""
+        return int(self.comm.rank)
+
+    def __enter__(self) -> Ranks:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._tell(None)
+
+    @contextmanager
+    def sharing(self, make: Make[Task, Result], *given: Any) -> Iterator[Do[Task, Result]]:
+        """Return what does tasks on all ranks, and yields their results in order; of rank 0."""
+        content = pickle.dumps((make, given), 5)
+        self._tell(True)
+        self._spread(content)
+        try:
+            with (
+                limited(self.threads) as limit,
+                make(*given) as work,
+                # The other threads of this one wait for messages, which must not wait for it.
+                ThreadPoolExecutor(1, "slideviz-rank", limit) as pool,
+            ):
+                yield lambda tasks: self._results(pool, work, tasks)
+        finally:
+            while self._owing:
+                self._received(0.001)
+            self._tell(None)
+
+    def serve(self) -> None:
+        """Do what rank 0 asks for, until it lets this rank go."""
+        with limited(self.threads) as limit:
+            limit()
+            while self._received(0.01)[1] is not None:
+                make, given = pickle.loads(self._spread(b""))
+                with ExitStack() as stack:
+                    self._serve(stack, make, given)
+
+    def _serve(self, stack: ExitStack, make: Make[Any, Any], given: tuple[Any, ...]) -> None:
+        fault, work = None, None
+        try:
+            work = stack.enter_context(make(*given))
+        except Exception as problem:
+            fault = self._portable(problem)
+        while (order := self._received(0.001)[1]) is not None:
+            index, task = order
+            found = None
+            if work is not None:
+                try:
+                    fault, found = None, work(task)
+                except Exception as problem:
+                    fault = self._portable(problem)
+            self.comm.send((index, found, fault), 0)
+
+    def _results(
+        self, pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task]
+    ) -> Iterator[Result]:
+        idle = list(range(1, self.size))
+        own: Future[None] | None = None
+        found: dict[int, tuple[Any, BaseException | None]] = {}
+        given = done = 0
+
+        def do(index: int) -> None:
+            try:
+                found[index] = work(tasks[index]), None
+            except BaseException as problem:
+                found[index] = None, problem
+
+        while done < len(tasks):
+            while given < min(len(tasks), done + AHEAD * self.size) and (idle or own is None):
+                if own is None:
+                    own = pool.submit(do, given)
+                else:
+                    rank = idle.pop()
+                    self._owing.add(rank)
+                    self.comm.send((given, tasks[given]), rank)
+                given += 1
+            rank, answer = self._received(0.001, own)
+            if own is not None and own.done():
+                own = None
+            if answer is not None:
+                idle.append(rank)
+                found[answer[0]] = answer[1:]
+            while done in found:
+                result, fault = found.pop(done)
+                if fault is not None:
+                    raise fault
+                done += 1
+                yield result
+
+    def _received(self, pause: float, other: Future[None] | None = None) -> tuple[int, Any]:
+        """Return who sent a message and what, or nothing when ``other`` is done before.
+
+        MPI itself would wait in a loop that takes a core.
+        """
+        from mpi4py import MPI
+
+        status, wait = MPI.Status(), 1e-5
+        while not self.comm.iprobe(status=status):
+            if other is not None and other.done():
+                return 0, None
+            time.sleep(wait)
+            wait = min(2 * wait, pause)
+        self._owing.discard(status.source)
+        return status.source, self.comm.recv(source=status.source)
+
+    def _tell(self, what: object) -> None:
+        for rank in range(1, self.size):
+            self.comm.send(what, rank)
+
+    def _spread(self, content: bytes) -> bytearray:
+        """Return what rank 0 gives, on all ranks."""
+        size = self.comm.bcast(len(content))
+        whole = bytearray(content) if content else bytearray(size)
+        for at in range(0, size, PIECE):
+            self.comm.Bcast(memoryview(whole)[at : at + PIECE])
+        return whole
+
+    def _portable(self, problem: Exception) -> Exception:
+        """Return an error that rank 0 can raise."""
+        if isinstance(problem, FileNotFoundError):
+            return MeshError(
+                f"{problem.filename}: not there for rank {self.rank} on {os.uname().nodename}; "
+                "have mesh and results in a folder that all machines see by the same name"
+            )
+        try:
+            pickle.loads(pickle.dumps(problem))
+        except Exception:
+            return RuntimeError(f"{type(problem).__name__}: {problem}")
+        return problem
+
+
+def _threads_of(near: Comm) -> int:
+    """Return the threads for each of the ranks ``near``, those of one machine.
+
+    All may use all its cores then: a launcher binds each to some, but rank 0 needs them where it
+    works alone.
+    """
+    if not hasattr(os, "sched_setaffinity"):  # no Linux
+        return max(1, (os.cpu_count() or 1) // near.size)
+    every = set().union(*near.allgather(os.sched_getaffinity(0)))
+    os.sched_setaffinity(0, every)
+    return max(1, len(every) // near.size)
+
+
+@contextmanager
+def limited(threads: int) -> Iterator[Callable[[], None]]:
+    """Return what limits the thread that calls it, in a context where all keep to fewer threads."""
+    from numba import config, set_num_threads
+    from threadpoolctl import threadpool_limits
+
+    from slideviz.mesh.threads import at_most
+
+    with threadpool_limits(threads, user_api="blas"), at_most(threads):
+        yield lambda: set_num_threads(min(threads, config.NUMBA_NUM_THREADS))
