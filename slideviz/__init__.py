@@ -11,7 +11,17 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+    from slideviz.case.model import (
+        Case,
+        Ffd,
+        FromFile,
+        Prescribed,
+        Radial,
+        Reduction,
+        Rotate,
+        Scale,
+        Translate,
+    )
     from slideviz.deformation.solver import Step, deform
     from slideviz.errors import SlidevizError
     from slideviz.mesh.io.convert import convert
@@ -23,9 +33,11 @@ if TYPE_CHECKING:
 _HOME = {
     "Case": "case.model",
     "Cells": "mesh.model",
+    "Ffd": "case.model",
     "FromFile": "case.model",
     "Marker": "mesh.model",
     "Mesh": "mesh.model",
+    "Prescribed": "case.model",
     "Quality": "mesh.quality",
     "QualityDerivative": "mesh.quality_derivative",
     "Radial": "case.model",
@@ -45,9 +57,11 @@ _HOME = {
 __all__ = [
     "Case",
     "Cells",
+    "Ffd",
     "FromFile",
     "Marker",
     "Mesh",
+    "Prescribed",
     "Quality",
     "QualityDerivative",
     "Radial",

@@ -123,14 +123,22 @@ NODE_TYPES: dict[NodeType, Term] = {
 }
 """What boundary nodes may do; the colours of the roles, and two more that differ from them."""
 
-MotionKind = Literal["translate", "rotate", "scale", "radial", "file"]
+MotionKind = Literal["translate", "rotate", "scale", "radial", "ffd", "file"]
 MOTION_KINDS: dict[MotionKind, Term] = {
     "translate": Term("translate"),
     "rotate": Term("rotate"),
     "scale": Term("scale"),
     "radial": Term("push radially"),
+    "ffd": Term("free-form box"),
     "file": Term("displacement file"),
 }
+
+FfdBlending = Literal["BEZIER", "BSPLINE_UNIFORM"]
+FFD_BLENDINGS: dict[FfdBlending, Term] = {
+    "BEZIER": Term("Bézier"),
+    "BSPLINE_UNIFORM": Term("uniform B-spline"),
+}
+"""How the control points of a box for free-form deformation move what is inside."""
 
 # Method ------------------------------------------------------------------------------------
 

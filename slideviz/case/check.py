@@ -5,9 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from slideviz.case.boxes import ffd_problems
+from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
 from slideviz.case.keys import KEYS
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Translate, moves, named
+from slideviz.case.model import (
+    Ffd,
+    FromFile,
+    Motion,
+    Prescribed,
+    Radial,
+    Rotate,
+    Translate,
+    moves,
+    named,
+)
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.case.reduction_keys import no_tolerance
 from slideviz.case.words import nearest
@@ -85,7 +97,7 @@ def contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
             f"{case.direction}); write theta, or PERIODIC_TYPE= translational"
         )
         found.append((("PERIODIC_DIRECTION", "PERIODIC_TYPE"), sentence))
-    return found
+    return found + ffd_contradictions(case)
 
 
 def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
@@ -113,17 +125,25 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
         if not any(moves(motion, marker) for motion in case.motions)
     ]
     for place, motion in enumerate(case.motions, start=1):
-        found += [f"motion {place}: {text}" for text in _motion_problems(motion, mesh.dim)]
+        problems = [*_motion_problems(motion, mesh.dim)]
+        if isinstance(motion, Ffd) and not problems:
+            problems += ffd_problems(case, mesh, motion)
+        found += [f"motion {place}: {text}" for text in problems]
     return tuple(found)
 
 
 def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
-    if isinstance(motion, FromFile):
+    if isinstance(motion, FromFile | Prescribed):
+        return
+    if isinstance(motion, Ffd) and not motion.box:
+        yield "it names no FFD box; choose one of the mesh, or define one with FFD_DEFINITION"
         return
     try:
         read_motions(write_motions((motion,)))
     except CaseError as problem:
         yield str(problem).removeprefix("motion 1: ")
+        return
+    if isinstance(motion, Ffd):
         return
     needed = f"the mesh has {dim} dimensions"
     if isinstance(motion, Translate):

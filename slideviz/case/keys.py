@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from slideviz.case.ffd_keys import FFD_ROWS
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, QUALITY, Key, role, setting
 from slideviz.case.method_keys import METHOD_ROWS
 from slideviz.case.model import Case, FromFile, Motion
@@ -108,6 +109,7 @@ _ROWS = (
         get_motions,
         label="Motion",
     ),
+    *FFD_ROWS,
     *PERIODIC_ROWS,
     *METHOD_ROWS,
     *REDUCTION_ROWS,

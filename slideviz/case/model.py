@@ -7,7 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from slideviz.terms import (
+    FfdBlending,
     FileFormat,
     LevelCriterion,
     Method,
@@ -81,7 +85,34 @@ class FromFile:
     marker: Target = ""
 
 
-Motion = Translate | Rotate | Scale | Radial | FromFile
+@dataclass(frozen=True)
+class Ffd:
+    """Move control points of a box for free-form deformation, and with them what is inside.
+
+    ``box`` is one of the mesh's or of ``Case.ffd_boxes``, ``index`` the control point (i, j, k),
+    where -1 is all of that direction, ``vector`` its shift (dx, dy, dz), with dz 0 in 2D. What a
+    node takes of it depends on where it was in the undeformed box, whatever other motions do.
+    """
+
+    marker: Target
+    box: str
+    index: tuple[int, int, int]
+    vector: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """Displace nodes (k,) by vectors (k, d), which a program gives; no case file can hold it.
+
+    Nodes are sorted, each once; nodes of the markers that are not among them stay.
+    """
+
+    nodes: NDArray[np.int64]
+    vectors: NDArray[np.float64]
+    marker: Target = ""
+
+
+Motion = Translate | Rotate | Scale | Radial | Ffd | FromFile | Prescribed
 
 
 def named(target: Target) -> tuple[str, ...]:
@@ -149,6 +180,9 @@ class Case:
     many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
     boundary nodes are control nodes, however many, ``idw_power`` where it is the number of
     dimensions. ``view`` has how a window showed the case, by key: it changes no result.
+    ``ffd_boxes`` are boxes for free-form deformation that the mesh does not have: their names and
+    8 corners (24 numbers; in 2D the first 4 count), ``ffd_degrees`` their degrees, ``ffd_orders``
+    the orders of B-splines.
 
     Examples
     --------
@@ -172,6 +206,10 @@ class Case:
     zone: int | None = None
     roles: Mapping[str, Role] = field(default_factory=dict)
     motions: tuple[Motion, ...] = ()
+    ffd_boxes: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    ffd_degrees: tuple[tuple[int, int, int], ...] = ()
+    ffd_blending: FfdBlending = "BEZIER"
+    ffd_orders: tuple[int, int, int] = (2, 2, 2)
     method: Method = "rbf"
     sliding: Sliding = "none"
     periodic: PeriodicMode = "none"

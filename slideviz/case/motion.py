@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,19 +20,20 @@ from slideviz.case.check import (
     raise_all,
     require_valid,
 )
-from slideviz.case.displacement import Displacements, read_displacements
+from slideviz.case.displacement import Displacements
+from slideviz.case.given import Given, key_of, read_files
 from slideviz.case.model import (
     Case,
+    Ffd,
     FromFile,
     Motion,
     Point,
+    Prescribed,
     Radial,
     Rotate,
     Scale,
-    Target,
     Translate,
     moves,
-    named,
 )
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
@@ -58,8 +58,6 @@ ALIKE = 1e-6
 
 ROUNDING = 1e-13
 """What displacements may be off, as a part of the largest coordinate."""
-
-Files = Mapping[tuple[Path, Target], Displacements]
 
 
 def displacements(case: Case, mesh: Mesh) -> Displacements:
@@ -96,7 +94,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
 
 
 def moved_together(
-    motions: Iterable[Motion], points: FloatArray, on: Mapping[str, IntArray], files: Files
+    motions: Iterable[Motion], points: FloatArray, on: Mapping[str, IntArray], files: Given
 ) -> dict[str, FloatArray]:
     """Return the displacement (k, d) of the nodes of each marker, by motions in sequence.
 
@@ -140,7 +138,7 @@ def moved_points(
     motions: Iterable[Motion],
     points: FloatArray,
     nodes: IntArray | None = None,
-    files: Files | None = None,
+    files: Given | None = None,
 ) -> FloatArray:
     """Return where the points of one marker go: (k, d). Parameters as of `displacement_of`."""
     return points + displacement_of(motions, points, nodes, files)
@@ -150,7 +148,7 @@ def displacement_of(
     motions: Iterable[Motion],
     points: FloatArray,
     nodes: IntArray | None = None,
-    files: Files | None = None,
+    files: Given | None = None,
 ) -> FloatArray:
     """Return the displacement of the points of one marker, (k, d), by motions in sequence.
 
@@ -172,53 +170,26 @@ def displacement_of(
 
 
 def _change(
-    motion: Motion, points: FloatArray, nodes: IntArray | None, files: Files | None
+    motion: Motion, points: FloatArray, nodes: IntArray | None, files: Given | None
 ) -> FloatArray:
     """Return by how much a motion displaces the points of a marker from where they are, (k, d)."""
-    if not isinstance(motion, FromFile):
+    if isinstance(motion, Prescribed):
+        return _prescribed(motion, points, nodes)
+    if not isinstance(motion, FromFile | Ffd):
         return _increment(motion, points)
-    if not files or nodes is None or (motion.path, motion.marker) not in files:
+    key = key_of(motion)
+    if not files or nodes is None or key not in files:
         return np.zeros_like(points)
-    return files[motion.path, motion.marker].at(nodes)
+    return files[key].at(nodes)
 
 
-def read_files(case: Case, mesh: Mesh) -> dict[tuple[Path, Target], Displacements]:
-    """Return the displacement files of the case by path and target, for `displacement_of`.
-
-    Raises
-    ------
-    CaseError
-        Some cannot be read or have mistakes: those of all files at once.
-    """
-    on = {
-        name: mesh.marker(name).nodes
-        for name in case.markers_with("moving")
-        if name in mesh.marker_names
-    }
-    files: dict[tuple[Path, Target], Displacements] = {}
-    problems: list[str] = []
-    for motion in case.motions:
-        mine = [nodes for name, nodes in on.items() if moves(motion, name)]
-        if isinstance(motion, FromFile) and (mine or not motion.marker):
-            nodes = np.unique(np.concatenate([*mine, np.empty(0, np.int64)]))
-            names = " or ".join(repr(name) for name in named(motion.marker))
-            of = f"marker {names}" if names else "a moving marker"
-            try:
-                read = _read_file(motion.path, mesh, nodes, of)
-            except CaseError as problem:
-                problems.append(str(problem))
-            else:
-                files[motion.path, motion.marker] = read
-    raise_all(tuple(problems))
-    return files
-
-
-def _read_file(path: Path, mesh: Mesh, nodes: IntArray, of: str) -> Displacements:
-    """Return the displacements of nodes, which a file calls by their numbers in the whole mesh."""
-    if mesh.part is None:
-        return read_displacements(path, nodes, mesh.points.shape, of)
-    whole = mesh.part.n_points, mesh.dim
-    return replace(read_displacements(path, mesh.part.points[nodes], whole, of), nodes=nodes)
+def _prescribed(motion: Prescribed, points: FloatArray, nodes: IntArray | None) -> FloatArray:
+    """Return the displacement of nodes (k,), zero for those that are not given."""
+    out = np.zeros_like(points)
+    if nodes is not None:
+        _, here, given = np.intersect1d(nodes, motion.nodes, return_indices=True)
+        out[here] = motion.vectors[given]
+    return out
 
 
 def _increment(motion: Translate | Rotate | Scale | Radial, points: FloatArray) -> FloatArray:

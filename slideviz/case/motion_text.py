@@ -8,9 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from slideviz.case.model import (
+    Ffd,
     FromFile,
     Motion,
     Point,
+    Prescribed,
     Radial,
     Rotate,
     Scale,
@@ -96,6 +98,8 @@ def _read_motion(group: list[Word]) -> Motion:
         raise CaseError(f"{shown(word)} is not one of {', '.join(VERBS)}{hint}")
     if verb == "file":
         return _read_file(marker, rest)
+    if verb == "ffd":
+        return _read_ffd(marker, rest)
     if verb == "translate":
         return Translate(marker, read_vector(_flat(rest), "the shift"))
     if verb == "rotate":
@@ -198,8 +202,35 @@ def _read_radial(marker: Target, rest: list[Word]) -> Radial:
     return Radial(marker, factor, distance, axis, read_vector(place, "the point"))
 
 
+def _read_ffd(marker: Target, rest: list[Word]) -> Ffd:
+    items = _flat(rest)
+    name = items[0].text if items else ""
+    if len(items) not in (5, 7) or not name:
+        raise CaseError(
+            "needed are the box, the control point i, j, k (-1 is all of a direction) and its "
+            "shift: ffd, BOX, 2, 1, 0, dx, dy, dz; in 2D ffd, BOX, 2, 1, dx, dy will do"
+        )
+    count = (len(items) - 1) // 2
+    at = [number(word.text) for word in items[1 : 1 + count]]
+    if any(value != int(value) or value < -1 for value in at):
+        text = ", ".join(word.text for word in items[1 : 1 + count])
+        raise CaseError(f"the control point ({text}) is none; needed are whole numbers from -1")
+    i, j, k = (*(int(value) for value in at), -1)[:3]
+    dx, dy, dz = (*(number(word.text) for word in items[1 + count :]), 0.0)[:3]
+    return Ffd(marker, name, (i, j, k), (dx, dy, dz))
+
+
 def _motion_text(motion: Motion) -> str:
+    if isinstance(motion, Prescribed):
+        raise CaseError(
+            "displacements that a program gave cannot be written to a case file; write them to a "
+            "displacement file"
+        )
     head = _target_text(motion.marker)
+    if isinstance(motion, Ffd):
+        i, j, k = motion.index
+        at = f"{name_text(motion.box)}, {i}, {j}, {k}"
+        return f"({head}, ffd, {at}, {_numbers(motion.vector)})"
     if isinstance(motion, FromFile):
         path = path_text(motion.path)
         # Commas and spaces separate here, unlike in a value that is a path only.
@@ -244,6 +275,7 @@ GRAMMAR = (
     "(BLADE, scale, FACTORS, centroid)             FACTORS: one, or one for each axis",
     "(BLADE, scale, FACTORS, (px, py[, pz]))",
     "(HUB, radial, FACTOR, dr, AXIS, (px, py, pz))  radius r becomes FACTOR r + dr; 2D: no AXIS",
+    "(BLADE, ffd, BOX, i, j, k, dx, dy, dz)        control point of a box; -1: all of an index",
     "(BLADE, file, path)                           node, dx, dy[, dz] in each line",
     "(*, VERB, ...)                                all moving boundaries, as one body",
     "((BLADE, TIP), VERB, ...)                     several boundaries, as one body",

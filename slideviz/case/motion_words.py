@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 from slideviz.case.model import (
     Case,
+    Ffd,
     FromFile,
     Motion,
     Point,
+    Prescribed,
     Radial,
     Rotate,
     Scale,
@@ -61,6 +63,10 @@ def _in_full(motion: Motion, dim: int, extent: float) -> str:
         return f"scale by {_factors(motion.factors)} about {about}"
     if isinstance(motion, Radial):
         return f"push radially by {_push(motion)}"
+    if isinstance(motion, Ffd):
+        return f"move {_control(motion)} by {vector_words(motion.vector[:dim])}"
+    if isinstance(motion, Prescribed):
+        return f"displace {len(motion.nodes):,} nodes as given"
     return f"displace as in {motion.path.name or '(no file yet)'}"
 
 
@@ -111,6 +117,10 @@ def _briefly(motion: Motion) -> str:
         return f"scale {_factors(motion.factors[:1] if same else motion.factors)}"
     if isinstance(motion, Radial):
         return f"radially {_push(motion)}"
+    if isinstance(motion, Ffd):
+        return f"{_control(motion)} {vector_words(motion.vector)}"
+    if isinstance(motion, Prescribed):
+        return f"{len(motion.nodes):,} nodes as given"
     return motion.path.name or "(no file yet)"
 
 
@@ -118,6 +128,10 @@ def _exactly(motion: Motion) -> str:
     """Return all that a motion says, with every digit."""
     if isinstance(motion, FromFile):
         return str(motion.path)
+    if isinstance(motion, Ffd):
+        return f"{_control(motion)} {vector_words(motion.vector, '.15g')}"
+    if isinstance(motion, Prescribed):
+        return _briefly(motion)
     if isinstance(motion, Translate):
         return f"translate {vector_words(motion.vector, '.15g')}"
     if isinstance(motion, Scale):
@@ -162,6 +176,12 @@ def _push(motion: Radial) -> str:
     parts = [f"{100.0 * (motion.factor - 1.0):+.4g} %"] if motion.factor != 1.0 else []
     parts += [f"{motion.distance:+.4g}"] if motion.distance or not parts else []
     return " and ".join(parts)
+
+
+def _control(motion: Ffd) -> str:
+    """Return the control points that a motion moves, in words."""
+    at = ", ".join("all" if index < 0 else str(index) for index in motion.index)
+    return f"({at}) of {motion.box or '(no box yet)'}"
 
 
 def _place(point: Point, extent: float = 0.0, form: str = ".4g", its: str = "its") -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from slideviz.case.displacement import Displacements
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, FromFile, Prescribed
 from slideviz.case.motion import ROUNDING, displacements, same
 from slideviz.deformation.classes import find_classes
 from slideviz.deformation.intersection import intersection_message, jump_message
@@ -59,7 +59,7 @@ def alikeness(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
 
     Motions displace images alike but for what these are apart; files have few digits.
     """
-    if any(isinstance(motion, FromFile) for motion in case.motions):
+    if any(isinstance(motion, FromFile | Prescribed) for motion in case.motions):
         return TOLERANCE
     mismatch = max((pair.mismatch for pair in pairs), default=0.0)
     return min(TOLERANCE, APART * mismatch / mesh.extent)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from slideviz.case.boxes import boxes_for, ffd_displacements
 from slideviz.case.displacement import Displacements, read_displacements
+from slideviz.case.given import key_of
 from slideviz.case.model import Case, FromFile, Target, moves
 from slideviz.case.motion import moved_together
 from slideviz.case.motion_words import direction_words
@@ -73,6 +76,16 @@ def machine_axis(session: Session) -> Axis | None:
     return None
 
 
+def box_names(session: Session) -> tuple[str, ...]:
+    """Return the boxes for free-form deformation that motions can use."""
+    if session.mesh is None:
+        return ()
+    try:
+        return tuple(boxes_for(session.case, session.mesh))
+    except SlidevizError:  # told by the checks of a motion that uses one
+        return ()
+
+
 class Ghosts:
     """The moved boundaries of one mesh; displacement files are read once and when changed."""
 
@@ -84,17 +97,20 @@ class Ghosts:
     def moved(self, case: Case) -> dict[str, FloatArray]:
         """Return the points (u, d) of the nodes of each boundary that moves.
 
-        A displacement file that cannot be read moves nothing here; the run will say why.
+        A displacement file that cannot be read, or a box that is not there, moves nothing here;
+        the run will say why.
         """
         on = {
             name: self._nodes[name]
             for name in case.markers_with("moving")
             if name in self._nodes and any(moves(motion, name) for motion in case.motions)
         }
-        files: dict[tuple[Path, Target], Displacements] = {}
+        files: dict[object, Displacements] = {}
         for motion in case.motions:
             if isinstance(motion, FromFile) and (read := self._read(motion, on)) is not None:
-                files[motion.path, motion.marker] = read
+                files[key_of(motion)] = read
+        with suppress(SlidevizError):
+            files |= ffd_displacements(case, self.mesh, on)
         points = self.mesh.points
         moved = moved_together(case.motions, points, on, files)
         return {name: points[nodes] + moved[name] for name, nodes in on.items()}

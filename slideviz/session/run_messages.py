@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
+from slideviz.case.model import Case, Ffd, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
 from slideviz.session.state import Place, Run, Session
@@ -139,7 +139,7 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
 
 def moves_nothing(motion: Motion) -> bool:
     """Tell whether a motion leaves its boundary in place; of a file nobody knows."""
-    if isinstance(motion, Translate):
+    if isinstance(motion, Translate | Ffd):
         return not any(motion.vector)
     if isinstance(motion, Rotate):
         return motion.angle_deg == 0

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
-from slideviz.case.motion_text import GRAMMAR, read_motions
+from slideviz.case.model import Ffd, FromFile, Prescribed, Radial, Rotate, Scale, Translate
+from slideviz.case.motion_text import GRAMMAR, read_motions, write_motions
 from slideviz.errors import CaseError
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -39,6 +39,10 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         ("(B, radial, 1, -0.5, (1, 2))", Radial("B", 1.0, -0.5, Z, (1.0, 2.0))),
         ("(B, radial, 1.03, 0, x, (1, 2, 3))", Radial("B", 1.03, 0.0, X, (1.0, 2.0, 3.0))),
         ("(B, radial, 1.1, 0, (1, 0, 0), (1, 2, 3))", Radial("B", 1.1, 0.0, X, (1.0, 2.0, 3.0))),
+        ("(B, ffd, BOX, 2, 1, 0, 0, 0.1, 0)", Ffd("B", "BOX", (2, 1, 0), (0.0, 0.1, 0.0))),
+        ('(*, ffd, "my box", -1, 1, 0, 1, 2, 3)', Ffd("", "my box", (-1, 1, 0), (1.0, 2.0, 3.0))),
+        ("(B, ffd, BOX, 2, 1, 0.5, -1)", Ffd("B", "BOX", (2, 1, -1), (0.5, -1.0, 0.0))),
+        ("(B, ffd, BOX, (2, 1, 0), (0, 1, 0))", Ffd("B", "BOX", (2, 1, 0), (0.0, 1.0, 0.0))),
         ("(B, file, a\\b.txt)", FromFile(Path("a/b.txt"), "B")),
         ('(B, file, "my, (file).txt")', FromFile(Path("my, (file).txt"), "B")),
         ("(*, file, b.txt)", FromFile(Path("b.txt"))),
@@ -75,6 +79,7 @@ def test_examples_of_the_reference_are_read():
     for line in GRAMMAR[:-1]:
         text = line.split("  ")[0]
         for word, value in {
+            "i, j, k, dx, dy, dz": "0, -1, 1, 1, 2, 3",
             "dx, dy[, dz]": "1, 2",
             "degrees": "5",
             "px, py[, pz]": "1, 2",
@@ -98,7 +103,10 @@ def test_examples_of_the_reference_are_read():
         ("(B, translate, 1, 0))", "each motion needs a pair of brackets"),
         ("(B, translate, 1, 0", "a bracket is not closed; .* needs a backslash at the end"),
         ('(B, file, "a)', "the quotation mark .* is not closed"),
-        ("(B)", "motion 1: needed are a marker and one of translate, rotate, scale, radial, file"),
+        (
+            "(B)",
+            "motion 1: needed are a marker and one of translate, rotate, scale, radial, ffd, file",
+        ),
         ("(B, translate, 1, 0) ; ()", "motion 2: needed are a marker and one of"),
         ('("", translate, 1, 0)', "motion 1: it does not begin with the name of a marker"),
         ("(B, rotat, 5)", "'rotat' is not one of translate, .*; did you mean rotate?"),
@@ -106,6 +114,11 @@ def test_examples_of_the_reference_are_read():
         ("(((A), B), translate, 1, 0)", "its first brackets are no list of markers"),
         ("((A, B, A), translate, 1, 0)", r"\(A, B, A\) names a marker twice; name each once"),
         ("((A, B))", "'' is not one of translate, rotate"),
+        ("(B, ffd, BOX)", "needed are the box, the control point i, j, k"),
+        ("(B, ffd, BOX, 1, 2, 3, 4, 5)", "needed are the box, the control point i, j, k"),
+        ("(B, ffd, BOX, 1, 2, x, 4, 5, 6)", "'x' is not a number"),
+        ("(B, ffd, BOX, 1, -2, 0, 4, 5, 6)", r"point \(1, -2, 0\) is none; needed are whole"),
+        ("(B, ffd, BOX, 1, 0.5, 0, 4, 5, 6)", r"point \(1, 0.5, 0\) is none; needed are whole"),
         ("(B, translate, 1)", "the shift has 1 values; needed are 2 or 3 numbers"),
         ("(B, translate, 1, 2, 3, 4)", "the shift has 4 values"),
         ("(B, translate, 1, y)", "'y' is not a number"),
@@ -148,3 +161,8 @@ def test_all_wrong_motions_at_once():
         "motion 1",
         "motion 3",
     ]
+
+
+def test_displacements_of_a_program_cannot_be_written():
+    with pytest.raises(CaseError, match="cannot be written to a case file; write them to a disp"):
+        write_motions((Prescribed([0], [[1.0, 0.0]]),))

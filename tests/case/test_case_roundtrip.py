@@ -9,11 +9,20 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from slideviz.case.cfg import read_case, write_case
-from slideviz.case.model import Case, FromFile, Radial, Reduction, Rotate, Scale, Translate
+from slideviz.case.model import (
+    Case,
+    Ffd,
+    FromFile,
+    Radial,
+    Reduction,
+    Rotate,
+    Scale,
+    Translate,
+)
 from slideviz.case.motion import moved_points
 from slideviz.case.motion_text import read_motions, write_motions
 from slideviz.errors import CaseError
-from slideviz.terms import PERIODIC_MODES, ROLES, SLIDING
+from slideviz.terms import FFD_BLENDINGS, PERIODIC_MODES, ROLES, SLIDING
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -25,6 +34,10 @@ text = st.text(
 point = st.just("centroid") | st.tuples(finite, finite) | st.tuples(finite, finite, finite)
 axis = st.tuples(finite, finite, finite).filter(any)
 whole = st.integers(1, 999_999_999)
+index = st.tuples(*[st.integers(-1, 99)] * 3)
+degrees = st.tuples(*[st.integers(0, 99)] * 3)
+box = st.tuples(text, st.tuples(*[finite] * 24))
+boxes = st.lists(box, max_size=2, unique_by=lambda named: named[0]).map(tuple)
 
 
 def is_file_name(name: str) -> bool:
@@ -45,6 +58,7 @@ def motions_of(marker: st.SearchStrategy[str], path: st.SearchStrategy[Path]):
         st.builds(Scale, marker, factors, point),
         st.builds(Radial, marker, positive, finite, axis, st.tuples(finite, finite, finite)),
         st.builds(Radial, marker, positive, finite, point=st.tuples(finite, finite)),
+        st.builds(Ffd, marker, text, index, st.tuples(finite, finite, finite)),
         st.builds(FromFile, path, marker),
     )
 
@@ -77,12 +91,17 @@ def cases(draw: st.DrawFn, folder: Path) -> Case:
             [("auto", None), ("auto", 2), ("translational", 0), ("rotational", 1), ("auto", 1)]
         )
     )
+    defined = draw(boxes)
     return Case(
         mesh_file=draw(st.none() | path),
         mesh_out=draw(st.none() | path),
         zone=draw(st.none() | whole),
         roles=roles,
         motions=motions,
+        ffd_boxes=defined,
+        ffd_degrees=tuple(draw(degrees) for _ in defined),
+        ffd_blending=draw(st.sampled_from(list(FFD_BLENDINGS))),
+        ffd_orders=draw(st.tuples(*[st.integers(1, 99)] * 3)),
         sliding=draw(st.sampled_from(list(SLIDING))),
         periodic=draw(st.sampled_from(list(PERIODIC_MODES))),
         periodic_type=kind,

@@ -6,7 +6,7 @@ from qtpy.QtGui import QContextMenuEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
-from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
+from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
 from tests.slow import one_of_each_fast
 
@@ -109,6 +109,7 @@ FIRST = {
     Rotate: lambda editor: editor.angle,
     Scale: lambda editor: editor.factors.fields[0],
     Radial: lambda editor: editor.percent,
+    Ffd: lambda editor: editor.index.fields[0],
     FromFile: lambda editor: editor.path,
 }
 

@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 from qtpy.QtTest import QTest
 
-from slideviz.case.model import FromFile, Radial, Rotate, Scale, Translate
+import slideviz as sv
+from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
+from slideviz.ffd.box import plane_corners, regular_box
+from slideviz.ffd.section import with_boxes
 from slideviz.gui.dialogs.motion_table import TableDialog
+from slideviz.gui.panels.motion_form import control_point
 from slideviz.session import changes
 from slideviz.session.motion_table import Rows
+from slideviz.session.motions import Ghosts
+from slideviz.session.run_messages import run_requirements
 from tests.slow import one_of_each_fast
 
 NOISE = 3.7e-13
@@ -237,3 +243,71 @@ def test_a_table_that_cannot_be_written_is_told(blade, typed, answers, tmp_path)
     blade.window.motions.add_table.trigger()
     assert "the folder does not exist" in blade.window.banner.text.text()
     assert not blade.session.case.motions
+
+
+@pytest.fixture
+def boxed(driver, tmp_path):
+    """A 2D mesh with two boxes, whose lower side moves."""
+    mesh = square_with_boxes()
+    sv.write(tmp_path / "boxed.su2", mesh)
+    driver.open(tmp_path / "boxed.su2")
+    driver.role("low", "moving")
+    return driver
+
+
+def square_with_boxes():
+    axis = np.linspace(0.0, 1.0, 5)
+    points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    first = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
+    low = np.arange(4)[:, None] + [0, 1]
+    mesh = sv.Mesh(
+        points,
+        sv.Cells.from_blocks([(9, first[:, None] + [0, 1, 6, 5])]),
+        (
+            sv.Marker("low", sv.Cells.from_blocks([(3, low)])),
+            sv.Marker("high", sv.Cells.from_blocks([(3, low + 20)])),
+        ),
+    )
+    corners = plane_corners(np.array([[-0.1, -0.1], [1.1, -0.1], [1.1, 0.2], [-0.1, 0.2]]))
+    return with_boxes(mesh, [regular_box(name, corners, (3, 1, 1), None) for name in ("A", "B")])
+
+
+def test_motion_of_a_box_is_shown_edited_and_kept(boxed, tmp_path):
+    boxed.add_motion(Ffd)
+    form = editor(boxed)
+    assert boxed.session.case.motions == (Ffd("low", "A", (0, 0, -1), (0.0, 0.0, 0.0)),)
+    assert form.box.isVisible()
+    assert not form.angle.isVisible()
+    boxed.type(form.index.fields[0], "2")
+    boxed.type(form.index.fields[1], "-1")
+    boxed.type(form.vector.fields[1], "0.1")
+    boxed.choose(form.box, "B")
+    motion = Ffd("low", "B", (2, -1, -1), (0.0, 0.1, 0.0))
+    assert boxed.session.case.motions == (motion,)
+    assert listed(boxed) == "1.  low: move (2, all, all) of B by (0, 0.1)"
+    moved = Ghosts(boxed.session.mesh).moved(boxed.session.case)["low"]
+    u = (np.linspace(0.0, 1.0, 5) + 0.1) / 1.2
+    np.testing.assert_allclose(moved[:, 1], 0.1 * 3 * u**2 * (1 - u), atol=1e-14)
+    boxed.session.case.write(tmp_path / "kept.cfg")
+    assert sv.Case.read(tmp_path / "kept.cfg").motions == (motion,)
+
+
+def test_field_of_a_control_point_takes_whole_numbers_from_minus_one(boxed):
+    boxed.add_motion(Ffd)
+    form = editor(boxed)
+    for text in ("0.5", "-2"):
+        boxed.type(form.index.fields[0], text)
+        assert boxed.session.case.motions[0].index == (0, 0, -1)
+    assert "whole numbers from 0, or -1 for all" in control_point((0.5, 0.0))
+    boxed.type(form.index.fields[0], "9")
+    assert boxed.session.case.motions[0].index == (9, 0, -1)
+    (missing,) = run_requirements(boxed.session)[:1]
+    assert "moves yet" in missing.text
+
+
+def test_motion_of_a_box_without_a_box_says_what_is_missing(blade):
+    blade.add_motion(Ffd)
+    assert blade.session.case.motions[0].box == ""
+    blade.type(editor(blade).vector.fields[0], "0.1")
+    (missing,) = run_requirements(blade.session)
+    assert "names no FFD box; choose one of the mesh" in missing.text

@@ -10,6 +10,7 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QFileDialog, QWidget
 
 from slideviz.case.model import (
+    Ffd,
     FromFile,
     Motion,
     Radial,
@@ -49,6 +50,7 @@ class MotionEditor(MotionForm):
         self._targets: tuple[Target, ...] = ()
         self._centroid: Callable[[Target], tuple[float, ...]] = lambda _: (0.0,) * self._dim
         self._machine: Axis | None = None
+        self._boxes: tuple[str, ...] = ()
         self._as_point = False
         self._connect()
         self.show_motion(None, (), 3)
@@ -57,6 +59,7 @@ class MotionEditor(MotionForm):
         self.marker.chosen.connect(lambda _: self._tell())
         self.kind.chosen.connect(self._kind_chosen)
         self.about.chosen.connect(self._about_chosen)
+        self.box.chosen.connect(lambda _: self._tell())
         for field in self._rows.values():
             if isinstance(field, NumberField | VectorField):
                 field.changed.connect(lambda _: self._tell())
@@ -75,7 +78,7 @@ class MotionEditor(MotionForm):
         shown = self._show_numbers(motion, dim)
         if isinstance(motion, Rotate | Scale | Radial):
             shown |= {"about"} | self._show_place(motion, dim)
-        for vector in (self.vector, self.factors, self.point):
+        for vector in (self.vector, self.factors, self.point, self.index):
             vector.set_count(dim)
         self.show_rows(shown)
 
@@ -96,6 +99,13 @@ class MotionEditor(MotionForm):
             self.percent.show_value(round(100.0 * (motion.factor - 1.0), 10))
             self.distance.show_value(motion.distance)
             return {"percent", "distance"}
+        if isinstance(motion, Ffd):
+            self._sync_boxes(motion.box)
+            self.index.show_value(motion.index)
+            self.vector.show_value(motion.vector)
+            return {"box", "index", "vector"}
+        if not isinstance(motion, FromFile):
+            return set()
         if str(motion.path) != self.path.text() and not self.path.hasFocus():
             self.path.setText("" if motion.path == Path() else str(motion.path))
         return {"path"}
@@ -156,9 +166,19 @@ class MotionEditor(MotionForm):
                 self.marker.addItem(target_words(target), place)
         self.marker.show_value(targets.index(motion.marker))
 
+    def _sync_boxes(self, chosen: str) -> None:
+        names = tuple(dict.fromkeys((*self._boxes, chosen)))
+        if [self.box.itemData(row) for row in range(self.box.count())] != list(names):
+            self.box.clear()
+            for name in names:
+                self.box.addItem(name or "(no box)", name)
+        self.box.show_value(chosen)
+
     def _kind_chosen(self, kind: type) -> None:
         if self._motion is not None and type(self._motion) is not kind:
-            self.changed.emit(new_motion(kind, self._motion.marker, self._dim, self._machine))
+            marker = self._motion.marker
+            motion = new_motion(kind, marker, self._dim, self._machine, self._boxes)
+            self.changed.emit(motion)
 
     def _about_chosen(self, what: str) -> None:
         motion = self._motion
@@ -191,6 +211,7 @@ class MotionEditor(MotionForm):
             Rotate: self.angle,
             Scale: self.factors.fields[0],
             Radial: self.percent,
+            Ffd: self.index.fields[0],
             FromFile: self.path,
         }.get(type(self._motion))
         if first is not None:
@@ -209,6 +230,10 @@ class MotionEditor(MotionForm):
         """Set the axis about which the mesh repeats; None where it does not."""
         self._machine = machine
 
+    def set_boxes(self, names: tuple[str, ...]) -> None:
+        """Set the boxes for free-form deformation that there are."""
+        self._boxes = names
+
     def _tell(self) -> None:
         marker, kind = self._targets[self.marker.currentData()], type(self._motion)
         x, y, z = self.axis.value if self._dim == 3 else Z
@@ -226,10 +251,19 @@ class MotionEditor(MotionForm):
         elif kind is Radial:
             factor = round(1.0 + self.percent.value / 100.0, 14)
             motion = Radial(marker, factor, self.distance.value, axis, point)
+        elif isinstance(self._motion, Ffd):
+            motion = self._ffd(marker, self._motion)
         else:
             motion = FromFile(Path(self.path.text().strip()), marker)
         if motion != self._motion:
             self.changed.emit(motion)
+
+    def _ffd(self, marker: Target, before: Ffd) -> Ffd:
+        """Return the motion of a control point that the fields describe; in 2D, k stays."""
+        at = before.index if self.index.problem else (*self.index.value, before.index[2])[:3]
+        i, j, k = (int(value) for value in at)
+        dx, dy, dz = (*self.vector.value, 0.0)[:3]
+        return Ffd(marker, self.box.currentData(), (i, j, k), (dx, dy, dz))
 
     def _browse(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Displacement file", self.path.text())

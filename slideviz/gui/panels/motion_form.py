@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from qtpy.QtWidgets import QFormLayout, QLabel, QLineEdit, QPushButton, QSizePolicy, QWidget
 
-from slideviz.case.model import FromFile, Motion, Radial, Rotate, Scale, Target, Translate
+from slideviz.case.model import Ffd, FromFile, Motion, Radial, Rotate, Scale, Target, Translate
 from slideviz.gui.widgets.build import boxed, grow_fields, in_row
 from slideviz.gui.widgets.fields import Choice, NumberField, not_zero
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
@@ -61,6 +62,12 @@ class MotionForm(QWidget):
         self.axis = VectorField(
             (0.0, 0.0, 1.0), a_direction, tip="Direction of the axis; its length does not matter."
         )
+        self.box = Choice({}, "The box whose control points move: of the mesh, or of the case.")
+        self.index = VectorField(
+            allowed=control_point,
+            names="ijk",
+            tip="The control point, counted from 0 along each direction of the box; -1 is all.",
+        )
         self.path = QLineEdit()
         self.path.setToolTip("A line for each node: its number and its displacement.")
         self.browse = QPushButton("…")
@@ -76,6 +83,8 @@ class MotionForm(QWidget):
         file = boxed(in_row(self.path, self.browse, self.table, wide=[self.path], spacing=4))
         self._rows: dict[str, QWidget] = {}
         for name, title, widget in (
+            ("box", "Box", self.box),
+            ("index", "Control point", self.index),
             ("vector", "By", self.vector),
             ("angle", "Angle (°)", self.angle),
             ("factors", "Factors", self.factors),
@@ -93,7 +102,7 @@ class MotionForm(QWidget):
         widest = max(label.sizeHint().width() for label in labels)
         for label in labels:
             label.setMinimumWidth(widest)
-        for choice in (self.kind, self.marker, self.about):
+        for choice in (self.kind, self.marker, self.about, self.box):
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def show_rows(self, names: set[str]) -> None:
@@ -112,14 +121,28 @@ KINDS: dict[type, str] = {
     Rotate: MOTION_KINDS["rotate"].label,
     Scale: MOTION_KINDS["scale"].label,
     Radial: MOTION_KINDS["radial"].label,
+    Ffd: MOTION_KINDS["ffd"].label,
     FromFile: MOTION_KINDS["file"].label,
 }
 
 
-def new_motion(kind: type, marker: Target, dim: int, machine: Axis | None = None) -> Motion:
+def control_point(values: Sequence[float]) -> str:
+    """Return why numbers are no control point of a box."""
+    whole = all(value == int(value) and value >= -1 for value in values)
+    return "" if whole else "needed are whole numbers from 0, or -1 for all"
+
+
+def new_motion(
+    kind: type,
+    marker: Target,
+    dim: int,
+    machine: Axis | None = None,
+    boxes: Sequence[str] = (),
+) -> Motion:
     """Return a motion of a kind that does not move anything yet.
 
-    Where the mesh repeats about an axis, what turns or is pushed does so about that axis.
+    Where the mesh repeats about an axis, what turns or is pushed does so about that axis; control
+    points are those of the first of ``boxes``.
     """
     axis, origin = machine or ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     if kind is Translate:
@@ -130,4 +153,6 @@ def new_motion(kind: type, marker: Target, dim: int, machine: Axis | None = None
         return Radial(marker, 1.0, 0.0, axis, origin[:dim])
     if kind is Scale:
         return Scale(marker, (1.0,) * dim)
+    if kind is Ffd:
+        return Ffd(marker, (*boxes, "")[0], (0, 0, 0 if dim == 3 else -1), (0.0, 0.0, 0.0))
     return FromFile(Path(), marker)

@@ -28,7 +28,7 @@ from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
 from slideviz.session.motion_table import Rows
-from slideviz.session.motions import centroid, machine_axis, new_target, targets
+from slideviz.session.motions import box_names, centroid, machine_axis, new_target, targets
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -118,6 +118,7 @@ class MotionPanel(Panel):
                 self.list.item(row).setToolTip(wrapped(text))
             self.list.setCurrentRow(min(max(current, 0), len(texts) - 1))
         self.editor.set_machine(machine_axis(session))
+        self.editor.set_boxes(box_names(session))
         self._sync_editor(session)
         self._sync_buttons(session, moving)
 
@@ -175,7 +176,9 @@ class MotionPanel(Panel):
     def _add_for(self, target: Target, kind: type) -> None:
         """Add a motion that does nothing yet, and let its numbers be typed."""
         session = self.store.session
-        motion = new_motion(kind, target, session.mesh.dim, machine_axis(session))
+        motion = new_motion(
+            kind, target, session.mesh.dim, machine_axis(session), box_names(session)
+        )
         self.store.change(changes.add_motion, motion)
         self.editor.focus()
 

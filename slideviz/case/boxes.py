@@ -1,0 +1,157 @@
+"""The boxes for free-form deformation that a case can use, and what they do to boundaries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, Ffd, moves, named
+from slideviz.case.words import nearest
+from slideviz.errors import CaseError, SlidevizError
+from slideviz.ffd.box import Box, Embedding, plane_corners, regular_box
+from slideviz.ffd.inverse import parametric
+from slideviz.ffd.section import boxes_of
+from slideviz.mesh.model import IntArray, Mesh
+
+OFF = 1e-6
+"""By how much, as a part of the box, the coordinates in a mesh file may miss their points."""
+
+_EMBEDDED: WeakKeyDictionary[Mesh, dict[tuple[Box, str], tuple[Embedding, float]]] = (
+    WeakKeyDictionary()
+)
+_DEFINED: WeakKeyDictionary[Mesh, dict[object, dict[str, Box]]] = WeakKeyDictionary()
+
+
+def boxes_for(case: Case, mesh: Mesh) -> dict[str, Box]:
+    """Return the boxes of the mesh, and those of the case that it does not have, by name.
+
+    Raises
+    ------
+    SlidevizError
+        The mesh's section or the case's definition has mistakes.
+    """
+    return {**defined_boxes(case, mesh), **{box.name: box for box in boxes_of(mesh)}}
+
+
+def defined_boxes(case: Case, mesh: Mesh) -> dict[str, Box]:
+    """Return the boxes that the case defines, undeformed, by name.
+
+    Raises
+    ------
+    CaseError
+        A box is not possible.
+    """
+    key = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
+    kept = _DEFINED.setdefault(mesh, {})
+    if key not in kept:
+        kept[key] = {
+            name: _defined(case, mesh.dim, name, corners, degrees)
+            for (name, corners), degrees in zip(case.ffd_boxes, case.ffd_degrees, strict=False)
+        }
+    return kept[key]
+
+
+def _defined(
+    case: Case, dim: int, name: str, numbers: tuple[float, ...], degrees: tuple[int, int, int]
+) -> Box:
+    corners = np.array(numbers).reshape(8, 3)
+    corners = plane_corners(corners[:4, :2]) if dim == 2 else corners
+    i, j, k = (*degrees[:dim], 1)[:3]
+    first, second, third = (*case.ffd_orders[:dim], 2)[:3]
+    orders = (first, second, third) if case.ffd_blending == "BSPLINE_UNIFORM" else None
+    try:
+        return regular_box(name, corners, (i, j, k), orders)
+    except CaseError as problem:
+        raise CaseError(f"FFD_DEFINITION: box {name!r}: {problem}") from problem
+
+
+def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
+    """Return why the mesh cannot have a motion."""
+    try:
+        boxes = boxes_for(case, mesh)
+    except SlidevizError as problem:
+        return (str(problem),)
+    if motion.box not in boxes:
+        has = f"there are {', '.join(boxes)}" if boxes else "none is in it, or in FFD_DEFINITION"
+        why = nearest(motion.box, boxes) or f"; {has}"
+        return (f"{mesh.name} has no FFD box {motion.box!r}{why}",)
+    unknown = boxes[motion.box].problem(motion.index)
+    found = [unknown] if unknown else []
+    if mesh.dim == 2 and motion.vector[2]:
+        found.append(f"dz is {motion.vector[2]:g}, which leaves the plane; in 2D write 0")
+    return tuple(found)
+
+
+def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
+    """Return the nodes of a marker that are in a box, and by how much they are not its points.
+
+    Their parametric coordinates are those of the mesh file where it lists some of this marker.
+    By how much is a part of the size of the box. All is found once for each mesh.
+    """
+    kept = _EMBEDDED.setdefault(mesh, {})
+    if (box, marker) not in kept:
+        on = mesh.marker(marker).nodes
+        if marker in box.embedded:
+            nodes, uvw = box.embedded[marker]
+            inside = np.isin(nodes, on)
+        else:
+            nodes = on
+            uvw, inside = parametric(box, mesh.points[on])
+        found = box.embed(nodes[inside], uvw[inside])
+        size = np.ptp(box.points.reshape(-1, 3), axis=0)[: mesh.dim]
+        gap = np.abs(found.sums(box.points)[:, : mesh.dim] - mesh.points[found.nodes]) / size
+        kept[box, marker] = found, float(gap.max(initial=0.0))
+    return kept[box, marker]
+
+
+def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
+    """Return what each motion of a box does to the nodes of the moving markers ``names``.
+
+    Raises
+    ------
+    CaseError
+        None of the nodes that a motion should move is in its box: all such motions.
+    """
+    motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
+    boxes = boxes_for(case, mesh) if motions else {}
+    on = {name: mesh.marker(name).nodes for name in names}
+    found: dict[object, Displacements] = {}
+    problems = []
+    for place, motion in enumerate(case.motions, start=1):
+        if not isinstance(motion, Ffd) or motion.box not in boxes:
+            continue
+        mine = {name: nodes for name, nodes in on.items() if moves(motion, name)}
+        moved = _moved(boxes[motion.box], mesh, motion, mine)
+        if moved is None and mine:
+            of = " or ".join(repr(name) for name in named(motion.marker)) or "a moving marker"
+            problems.append(
+                f"motion {place}: no node of {of} is in the FFD box {motion.box!r}; move the box, "
+                "or take another boundary"
+            )
+        elif moved is not None:
+            found[motion] = moved
+    if problems:
+        raise CaseError("\n".join(problems))
+    return found
+
+
+def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Displacements | None:
+    """Return the displacement of the nodes of markers; None where no node is in the box."""
+    nodes = np.unique(np.concatenate([*on.values(), np.empty(0, np.int64)]))
+    vectors = np.zeros((len(nodes), mesh.dim))
+    change = box.change(motion.index, motion.vector)
+    warnings, any_inside = [], False
+    for name in on:
+        inside, off = embedding(box, mesh, name)
+        any_inside |= bool(len(inside.nodes))
+        vectors[np.searchsorted(nodes, inside.nodes)] = inside.sums(change)[:, : mesh.dim]
+        if off > OFF:
+            warnings.append(
+                f"{mesh.name}: the surface points of the FFD box {box.name!r} on {name} are not "
+                f"those of the mesh, by up to {off:.1g} of the box; was the mesh moved without "
+                "it? Then define the box anew"
+            )
+    return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None

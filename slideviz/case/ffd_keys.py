@@ -1,0 +1,143 @@
+"""Keys of a case file about boxes for free-form deformation, as SU2 has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
+from slideviz.case.model import Case
+from slideviz.case.values import Kind, one_of
+from slideviz.case.words import Word, is_none, list_of, name_text, number, shown, words_of
+from slideviz.errors import CaseError
+from slideviz.terms import FFD_BLENDINGS
+
+Definition = tuple[str, tuple[float, ...]]
+Degrees = tuple[int, int, int]
+NUMBERS = 24
+"""Coordinates of the 8 corners of a box."""
+
+
+def _groups(text: str) -> list[list[Word]]:
+    """Return the words between brackets, or between semicolons."""
+    groups: list[list[Word]] = [[]]
+    for word in [] if is_none(words_of(text)) else words_of(text):
+        if word.is_sign(";"):
+            groups.append([])
+        elif not any(word.is_sign(sign) for sign in "(),"):
+            groups[-1].append(word)
+    return [group for group in groups if group]
+
+
+def _read_definition(text: str) -> tuple[Definition, ...]:
+    found = []
+    for group in _groups(text):
+        name, *corners = group
+        if len(corners) != NUMBERS or name.is_number:
+            raise CaseError(
+                f"box {shown(name.text)} has {len(corners)} numbers; needed are its name and "
+                f"{NUMBERS}: 8 corners x, y, z (in 2D 4 with z = 0, and zeros)"
+            )
+        found.append((name.text, tuple(number(word.text) for word in corners)))
+    names = [box for box, _ in found]
+    for box in names:
+        if names.count(box) > 1:
+            raise CaseError(f"box {box!r} is defined twice; rename one")
+    return tuple(found)
+
+
+def _write_definition(boxes: tuple[Definition, ...]) -> str:
+    return " ; \\\n    ".join(
+        f"({name_text(name)}, {', '.join(repr(float(value)) for value in corners)})"
+        for name, corners in boxes
+    )
+
+
+def _whole(words: list[Word], least: int) -> Degrees:
+    values = [number(word.text) for word in words]
+    if len(values) != 3 or any(value != int(value) or value < least for value in values):
+        said = ", ".join(word.text for word in words)
+        raise CaseError(f"({said}) is not three whole numbers from {least}")
+    i, j, k = (int(value) for value in values)
+    return i, j, k
+
+
+def _read_degrees(text: str) -> tuple[Degrees, ...]:
+    return tuple(_whole(group, 0) for group in _groups(text))
+
+
+def _write_degrees(degrees: tuple[Degrees, ...]) -> str:
+    return " ; ".join(f"({i}, {j}, {k})" for i, j, k in degrees)
+
+
+def _write_orders(orders: Degrees) -> str:
+    return ", ".join(map(str, orders))
+
+
+def _said_where_needed(row: Key) -> Key:
+    """Return the row of a key that a file has only where it says something."""
+    usual = getattr(Case(), row.field)
+
+    def get(case: Case) -> Any:
+        value = getattr(case, row.field)
+        return value if value != usual or (case.ffd_boxes and usual) else None
+
+    return replace(row, get=get, default=row.default or NO_DEFAULT)
+
+
+def without_definition(case: Case) -> str:
+    """Return why the other keys do nothing in a case."""
+    return "" if case.ffd_boxes else "FFD_DEFINITION defines no box"
+
+
+def ffd_contradictions(case: Case) -> list[tuple[tuple[str, ...], str]]:
+    """Return the contradictions between the keys: those involved, and a sentence."""
+    boxes, degrees = len(case.ffd_boxes), len(case.ffd_degrees)
+    if boxes == degrees or not boxes:
+        return []
+    said = f"FFD_DEFINITION has {boxes} and FFD_DEGREE {degrees}; give a degree for each box"
+    return [(("FFD_DEFINITION", "FFD_DEGREE"), said)]
+
+
+DEFINITION = Kind("(NAME, 8 corners x, y, z) ; ...", _read_definition, _write_definition)
+DEGREES = Kind("(i, j, k) ; ...", _read_degrees, _write_degrees)
+ORDERS = Kind("i, j, k", lambda text: _whole(list_of(text), 1), _write_orders)
+
+_ROWS = (
+    setting(
+        "FFD_DEFINITION",
+        MOTION,
+        DEFINITION,
+        "ffd_boxes",
+        "Boxes for free-form deformation, by SU2's order of corners; those in the mesh go before.",
+        label="FFD boxes",
+    ),
+    setting(
+        "FFD_DEGREE",
+        MOTION,
+        DEGREES,
+        "ffd_degrees",
+        "The degrees of each box of FFD_DEFINITION: control points of each direction, less one.",
+        label="FFD degrees",
+        unless=without_definition,
+    ),
+    setting(
+        "FFD_BLENDING",
+        MOTION,
+        one_of(FFD_BLENDINGS),
+        "ffd_blending",
+        "How control points of these boxes move what is inside.",
+        label="FFD blending",
+        unless=without_definition,
+    ),
+    setting(
+        "FFD_BSPLINE_ORDER",
+        MOTION,
+        ORDERS,
+        "ffd_orders",
+        "With FFD_BLENDING= BSPLINE_UNIFORM, the orders of the splines, 2 or more.",
+        label="FFD orders",
+        unless=without_definition,
+    ),
+)
+FFD_ROWS = tuple(_said_where_needed(row) for row in _ROWS)
