@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         Translate,
     )
     from slideviz.deformation.solver import Step, deform
+    from slideviz.design.sweep import sweep
     from slideviz.errors import SlidevizError
     from slideviz.mesh.io.convert import convert
     from slideviz.mesh.io.files import read, write
@@ -51,6 +52,7 @@ _HOME = {
     "deform": "deformation.solver",
     "quality": "mesh.quality",
     "read": "mesh.io.files",
+    "sweep": "design.sweep",
     "write": "mesh.io.files",
 }
 
@@ -76,6 +78,7 @@ __all__ = [
     "deform",
     "quality",
     "read",
+    "sweep",
     "write",
 ]
 

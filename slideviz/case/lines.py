@@ -17,7 +17,11 @@ Problem = tuple[int, str]
 _END_OF_LINE = re.compile(r"\r\n|\n|\r")
 _KEY_LINE = re.compile(r"\s*([A-Za-z][A-Za-z0-9_]*)\s*=(.*)\Z", re.DOTALL)
 _LISTED = 30
-LARGEST = {"case file": 16_000_000, "displacement file": 2_000_000_000}
+LARGEST = {
+    "case file": 16_000_000,
+    "displacement file": 2_000_000_000,
+    "table of designs": 100_000_000,
+}
 """Bytes that a kind of file may have: a displacement file has a line for each node at most."""
 
 

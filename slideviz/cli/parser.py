@@ -18,6 +18,7 @@ from slideviz.cli.run_command import add_run
 from slideviz.cli.sample_command import add_sample
 from slideviz.cli.section_command import add_section
 from slideviz.cli.section_options import glued
+from slideviz.cli.sweep_command import add_sweep
 from slideviz.cli.window_command import add_shots, window
 
 COMMANDS: dict[str, Callable[[argparse._SubParsersAction], None]] = {
@@ -27,6 +28,7 @@ COMMANDS: dict[str, Callable[[argparse._SubParsersAction], None]] = {
     "film": add_film,
     "section": add_section,
     "compare": add_compare,
+    "sweep": add_sweep,
     "convert": add_convert,
     "sample": add_sample,
     "keys": add_keys,

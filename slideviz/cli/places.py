@@ -24,6 +24,7 @@ _READ = {
     "mesh": "the input mesh",
     "case": "the case file",
     "reference": "the reference mesh",
+    "table": "the table of designs",
 }
 """What the files are that a command line names to be read, by the name of their argument."""
 

@@ -114,10 +114,11 @@ class Bar:
         word = _PHASES.get(progress.phase, progress.phase)
         self._draw(done, f"{self._head}{word}: {100 * done:.0f} %{left}")
 
-    def count(self, done: int, total: int, what: str) -> None:
-        """Draw the bar for ``done`` of ``total`` things."""
+    def count(self, done: int, total: int, what: str, rest: float | None = None) -> None:
+        """Draw the bar for ``done`` of ``total`` things, with the seconds that the rest takes."""
         if self.enabled:
-            self._draw(done / total, f"{what} {done} of {total}")
+            left = "" if rest is None else f", about {rest:.0f} s left"
+            self._draw(done / total, f"{what} {done} of {total}{left}")
 
     def _draw(self, done: float, text: str) -> None:
         filled = round(24 * done)

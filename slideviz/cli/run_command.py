@@ -184,7 +184,7 @@ def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
     from slideviz.cli.steps_file import steps_file
-    from slideviz.session.formats import usual_ending
+    from slideviz.mesh.io.files import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir

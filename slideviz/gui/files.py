@@ -17,8 +17,9 @@ from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.files import usual_ending
 from slideviz.session import changes, jobs
-from slideviz.session.formats import left_out, usual_ending
+from slideviz.session.formats import left_out
 from slideviz.session.keep import keep_view
 from slideviz.session.unsaved import Unsaved
 

@@ -51,13 +51,6 @@ def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
     }
 
 
-def usual_ending(mesh: Mesh) -> str:
-    """Return the ending that a mesh is offered to be saved with."""
-    if mesh.cgns is not None:
-        return ".cgns"
-    return ".su2" if mesh.binary is None else ".su2b"
-
-
 def holds_quality(path: Path) -> bool:
     """Tell whether a file of that name can hold values of the cells."""
     row = MESH_FORMATS.get(path.suffix.lower())

@@ -17,9 +17,9 @@ from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services
+from slideviz.mesh.io.files import usual_ending
 from slideviz.mesh.io.vtkhdf import VTKHDF
 from slideviz.session import changes, jobs_export
-from slideviz.session.formats import usual_ending
 from slideviz.session.state import Session
 
 log = logging.getLogger("slideviz")

@@ -100,6 +100,13 @@ def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
         raise unreadable(path, problem) from problem
 
 
+def usual_ending(mesh: Mesh) -> str:
+    """Return the ending that a mesh is offered to be saved with."""
+    if mesh.cgns is not None:
+        return ".cgns"
+    return ".su2" if mesh.binary is None else ".su2b"
+
+
 def write(
     path: str | Path,
     mesh: Mesh,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import weakref
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
@@ -37,6 +37,12 @@ class Source:
         self._file = None if isinstance(content, bytes) else content
         self._stamp = self._now()
         self.size = len(content) if isinstance(content, bytes) else self._stamp[0]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes it again in another process: a large file is opened there, too."""
+        if self._content is not None:
+            return Source, (self.path, self._content)
+        return _again, (self.path.absolute(), self._stamp)
 
     def __getitem__(self, part: slice) -> bytes:
         """Return a range of the bytes; may be called from several threads.
@@ -99,6 +105,14 @@ def open_source(path: Path) -> Source:
     except OSError as problem:
         raise unreadable(path, problem) from problem
     weakref.finalize(source, file.close)
+    return source
+
+
+def _again(path: Path, stamp: tuple[int, int]) -> Source:
+    """Return the bytes of a file that is open in another process, and must be the same still."""
+    source = open_source(path)
+    if source._now() != stamp:
+        raise source.changed()
     return source
 
 

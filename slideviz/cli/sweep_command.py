@@ -1,0 +1,256 @@
+"""``slideviz sweep``: a run for each row of a table of designs, and a table of results."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slideviz.cli.options import add_shared, count, read_case, require_mesh_file
+from slideviz.cli.progress import Bar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from concurrent.futures import Executor
+
+    from slideviz.design.sweep_designs import Designs
+    from slideviz.design.sweep_row import Row
+
+_LISTED = 5
+"""Designs that are named, of those with inverted cells, and reasons of those that failed."""
+_CONNECTING = 10.0
+"""Seconds to wait for a scheduler."""
+
+
+def add_sweep(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``sweep`` to the parser."""
+    call = calls.add_parser(
+        "sweep",
+        help="a run for each row of a table of designs",
+        description="Deform a mesh by each design of a table, on all cores or on a Dask cluster, "
+        "and write a table of quality, errors and times. Columns are numbers of the motions, as "
+        "BLADE.translate.y or motion2.angle_deg, and keys of the case, as STEPS; `--columns` "
+        "lists them.",
+        epilog="exit codes: 0 done (also when cells are inverted or a design failed: the table "
+        "says it); 1 no design could be computed; 130 cancelled, 143 ended by SIGTERM: what was "
+        "finished is in the table, and --resume goes on",
+    )
+    add_shared(call, "case")
+    call.add_argument("table", type=Path, nargs="?", help="the table of designs (CSV)")
+    call.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="folder (default: NAME_swept)"
+    )
+    call.add_argument("--columns", action="store_true", help="list the columns there can be")
+    call.add_argument("--meshes", action="store_true", help="write the mesh of each design")
+    call.add_argument(
+        "--workers", type=count, metavar="N", help="processes (default: one for each core)"
+    )
+    call.add_argument(
+        "--scheduler", metavar="ADDRESS", help="work on a Dask cluster, as tcp://node1:8786"
+    )
+    call.add_argument("--resume", action="store_true", help="go on with a sweep that was stopped")
+    call.add_argument("--force", action="store_true", help="begin anew where there are results")
+    add_shared(call, "set")
+    add_shared(call, "zone")
+    add_shared(call, "json", help="report as JSON; - is the terminal")
+    add_shared(call, "quiet")
+    call.set_defaults(command=sweep)
+
+
+def sweep(arguments: argparse.Namespace) -> int:
+    """Deform a mesh by many designs, and write the table of results."""
+    from slideviz import read
+    from slideviz import sweep as sweep_of
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.places import Output, make_folder, require_places
+    from slideviz.cli.report import save_json
+    from slideviz.design.sweep_designs import read_designs
+    from slideviz.design.sweep_results import RESULTS
+    from slideviz.errors import CaseError
+
+    case = read_case(arguments)
+    if arguments.columns:
+        return _print_columns(case)
+    if arguments.table is None:
+        raise CaseError("the table of designs is missing; `--columns` lists what it can have")
+    designs = read_designs(case, arguments.table)
+    mesh_file = require_mesh_file(arguments, case)
+    folder = arguments.output or Path(f"{arguments.case.stem}_swept")
+    mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
+    make_folder(folder)
+    require_places(arguments, Output(arguments.json, "--json"))
+    with _executor(arguments) as executor:
+        rows = sweep_of(
+            case,
+            designs,
+            executor,
+            mesh=mesh,
+            workers=arguments.workers,
+            folder=folder,
+            meshes=arguments.meshes,
+            resume=arguments.resume,
+            force=arguments.force,
+        )
+        if not arguments.quiet:
+            what = f"{len(designs.rows)} designs of {', '.join(designs.columns)}"
+            print(f"{arguments.case}, {len(mesh.cells):,} cells: {what}", flush=True)
+        begin = time.perf_counter()
+        found = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
+    report = _report(arguments, designs, found, time.perf_counter() - begin)
+    report["results"] = str(folder / RESULTS)
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    elif not arguments.quiet:
+        _print_sweep(report)
+    _warn(case.warnings, found)
+    if report["failed"] == len(found):
+        raise CaseError(f"no design could be computed; {folder / RESULTS} says why for each")
+    return DONE
+
+
+def _print_columns(case: Any) -> int:
+    """Print the columns that a table of designs can have, with the values of the case."""
+    from slideviz.case.key import FILES, VIEW
+    from slideviz.case.keys import KEYS
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.report import table
+    from slideviz.design.sweep_columns import numbers_of
+
+    numbers = numbers_of(case)
+    if numbers:
+        print("numbers of the motions, and those of the case:")
+        print(table([(name, place.of(case)) for name, place in numbers.items()]))
+    print("keys of the case (`slideviz keys` explains them):")
+    print("  " + ", ".join(name for name, key in KEYS.items() if key.group not in (FILES, VIEW)))
+    return DONE
+
+
+@contextmanager
+def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
+    """Return a context with the executor of ``--scheduler``; None where there is none.
+
+    Raises
+    ------
+    CaseError
+        Dask is not installed, or no scheduler answers.
+    """
+    from slideviz.errors import CaseError
+
+    if arguments.scheduler is None:
+        yield None
+        return
+    if arguments.workers is not None:
+        raise CaseError("--workers is for processes of this machine; a Dask cluster has its own")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise CaseError("--scheduler needs Dask; install slideviz[dask]") from None
+    try:
+        client = Client(arguments.scheduler, timeout=_CONNECTING, set_as_default=False)
+    except (OSError, ValueError) as problem:
+        raise CaseError(
+            f"--scheduler {arguments.scheduler}: no scheduler answers ({problem}); start one "
+            "with `dask scheduler`, and give the address that it prints"
+        ) from problem
+    try:
+        if not client.nthreads():
+            print("slideviz: note: the cluster has no workers yet; waiting", file=sys.stderr)
+        yield client.get_executor()
+    finally:
+        client.close()
+
+
+def _pulled(
+    arguments: argparse.Namespace, rows: Iterator[Row], total: int, results: Path
+) -> list[Row]:
+    """Return all rows; a bar tells how many there are and how long the rest will take."""
+    from slideviz.mesh.io.cleanup import keep
+
+    found: list[Row] = []
+    begin, earlier = time.monotonic(), 0
+    with Bar(not arguments.quiet) as bar:
+        bar.count(0, total, "designs:")
+        for row in rows:
+            found.append(row)
+            earlier += row.earlier
+            keep(results, f"{results} has {len(found)} of {total} designs, and --resume goes on")
+            fresh = len(found) - earlier
+            left = (time.monotonic() - begin) / fresh * (total - len(found)) if fresh else None
+            bar.count(len(found), total, "designs:", left)
+    return found
+
+
+def _report(
+    arguments: argparse.Namespace, designs: Designs, rows: Sequence[Row], seconds: float
+) -> dict[str, Any]:
+    """Return the JSON object of a sweep."""
+    done = sorted((row for row in rows if not row.problem), key=lambda row: (-row.min, row.design))
+    fresh = [row for row in rows if not row.earlier]
+    return {
+        "case": str(arguments.case),
+        "table": str(arguments.table),
+        "columns": list(designs.columns),
+        "designs": len(rows),
+        "earlier": len(rows) - len(fresh),
+        "failed": len(rows) - len(done),
+        "inverted": [row.design for row in sorted(done, key=_number) if row.inverted],
+        "best": _named(done[0]) if done else None,
+        "worst": _named(done[-1]) if done else None,
+        "lost_workers": sum(row.lost for row in fresh),
+        "seconds": {"total": seconds, "designs": sum(row.seconds for row in fresh)},
+    }
+
+
+def _number(row: Row) -> int:
+    return row.design
+
+
+def _named(row: Row) -> dict[str, Any]:
+    """Return a design with its values and quality."""
+    return {"design": row.design, "min": row.min, "mean": row.mean, "values": dict(row.values)}
+
+
+def _print_sweep(report: dict[str, Any]) -> None:
+    """Print the summary of a sweep."""
+    from slideviz.cli.report import counted, table
+
+    seconds = report["seconds"]
+    fresh = report["designs"] - report["earlier"]
+    earlier = f" ({report['earlier']} were there)" if report["earlier"] else ""
+    print(f"{counted(fresh, 'design')} in {seconds['total']:.1f} s{earlier}")
+    lines: list[tuple[str, object]] = []
+    for word in ("best", "worst"):
+        if report[word]:
+            one = report[word]
+            lines.append((f"{word} minimum quality", f"{one['min']:.6f}  (design {one['design']})"))
+    if report["inverted"]:
+        named = ", ".join(map(str, report["inverted"][:_LISTED]))
+        more = ", ..." if len(report["inverted"]) > _LISTED else ""
+        lines.append(("with inverted cells", f"{len(report['inverted'])}  (design {named}{more})"))
+    if report["failed"]:
+        lines.append(("failed", report["failed"]))
+    if report["lost_workers"]:
+        lines.append(("workers lost", report["lost_workers"]))
+    print(table(lines))
+    print(f"results: {report['results']}")
+
+
+def _warn(warnings: Sequence[str], rows: Sequence[Row]) -> None:
+    """Print the warnings of the case, and why designs failed, each reason once."""
+    for warning in warnings:
+        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    reasons: dict[str, list[int]] = {}
+    for row in sorted(rows, key=_number):
+        if row.problem:
+            reasons.setdefault(row.problem, []).append(row.design)
+    for reason, failed in list(reasons.items())[:_LISTED]:
+        named = ", ".join(map(str, failed[:_LISTED])) + (", ..." if len(failed) > _LISTED else "")
+        word = "design" if len(failed) == 1 else "designs"
+        print(f"slideviz: warning: {word} {named}: {reason}", file=sys.stderr)
+    if len(reasons) > _LISTED:
+        print(f"slideviz: warning: and {len(reasons) - _LISTED} more reasons", file=sys.stderr)

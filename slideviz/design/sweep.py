@@ -1,0 +1,272 @@
+"""Sweeps: one mesh deformed by many designs, on as many processes or machines as there are."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.case.model import Case, FromFile
+from slideviz.design.sweep_designs import Design, Table, read_designs
+from slideviz.design.sweep_processes import Processes, usable_cores
+from slideviz.design.sweep_results import Results, sources_of
+from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_worker import Answer, Packed, Task, packed, work
+from slideviz.errors import CaseError, DeformError
+from slideviz.mesh.io.files import read, usual_ending
+from slideviz.mesh.model import Mesh
+
+LOST = 3
+"""How often a design may lose its worker, before it is a row that says so."""
+
+
+def sweep(
+    case: Case,
+    designs: Table,
+    executor: Executor | None = None,
+    *,
+    mesh: Mesh | None = None,
+    workers: int | None = None,
+    folder: str | Path | None = None,
+    meshes: bool = False,
+    resume: bool = False,
+    force: bool = False,
+) -> Iterator[Row]:
+    """Return an iterator over the results of designs, each as it comes.
+
+    Each design is deformed as ``slideviz run`` would with its values, to the bit.
+
+    Parameters
+    ----------
+    case : Case
+        What is the same for all designs.
+    designs : path, sequence of mappings, or mapping of sequences
+        A CSV file, the designs one by one, or the columns. A column is a number of a motion, as
+        ``BLADE.translate.y`` or ``motion2.angle_deg``, or a key of the case, as ``STEPS``; where
+        a value is empty, that of the case holds.
+    executor : concurrent.futures.Executor, optional
+        What does the work: ``ProcessPoolExecutor``, ``mpi4py.futures.MPIPoolExecutor``, Dask's
+        ``client.get_executor()``. Without it, processes of this machine, which are replaced when
+        they are lost. Each process works on one design at a time, with one thread, and is sent
+        the mesh once.
+    mesh : Mesh, optional
+        The undeformed mesh; that of the case when left out.
+    workers : int, optional
+        Processes to start without ``executor``; one for each core when left out.
+    folder : path, optional
+        Where ``results.csv`` is written, a row as soon as it comes.
+    meshes : bool
+        Whether the deformed meshes are written to ``folder``, by the workers.
+    resume : bool
+        Whether designs that have a result in ``folder`` are left out. Their rows come first.
+    force : bool
+        Whether results that are in ``folder`` may be lost.
+
+    Yields
+    ------
+    Row
+        A design that fails is a row with the reason. A worker that is lost (killed, out of memory)
+        loses one design, which is done again.
+
+    Raises
+    ------
+    CaseError
+        The table is wrong, or results in ``folder`` are of other designs.
+    MeshError
+        The mesh cannot be read.
+    DeformError
+        No process can be started, or the executor takes no work any more.
+
+    Examples
+    --------
+    >>> import slideviz as sv
+    >>> made = sample("square", size=8, variant="motion")
+    >>> designs = {"motion1.dx": [0.0, 0.1, 0.2]}
+    >>> rows = sorted(sv.sweep(made.case, designs, mesh=made.mesh), key=lambda row: row.design)
+    """
+    asked = read_designs(case, designs)
+    if workers is not None and workers < 1:
+        raise CaseError(f"workers is {workers}; needed is 1 or more")
+    if mesh is None:
+        if case.mesh_file is None:
+            raise CaseError("the case names no mesh; give MESH_FILENAME, or mesh=")
+        mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
+    if folder is None and (meshes or resume):
+        raise CaseError("meshes and resume need a folder; give folder=")
+    results, earlier = None, list[Row]()
+    if folder is not None:
+        results = Results(Path(folder), asked, sources_of(case, mesh))
+        earlier = results.start(resume=resume, force=force, meshes=meshes)
+    done = {row.design for row in earlier}
+    waiting = deque(row for row in asked.rows if row.number not in done)
+    tasks = _Tasks(mesh, len(asked.rows), Path(folder) if folder and meshes else None)
+    if executor is None:
+        count = min(workers or usable_cores(), len(waiting))
+        executor = Processes(max(count, 1), tasks.packed)
+    return _rows(_Loop(executor, tasks, waiting), earlier, results)
+
+
+def _rows(loop: _Loop, earlier: list[Row], results: Results | None) -> Iterator[Row]:
+    """Yield the rows of a stopped sweep and then the others as they come; keep them in a table."""
+    rows = list(earlier)
+    yield from earlier
+    with closing(loop.rows()) as coming:
+        for row in coming:
+            if results is not None:
+                results.add(row)
+            rows.append(row)
+            yield row
+    if results is not None:
+        results.sort(rows)
+
+
+class _Tasks:
+    """What workers are sent: the mesh once, and the case of each design.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    count : int
+        Designs there are.
+    folder : Path or None
+        Where the workers write the meshes.
+    """
+
+    def __init__(self, mesh: Mesh, count: int, folder: Path | None) -> None:
+        self._folder = None if folder is None else Path(folder).absolute()
+        # What only writing needs, such as the text of the file, is much of a mesh.
+        lean = replace(mesh, document=None, binary=None, cgns=None)
+        self.packed: Packed = packed(lean if folder is None else mesh)
+        self._mesh, self._width = mesh, len(str(count))
+
+    def of(self, design: Design, with_mesh: bool) -> Task:
+        """Return the task of a design."""
+        case = design.case
+        motions = tuple(
+            replace(motion, path=motion.path.absolute()) if isinstance(motion, FromFile) else motion
+            for motion in case.motions
+        )
+        output = None
+        if self._folder is not None:
+            ending = (
+                f".{case.mesh_out_format}" if case.mesh_out_format else usual_ending(self._mesh)
+            )
+            output = self._folder / f"design_{design.number:0{self._width}d}{ending}"
+        return Task(
+            design.number,
+            case.change(motions=motions, view={}, warnings=()),
+            self.packed.name,
+            packed=self.packed if with_mesh else None,
+            output=output,
+            file_format=case.mesh_out_format,
+        )
+
+
+class _Loop:
+    """The designs that wait and those that workers have.
+
+    Attributes
+    ----------
+    holding, lacking : set of str
+        Workers that have the mesh, and that said that they need it.
+    """
+
+    def __init__(self, executor: Executor, tasks: _Tasks, waiting: deque[Design]) -> None:
+        self._executor, self._tasks, self._waiting = executor, tasks, waiting
+        self._flying: dict[Future[Answer], tuple[Design, bool]] = {}
+        self._tries: dict[int, int] = {}
+        self.holding: set[str] = set()
+        self.lacking: set[str] = set()
+        self._refused = False
+
+    def rows(self) -> Generator[Row, None, None]:
+        """Yield the rows as they come; when it is closed, what is in work is given up."""
+        ended = False
+        try:
+            while self._waiting or self._flying:
+                self._submit()
+                done, _ = wait(self._flying, return_when=FIRST_COMPLETED)
+                for future in done:
+                    row = self._row(future, self._flying.pop(future)[0])
+                    if row is not None:
+                        yield row
+            ended = True
+        finally:
+            for future in self._flying:
+                future.cancel()
+            if isinstance(self._executor, Processes):
+                self._executor.shutdown(cancel_futures=not ended)
+
+    def _submit(self) -> None:
+        """Give the executor as many designs as keep its workers busy."""
+        unknown = max(_slots(self._executor) - len(self.holding) - len(self.lacking), 1)
+        window = 2 * len(self.holding) + len(self.lacking) + unknown
+        sent = sum(with_mesh for _, with_mesh in self._flying.values())
+        while self._waiting and len(self._flying) < window:
+            with_mesh = sent < len(self.lacking)
+            if self._refused and not with_mesh:
+                return  # what lacks the mesh, and is idle for that, would be asked again and again
+            design = self._waiting.popleft()
+            sent += with_mesh
+            try:
+                future = self._executor.submit(work, self._tasks.of(design, with_mesh))
+            except (BrokenExecutor, RuntimeError) as problem:
+                raise DeformError(
+                    f"the executor takes no more work: {problem}; without an executor, processes "
+                    "that are lost are replaced, and with resume=True what is done need not be "
+                    "done again"
+                ) from problem
+            self._flying[future] = design, with_mesh
+
+    def _row(self, future: Future[Answer], design: Design) -> Row | None:
+        """Return the row of a design; None where it is to be done again."""
+        try:
+            answer = future.result()
+        except Exception as problem:  # whatever goes wrong with a design itself is an answer
+            return self._lost(design, problem)
+        lost = self._tries.get(design.number, 0)
+        if answer.row is None:
+            self.lacking.add(answer.worker)
+            self._refused = True
+            self._waiting.appendleft(design)
+            return None
+        self._refused = False
+        self.lacking.discard(answer.worker)
+        self.holding.add(answer.worker)
+        return replace(answer.row, values=design.values, lost=lost)
+
+    def _lost(self, design: Design, problem: Exception) -> Row | None:
+        """Let a design be done again whose worker was lost; a row when that was so too often."""
+        if isinstance(self._executor, Processes) and self._executor.cannot_start:
+            raise DeformError(
+                "processes end before they begin; in a script, the sweep must stand under "
+                '`if __name__ == "__main__":`, for each process imports the script'
+            ) from problem
+        self.lacking.clear()
+        self._refused = False
+        lost = self._tries[design.number] = self._tries.get(design.number, 0) + 1
+        if lost < LOST:
+            self._waiting.appendleft(design)
+            return None
+        reason = " ".join(f"{type(problem).__name__}: {problem}".split())
+        return Row(
+            design.number,
+            design.values,
+            lost=lost,
+            problem=f"its worker was lost {lost} times: killed, or out of memory ({reason})",
+        )
+
+
+def _slots(executor: Executor) -> int:
+    """Return how many calls an executor does at once, as far as it tells."""
+    client = getattr(executor, "_client", None)  # of Dask
+    if client is not None and hasattr(client, "nthreads"):
+        return sum(client.nthreads().values())
+    for name in ("num_workers", "_max_workers"):  # of mpi4py, and of the standard library
+        found = getattr(executor, name, None)
+        if isinstance(found, int):
+            return found
+    return 1

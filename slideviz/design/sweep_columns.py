@@ -1,0 +1,247 @@
+"""The columns of a table of designs: numbers of the case's motions, and keys of the case.
+
+A number of a motion is called ``BLADE.translate.y``: what is moved, how, and which number; or by
+the place of the motion in ``MOTION``, ``motion2.y``, which is needed where the same is moved the
+same way twice. A key is called as ``--set`` calls it, ``STEPS``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from numbers import Real
+from typing import Any
+
+from slideviz.case.cfg import set_key
+from slideviz.case.key import FILES, VIEW
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.case.words import nearest, number, shown
+from slideviz.errors import CaseError
+
+Value = str | float
+"""A number of a motion, or the text of a key's value; empty for that of the case."""
+
+_AXES = "xyz"
+_SHORT = {"vector": "", "point": "point_", "axis": "axis_", "factors": "factor_"}
+"""What the components of a field are called before their axis, where that is not the field."""
+_ALSO = {
+    "angle": "angle_deg",
+    "degrees": "angle_deg",
+    "dx": "x",
+    "dy": "y",
+    "dz": "z",
+    "px": "point_x",
+    "py": "point_y",
+    "pz": "point_z",
+    "dr": "distance",
+}
+"""Other names of numbers, as the grammar of ``MOTION`` has them, and what they are here."""
+_WHOLE_MOTION = ("MOTION", "DEFORMATION_FILENAME")
+_LISTED = 24
+
+
+@dataclass(frozen=True)
+class Place:
+    """The place of a number: which motion (from 0), its field, and which of several numbers."""
+
+    motion: int
+    field: str
+    component: int | None = None
+
+    def of(self, case: Case) -> float:
+        """Return the number that a case has there."""
+        value = getattr(case.motions[self.motion], self.field)
+        return float(value if self.component is None else value[self.component])
+
+    def put(self, motions: list[Motion], value: float) -> None:
+        """Put a number there, in place."""
+        motion = motions[self.motion]
+        new: Any = value
+        if self.component is not None:
+            several = list(getattr(motion, self.field))
+            several[self.component] = value
+            new = tuple(several)
+        motions[self.motion] = replace(motion, **{self.field: new})
+
+
+def numbers_of(case: Case) -> dict[str, Place]:
+    """Return the numbers of a case's motions by name, the shortest that tells each apart."""
+    found: dict[str, Place] = {}
+    heads = [_head(motion) for motion in case.motions]
+    for at, (motion, head) in enumerate(zip(case.motions, heads, strict=True)):
+        name = head if heads.count(head) == 1 else f"motion{at + 1}"
+        found |= {f"{name}.{part}": place for part, place in _parts(motion, at)}
+    return found
+
+
+def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
+    """Return for the name of each column the place of its number, or its key.
+
+    Raises
+    ------
+    CaseError
+        Some are unknown, mean the same, or cannot vary: a sentence for each.
+    """
+    found: dict[str, Place | str] = {}
+    problems = []
+    for name in names:
+        try:
+            meant = _meant(case, name)
+            twin = next((other for other, what in found.items() if what == meant), None)
+            if name in found or twin is not None:
+                raise CaseError(f"it means the same as column {twin or name}; keep one of them")
+            found[name] = meant
+        except CaseError as problem:
+            problems.append(f"column {shown(name)}: {problem}")
+    places = [name for name, what in found.items() if isinstance(what, Place)]
+    whole = [name for name, what in found.items() if what in _WHOLE_MOTION]
+    if places and whole:
+        problems.append(
+            f"column {shown(whole[0])} replaces motions whose numbers column {shown(places[0])} "
+            "changes; keep one of them"
+        )
+    if problems:
+        raise CaseError("\n".join(problems))
+    return found
+
+
+def applied(case: Case, columns: Mapping[str, Place | str], values: Mapping[str, Value]) -> Case:
+    """Return the case of one design; an empty value is that of the case.
+
+    Raises
+    ------
+    CaseError
+        Some values are wrong: a sentence for each, which names the column.
+    """
+    problems = []
+    keys = {what: name for name, what in columns.items() if isinstance(what, str)}
+    # In the order of the table, as in a case file: a key may be needed for another.
+    for key in (key for key in KEYS if key in keys):
+        try:
+            text = _text(values.get(keys[key], ""))
+            case = set_key(case, key, text) if text else case
+        except CaseError as problem:
+            said = str(problem).replace(f"--set {key}={text}: ", "")
+            problems.append(f"column {shown(keys[key])}: {said}")
+    motions = list(case.motions)
+    for name, place in columns.items():
+        value = values.get(name, "")
+        if isinstance(place, str) or value == "":
+            continue
+        try:
+            place.put(motions, _number(value))
+        except CaseError as problem:
+            problems.append(f"column {shown(name)}: {problem}")
+    if problems:
+        raise CaseError("\n".join(problems))
+    return case.change(motions=tuple(motions))
+
+
+def column_name(name: str) -> str:
+    """Return what a column is called in results: a key in capitals, else as it was given."""
+    plain = name.strip()
+    return plain.upper() if plain.upper() in KEYS else plain
+
+
+def own_values(case: Case, columns: Mapping[str, Place | str]) -> dict[str, Value]:
+    """Return what the case itself has in each column: a number, or a text."""
+    found: dict[str, Value] = {}
+    for name, what in columns.items():
+        if isinstance(what, Place):
+            found[name] = what.of(case)
+        else:
+            value = KEYS[what].get(case)
+            found[name] = "" if value is None else KEYS[what].kind.write(value)
+    return found
+
+
+def _meant(case: Case, name: str) -> Place | str:
+    """Return the place of a number, or the key, that a name means."""
+    key = name.strip().upper()
+    if key in KEYS:
+        if KEYS[key].group in (FILES, VIEW):
+            raise CaseError("files and the view are those of the case for all designs")
+        return key
+    known = numbers_of(case)
+    wanted = _plain(name)
+    by_place = {
+        _plain(f"motion{at + 1}.{part}"): place
+        for at, motion in enumerate(case.motions)
+        for part, place in _parts(motion, at)
+    }
+    by_name = {_plain(other): place for other, place in known.items()}
+    if name.strip() in known:  # markers may differ in capitals alone
+        return known[name.strip()]
+    if wanted in by_name or wanted in by_place:
+        return by_name.get(wanted) or by_place[wanted]
+    if any(_plain(f"{_head(motion)}.{part}") == wanted for motion, part in _all_parts(case)):
+        raise CaseError(f"several motions have it; say which, as {_listed(known) or 'motion1.x'}")
+    there = f"the motions have {_listed(known)}" if known else "the motions have no numbers"
+    hint = nearest(name, [*known, *KEYS])
+    raise CaseError(
+        f"there is no such number of a motion, and no such key{hint}; {there}; "
+        "`slideviz keys` lists the keys"
+    )
+
+
+def _all_parts(case: Case) -> Iterator[tuple[Motion, str]]:
+    for at, motion in enumerate(case.motions):
+        for part, _ in _parts(motion, at):
+            yield motion, part
+
+
+def _plain(name: str) -> str:
+    """Return a name in small letters, with the usual name of its number."""
+    head, dot, part = name.strip().lower().rpartition(".")
+    return f"{head}{dot}{_ALSO.get(part, part)}"
+
+
+def _head(motion: Motion) -> str:
+    """Return what a motion moves and how: ``BLADE.translate``."""
+    return f"{'+'.join(named(motion.marker)) or '*'}.{type(motion).__name__.lower()}"
+
+
+def _parts(motion: Motion, at: int) -> Iterator[tuple[str, Place]]:
+    """Yield the names and places of the numbers of a motion."""
+    if isinstance(motion, FromFile):
+        return
+    for field in fields(motion):
+        value = getattr(motion, field.name)
+        if _is_number(value):
+            yield field.name, Place(at, field.name)
+        elif isinstance(value, tuple) and value and all(map(_is_number, value)):
+            if field.name == "factors" and len(value) == 1:
+                yield "factor", Place(at, field.name, 0)
+                continue
+            head = _SHORT.get(field.name, f"{field.name}_")
+            for component, axis in zip(range(len(value)), _AXES, strict=False):
+                yield f"{head}{axis}", Place(at, field.name, component)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _listed(known: Iterable[str]) -> str:
+    names = list(known)
+    return ", ".join(names[:_LISTED]) + (", ..." if len(names) > _LISTED else "")
+
+
+def _number(value: Value) -> float:
+    if isinstance(value, str):
+        return number(value.strip())
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise CaseError(f"{value!r} is not a finite number")
+    return float(value)
+
+
+def _text(value: Any) -> str:
+    """Return a value as a case file would have it."""
+    if isinstance(value, str):
+        return value.strip()
+    if isinstance(value, bool):
+        return "YES" if value else "NO"
+    # 5.0 is what tables of numbers make of 5.
+    return format(value, ".17g") if isinstance(value, float) and value.is_integer() else str(value)

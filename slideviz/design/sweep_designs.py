@@ -1,0 +1,153 @@
+"""The designs of a sweep: a table read from CSV or given as values, each row made a case."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from slideviz.case.lines import listed, read_text
+from slideviz.case.model import Case
+from slideviz.design.sweep_columns import Place, Value, applied, column_name, columns_of
+from slideviz.errors import CaseError
+
+_SEPARATORS = (",", ";", "\t")
+
+
+@dataclass(frozen=True)
+class Design:
+    """A row of the table: its number (from 1), what it has in each column, and its case."""
+
+    number: int
+    values: Mapping[str, Value]
+    case: Case
+
+
+@dataclass(frozen=True)
+class Designs:
+    """The designs of a table, and what its columns mean."""
+
+    columns: Mapping[str, Place | str]
+    rows: tuple[Design, ...]
+
+
+Table = str | Path | Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]] | Designs
+"""A CSV file; the designs, each by the names of its columns; the columns by name; or as read."""
+
+
+def read_designs(case: Case, table: Table) -> Designs:
+    """Return the designs of a table.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be read, a column is unknown, or values are wrong: all of them, each with
+        its line.
+    """
+    if isinstance(table, Designs):
+        return table
+    if isinstance(table, str | Path):
+        return _read_csv(case, Path(table))
+    rows = [{column_name(name): row[name] for name in row} for row in _rows_of(table)]
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = columns_of(case, names)
+    if not columns or not rows:
+        raise CaseError("the table of designs is empty; give at least one column and one row")
+    designs, problems = [], []
+    for at, row in enumerate(rows, start=1):
+        values = {name: _value(row.get(name, "")) for name in names}
+        try:
+            designs.append(_design(case, columns, at, values))
+        except CaseError as problem:
+            problems += [f"design {at}: {line}" for line in str(problem).splitlines()]
+    if problems:
+        raise CaseError("\n".join(problems))
+    return Designs(columns, tuple(designs))
+
+
+def _rows_of(table: Sequence[Mapping[str, Any]] | Mapping[str, Sequence[Any]]) -> list[Mapping]:
+    """Return the rows of a table that is given by rows or by columns."""
+    if not isinstance(table, Mapping):
+        return list(table)
+    lengths = {name: len(values) for name, values in table.items()}
+    if len(set(lengths.values())) > 1:
+        said = ", ".join(f"{name} {count}" for name, count in lengths.items())
+        raise CaseError(f"the columns have different numbers of values ({said}); give as many")
+    return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+
+
+def _value(value: Any) -> Value:
+    """Return a value as a plain one: those of NumPy become numbers of Python."""
+    if isinstance(value, str):
+        return value.strip()
+    if value is None or value != value:  # what tables of numbers have where there is nothing
+        return "" if value is None else float(value)
+    return value.item() if hasattr(value, "item") else value
+
+
+def _read_csv(case: Case, path: Path) -> Designs:
+    """Return the designs of a file: a head with the names of the columns, then a row for each.
+
+    Empty lines and lines that begin with ``#`` are passed over; commas, semicolons or tabs
+    separate.
+    """
+    text, _ = read_text(path, "table of designs")
+    lines = _filled(text)
+    if len(lines) < 2:
+        raise CaseError(
+            f"{path}: has no designs; needed are a line with the names of the columns, as "
+            "BLADE.translate.y, and a line of values for each design"
+        )
+    (first, head), *rest = lines
+    separator = max(_SEPARATORS, key=head.count) if "," not in head else ","
+    names = [column_name(name) for name in _split(head, separator)]
+    try:
+        columns = columns_of(case, names)
+    except CaseError as problem:
+        raise CaseError(listed(path, [(first, line) for line in str(problem).splitlines()])) from (
+            problem
+        )
+    designs: list[Design] = []
+    problems = []
+    for at, (line, content) in enumerate(rest, start=1):
+        cells = [cell.strip() for cell in _split(content, separator)]
+        try:
+            if len(cells) != len(names):
+                raise CaseError(
+                    f"has {len(cells)} values, and the head {len(names)} columns; give as many"
+                )
+            values: dict[str, Value] = dict(zip(names, cells, strict=True))
+            designs.append(_design(case, columns, at, values))
+        except CaseError as problem:
+            problems += [(line, said) for said in str(problem).splitlines()]
+    if problems:
+        raise CaseError(listed(path, problems))
+    return Designs(columns, tuple(designs))
+
+
+def _design(
+    case: Case, columns: Mapping[str, Place | str], number: int, values: Mapping[str, Value]
+) -> Design:
+    """Return a design, with the numbers of motions as numbers."""
+    made = applied(case, columns, values)
+    plain = {
+        name: float(value) if isinstance(columns[name], Place) and value != "" else value
+        for name, value in values.items()
+    }
+    return Design(number, plain, made)
+
+
+def _filled(text: str) -> list[tuple[int, str]]:
+    """Return the lines that hold something, with their numbers from 1."""
+    return [
+        (at, line)
+        for at, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+
+
+def _split(line: str, separator: str) -> list[str]:
+    return next(csv.reader(StringIO(line), delimiter=separator, skipinitialspace=True))

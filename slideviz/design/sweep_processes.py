@@ -1,0 +1,218 @@
+"""Processes of this machine for a sweep: one of them that ends takes one design with it.
+
+``ProcessPoolExecutor`` ends all its processes when one is lost, and tells all their work as lost.
+Here each has a pool of its own, which is made anew.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context, parent_process
+from typing import Any, NoReturn
+
+from slideviz.design.sweep_worker import Packed, hold
+from slideviz.mesh.io.cleanup import clean_up
+
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
+"""What tidies up semaphores would complain of a command that is ended by a signal."""
+_environment = threading.Lock()
+_STARTS = 2
+"""Processes in a row that may end before they begin."""
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Processes(Executor):
+    """An executor with so many processes of this machine, each with one thread.
+
+    Parameters
+    ----------
+    count : int
+    mesh : Packed
+        Sent to each process when it starts.
+    """
+
+    def __init__(self, count: int, mesh: Packed) -> None:
+        self._max_workers = count
+        self._mesh = mesh
+        self._lock = threading.RLock()
+        self._asked: deque[tuple[Future, Callable, tuple, dict]] = deque()
+        self._idle: list[_Process] = [_Process(self) for _ in range(count)]
+        self._all = tuple(self._idle)
+        self._failed_starts = 0
+        self.lost = 0
+        """Processes that ended while they worked."""
+
+    @property
+    def cannot_start(self) -> bool:
+        """Tell whether processes end before they begin."""
+        return self._failed_starts >= _STARTS
+
+    @property
+    def pids(self) -> list[int]:
+        """Return the numbers of the processes that run."""
+        return [pid for one in self._all for pid in one.pids]
+
+    def submit(self, fn: Callable, /, *args: Any, **kwargs: Any) -> Future:
+        """Return the future of a call in the first process that is free."""
+        future: Future = Future()
+        with self._lock:
+            self._asked.append((future, fn, args, kwargs))
+        self._give()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; those in work are stopped where ``cancel_futures`` says so."""
+        with self._lock:
+            asked, idle = list(self._asked), self._idle
+            if cancel_futures:
+                self._asked.clear()
+            self._idle = [] if cancel_futures else idle
+        for future, *_ in asked if cancel_futures else ():
+            future.cancel()
+        for one in self._all:
+            one.end(wait, kill=cancel_futures)
+
+    def _give(self) -> None:
+        """Give free processes what is asked for."""
+        while True:
+            with self._lock:
+                if not (self._asked and self._idle):
+                    return
+                future, fn, args, kwargs = self._asked.popleft()
+                if not future.set_running_or_notify_cancel():
+                    continue
+                one = self._idle.pop()
+            one.run(future, fn, args, kwargs)
+
+    def _done(self, one: _Process, future: Future, inner: Future, began: bool) -> None:
+        """Pass a result on, and give the process the next."""
+        problem = inner.exception()
+        with self._lock:
+            if isinstance(problem, BrokenProcessPool):
+                one.forget()
+                self.lost += began
+                self._failed_starts = 0 if began else self._failed_starts + 1
+            elif began:
+                self._failed_starts = 0
+            self._idle.append(one)
+        if problem is None:
+            future.set_result(inner.result())
+        else:
+            future.set_exception(problem)
+        self._give()
+
+
+class _Process:
+    """A process that is started when it is needed, and again when it was lost."""
+
+    def __init__(self, owner: Processes) -> None:
+        self._owner = owner
+        self._pool: ProcessPoolExecutor | None = None
+        self._begun: Future | None = None
+        # What is told of a loss by a pool must not be the end of that pool: it holds its own lock.
+        self._broken: list[ProcessPoolExecutor] = []
+
+    @property
+    def pids(self) -> list[int]:
+        """Return the number of the process, if it runs."""
+        found = getattr(self._pool, "_processes", None) or {}
+        return list(found)
+
+    def run(self, future: Future, fn: Callable, args: tuple, kwargs: dict) -> None:
+        """Let the process do a call."""
+        try:
+            if self._pool is None:
+                self._start()
+            assert self._pool is not None
+            inner = self._pool.submit(fn, *args, **kwargs)
+        except Exception as problem:  # it was lost while it was idle, or cannot be started
+            inner = Future()
+            inner.set_exception(BrokenProcessPool(str(problem)))
+        begun = self._begun
+        inner.add_done_callback(
+            lambda done: self._owner._done(
+                self, future, done, begun is not None and _succeeded(begun)
+            )
+        )
+
+    def _start(self) -> None:
+        """Start the process and send it the mesh."""
+        with _settings_of_workers():
+            self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin)
+            self._begun = self._pool.submit(hold, self._owner._mesh)
+
+    def forget(self) -> None:
+        """Do without the process: the next call starts another."""
+        if self._pool is not None:
+            self._broken.append(self._pool)
+        self._pool, self._begun = None, None
+
+    def end(self, wait: bool, kill: bool) -> None:
+        """End the process."""
+        for pool in (*self._broken, *([self._pool] if self._pool is not None else [])):
+            if kill:
+                for process in list((getattr(pool, "_processes", None) or {}).values()):
+                    with suppress(OSError, ValueError, AttributeError):
+                        process.terminate()
+            pool.shutdown(wait=wait, cancel_futures=kill)
+
+
+def _succeeded(future: Future) -> bool:
+    return future.done() and not future.cancelled() and future.exception() is None
+
+
+@contextmanager
+def _settings_of_workers() -> Iterator[None]:
+    """Return a context whose processes have one thread, and leave Ctrl+C to this one.
+
+    What blocks a signal is inherited, from the beginning: nothing is lost that comes meanwhile.
+    """
+    with _environment:
+        before = {name: os.environ.get(name) for name in (*_THREADS, "PYTHONWARNINGS")}
+        os.environ.update(dict.fromkeys(_THREADS, "1"))
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [before["PYTHONWARNINGS"], _QUIET]))
+        masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+
+def _begin() -> None:
+    """Prepare a worker: it leaves no draft when it is ended, and does not outlive its parent.
+
+    Threads wait for both, since Python would act on a signal only after a loop that computes.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+    for wait in (lambda: signal.sigwait({signal.SIGTERM}), _wait_for_parent):
+        threading.Thread(target=lambda wait=wait: (wait(), _leave()), daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+
+
+def _leave() -> NoReturn:
+    clean_up()
+    os._exit(128 + signal.SIGTERM)

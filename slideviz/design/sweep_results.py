@@ -1,0 +1,264 @@
+"""The folder of a sweep: ``results.csv`` with a row for each design, and what it was made of.
+
+A row is added as soon as it comes, so that a sweep that was stopped, in whatever way, can go on.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import blake2b
+from io import StringIO
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from slideviz import __version__
+from slideviz.case.check import effective
+from slideviz.case.key import FILES, VIEW
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case, FromFile
+from slideviz.design.sweep_columns import Value
+from slideviz.design.sweep_designs import Designs
+from slideviz.design.sweep_row import NUMBERS, Row
+from slideviz.errors import CaseError
+from slideviz.mesh.io.atomic import atomic_write, reason_of
+from slideviz.mesh.model import Mesh
+
+RESULTS, SOURCES = "results.csv", "sweep.json"
+_WORDS = ("mesh", "warnings", "problem")
+
+
+class Results:
+    """The results of a sweep in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    designs : Designs
+    sources : mapping of str to str
+        What the results depend on; see `sources_of`.
+    """
+
+    def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
+        self._folder, self._designs, self._sources = folder, designs, sources
+        self._head = ["design", *designs.columns, *NUMBERS, *_WORDS]
+
+    @property
+    def path(self) -> Path:
+        """Return the table."""
+        return self._folder / RESULTS
+
+    def start(self, *, resume: bool, force: bool, meshes: bool) -> list[Row]:
+        """Begin the table, or return the rows of a stopped sweep that need not be done again.
+
+        Designs that failed are done again, and those whose mesh is wanted and missing.
+
+        Raises
+        ------
+        CaseError
+            There are results, and it was not said what to do with them; or they are of another
+            case, mesh or table; or the table cannot be written.
+        """
+        if resume and self.path.exists():
+            found = {row.design: row for row in self._go_on()}
+            return [row for row in found.values() if not row.problem and _has(row, meshes)]
+        if self.path.exists() and not force:
+            raise CaseError(
+                f"{self.path}: there are results already; go on with --resume (resume=True), "
+                "begin anew with --force (force=True), or choose another folder"
+            )
+        self._begin()
+        return []
+
+    def _begin(self) -> None:
+        """Write an empty table, and what the results depend on."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise CaseError(
+                f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
+            ) from problem
+        text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
+        with atomic_write(self._folder / SOURCES, CaseError) as file:
+            file.write(text.encode())
+        with atomic_write(self.path, CaseError) as file:
+            file.write(_line(self._head))
+
+    def _go_on(self) -> list[Row]:
+        """Return the rows that are there, after a check that they are of the same sweep.
+
+        A line that was cut off when the sweep was stopped is taken away.
+        """
+        self._require_same_sources()
+        try:
+            data = self.path.read_bytes()
+            whole = data[: data.rfind(b"\n") + 1]
+            if len(whole) < len(data):
+                os.truncate(self.path, len(whole))
+        except OSError as problem:
+            raise CaseError(f"{self.path}: cannot be read: {reason_of(problem)}") from problem
+        head, *lines = [*csv.reader(StringIO(whole.decode("utf-8", "replace")))] or [[]]
+        if head != self._head:
+            names = ", ".join(head[1 : -len(NUMBERS) - len(_WORDS)])
+            raise CaseError(
+                f"{self.path}: has other columns ({names}) than the table of designs "
+                f"({', '.join(self._designs.columns)}); {_REMEDY}"
+            )
+        return [self._row(at, line) for at, line in enumerate(lines, start=2)]
+
+    def add(self, row: Row) -> None:
+        """Add a row at the end of the table, in one piece.
+
+        Raises
+        ------
+        CaseError
+            It cannot be written.
+        """
+        try:
+            with self.path.open("ab", buffering=0) as file:
+                file.write(_line(self._cells(row)))
+        except OSError as problem:
+            raise CaseError(f"{self.path}: cannot be written: {reason_of(problem)}") from problem
+
+    def sort(self, rows: Iterable[Row]) -> None:
+        """Write the table anew, in the order of the designs, each once."""
+        last = {row.design: row for row in rows}
+        with atomic_write(self.path, CaseError) as file:
+            file.write(_line(self._head))
+            for number in sorted(last):
+                file.write(_line(self._cells(last[number])))
+
+    def _cells(self, row: Row) -> list[Any]:
+        done = not row.problem
+        return [
+            row.design,
+            *(row.values[name] for name in self._designs.columns),
+            *(getattr(row, name) if done else "" for name in NUMBERS),
+            "" if row.mesh is None else os.path.relpath(row.mesh, self._folder),
+            "; ".join(" ".join(text.split()) for text in row.warnings),
+            " ".join(row.problem.split()),
+        ]
+
+    def _row(self, line: int, cells: Sequence[str]) -> Row:
+        """Return the row of a line, after a check that it is of the design of that number."""
+        try:
+            if len(cells) != len(self._head):
+                raise ValueError
+            found = dict(zip(self._head, cells, strict=True))  # columns and results differ in name
+            number = int(cells[0])
+            numbers = {
+                name: read(found[name]) for name, (_, read) in NUMBERS.items() if found[name]
+            }
+        except ValueError:
+            raise CaseError(
+                f"{self.path}:{line}: is no row of a sweep; take the line away, or {_REMEDY}"
+            ) from None
+        rows = self._designs.rows
+        values = dict(zip(self._designs.columns, cells[1:], strict=False))
+        if not 1 <= number <= len(rows):
+            raise CaseError(
+                f"{self.path}:{line}: has design {number}, and the table of designs has "
+                f"{len(rows)}; {_REMEDY}"
+            )
+        for name, value in values.items():
+            now = rows[number - 1].values[name]
+            if not _same(value, now):
+                raise CaseError(
+                    f"{self.path}:{line}: design {number} was made with {name}= "
+                    f"{value or '(that of the case)'}, and the table of designs has "
+                    f"{now or '(that of the case)'} now; {_REMEDY}"
+                )
+        return Row(
+            number,
+            rows[number - 1].values,
+            **numbers,  # type: ignore[arg-type]
+            mesh=self._folder / found["mesh"] if found["mesh"] else None,
+            warnings=tuple(found["warnings"].split("; ")) if found["warnings"] else (),
+            problem=found["problem"],
+            earlier=True,
+        )
+
+    def _require_same_sources(self) -> None:
+        path = self._folder / SOURCES
+        try:
+            before = json.loads(path.read_bytes())
+            if not isinstance(before, dict):
+                raise ValueError
+        except (OSError, ValueError):
+            raise CaseError(
+                f"{path}: is missing or not readable, so that nothing tells what {self.path} was "
+                f"made of; {_REMEDY}"
+            ) from None
+        before.pop("slideviz", None)
+        now = self._sources
+        changed = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+        if not changed:
+            return
+        said = "; ".join(
+            f"{key}= {_short(before.get(key))} before, {_short(now.get(key))} now"
+            if key in KEYS
+            else f"the {key} is another"
+            for key in changed
+        )
+        raise CaseError(f"{self.path}: was made of something else: {said}; {_REMEDY}")
+
+
+_REMEDY = "choose another folder, or begin anew with --force (force=True)"
+
+
+def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
+    """Return what the results of a case depend on: digests of its files, and its keys as text."""
+    plain = effective(case)
+    boundaries = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
+    found = {
+        "mesh": _digest(mesh.points, mesh.cells.types, mesh.cells.connectivity, *chain(*boundaries))
+    }
+    for motion in case.motions:
+        if isinstance(motion, FromFile):
+            try:
+                found[f"file {motion.path.name}"] = _digest(motion.path.read_bytes())
+            except OSError:
+                found[f"file {motion.path.name}"] = "not readable"
+    for key in KEYS.values():
+        value = key.get(plain) if key.group not in (FILES, VIEW) else None
+        if value is not None and key.name != "DEFORMATION_FILENAME":
+            found[key.name] = " ".join(key.kind.write(value).split())
+    return found
+
+
+def _has(row: Row, meshes: bool) -> bool:
+    return not meshes or (row.mesh is not None and row.mesh.is_file())
+
+
+def _digest(*parts: Any) -> str:
+    digest = blake2b(digest_size=16)
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _line(cells: Sequence[Any]) -> bytes:
+    out = StringIO()
+    plain = ["" if isinstance(c, float) and math.isnan(c) else c for c in cells]
+    csv.writer(out, lineterminator="\n").writerow(plain)
+    return out.getvalue().encode()
+
+
+def _same(text: str, value: Value) -> bool:
+    """Tell whether a value is what the table has as text: as words, or as a number."""
+    if text == str(value):
+        return True
+    try:
+        return float(text) == float(value)
+    except ValueError:
+        return False
+
+
+def _short(text: str | None) -> str:
+    if text is None:
+        return "nothing"
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,160 @@
+"""The work of a sweep on one design, in whatever process or machine an executor has.
+
+The mesh goes to a process once and is held there, with all that is found once for it (boundary,
+undeformed quality); a design is the case alone. A process that does not hold the mesh says so,
+and is sent it with the next design.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from slideviz import __version__
+from slideviz.case.model import Case
+from slideviz.deformation.solver import deform
+from slideviz.deformation.steps import Step
+from slideviz.design.sweep_row import Row
+from slideviz.errors import Note, SlidevizError
+from slideviz.mesh.io.files import write
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.quality import quality
+from slideviz.terms import FileFormat
+
+_KEPT = 2
+"""Meshes that a process holds: that of the sweep, and one of another that uses it, too."""
+_held: dict[str, Mesh] = {}
+_one_at_a_time = Lock()
+"""Numba's threads end the process where two loops of different threads meet."""
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A mesh as bytes, and the name it goes by."""
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True)
+class Task:
+    """A design as it is sent: its number, its case, the name of the mesh, perhaps the mesh."""
+
+    design: int
+    case: Case
+    mesh: str
+    version: str = __version__
+    packed: Packed | None = None
+    output: Path | None = None
+    file_format: FileFormat | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a task, and who did it; no row where the mesh is not held there."""
+
+    worker: str
+    row: Row | None = None
+
+
+def packed(mesh: Mesh) -> Packed:
+    """Return a mesh as bytes, under a name that tells it apart from all others."""
+    content = pickle.dumps(mesh, protocol=pickle.HIGHEST_PROTOCOL)
+    return Packed(blake2b(content, digest_size=16).hexdigest(), content)
+
+
+def hold(mesh: Packed) -> str:
+    """Keep a mesh in this process, and return who it is."""
+    if mesh.name not in _held:
+        while len(_held) >= _KEPT:
+            _held.pop(next(iter(_held)))
+        _held[mesh.name] = pickle.loads(mesh.content)
+    return _myself()
+
+
+def work(task: Task) -> Answer:
+    """Return the result of a design: whatever goes wrong with it is a row with the reason."""
+    if task.version != __version__:
+        reason = f"the worker {_myself()} has slideviz {__version__}, this is {task.version}"
+        return Answer(_myself(), Row(task.design, problem=f"{reason}; install the same version"))
+    with _one_at_a_time:
+        if task.packed is not None:
+            hold(task.packed)
+        mesh = _held.get(task.mesh)
+        if mesh is None:
+            return Answer(_myself())
+        begin = time.perf_counter()
+        try:
+            with _one_thread():
+                row = _result(task, mesh, begin)
+        except SlidevizError as problem:
+            row = Row(task.design, problem="; ".join(str(problem).splitlines()))
+        except MemoryError:
+            row = Row(task.design, problem="out of memory; a coarser mesh or fewer workers")
+        except Exception as problem:
+            row = Row(task.design, problem=f"internal error ({type(problem).__name__}: {problem})")
+        return Answer(_myself(), row)
+
+
+def _result(task: Task, mesh: Mesh, begin: float) -> Row:
+    """Deform the mesh as ``slideviz run`` does, and return the row."""
+    last, errors = None, []
+    for step in deform(task.case, mesh):
+        last = step
+        errors.append(step.max_error)
+    assert last is not None
+    found = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
+    if task.output is not None:
+        write(task.output, last.mesh, base=mesh, file_format=task.file_format)
+    return Row(
+        design=task.design,
+        min=found.min,
+        mean=found.mean,
+        inverted=found.inverted,
+        max_error=max(errors),
+        control_nodes=last.control_nodes,
+        steps=last.total,
+        seconds=time.perf_counter() - begin,
+        mesh=task.output,
+        warnings=_warnings(last),
+    )
+
+
+def _warnings(last: Step) -> tuple[str, ...]:
+    """Return what should be known of a run, without what is harmless."""
+    return tuple(text for text in last.warnings if not isinstance(text, Note))
+
+
+def _myself() -> str:
+    return f"{os.uname().nodename}, process {os.getpid()}"
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Return a context in which loops and linear algebra use one thread: designs use the cores."""
+    from numba import get_num_threads, set_num_threads
+
+    before = get_num_threads()
+    set_num_threads(1)
+    try:
+        with _libraries().limit(limits=1):
+            yield
+    finally:
+        set_num_threads(before)
+
+
+@cache
+def _libraries() -> Any:
+    """Return the libraries of linear algebra of this process; finding them takes milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

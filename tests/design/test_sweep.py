@@ -1,0 +1,317 @@
+"""Sweeps: rows as single runs give them, columns by name, results that can go on."""
+
+from __future__ import annotations
+
+import csv
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.design import sweep as sweeping
+from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
+from slideviz.design.sweep_designs import read_designs
+from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_worker import Answer, Packed, Task, hold, packed, work
+from slideviz.errors import CaseError, DeformError
+from slideviz.samples.table import sample
+
+
+@pytest.fixture(scope="module")
+def passage():
+    return sample("passage", 12)
+
+
+@pytest.fixture
+def here():
+    with ThreadPoolExecutor(2) as executor:
+        yield executor
+
+
+DESIGNS = {"airfoil.rotate.angle_deg": [-1.0, -4.0, -8.0], "airfoil.translate.y": [0.0, 0.05, 0.1]}
+
+
+def turned(case, angle, up):
+    rotation, shift = case.motions
+    return case.change(
+        motions=(replace(rotation, angle_deg=angle), replace(shift, vector=(0.0, up)))
+    )
+
+
+def swept(case, designs, executor, **options):
+    return sorted(sv.sweep(case, designs, executor, **options), key=lambda row: row.design)
+
+
+def test_rows_are_what_single_runs_give_to_the_bit(passage, here):
+    rows = swept(passage.case, DESIGNS, here, mesh=passage.mesh)
+    assert [row.design for row in rows] == [1, 2, 3]
+    for row, angle, up in zip(rows, *DESIGNS.values(), strict=True):
+        *steps, last = sv.deform(turned(passage.case, angle, up), passage.mesh)
+        found = sv.quality(last.mesh, reference=passage.mesh)
+        errors = [step.max_error for step in (*steps, last)]
+        assert (row.min, row.mean, row.inverted) == (found.min, found.mean, found.inverted)
+        assert (row.control_nodes, row.steps) == (last.control_nodes, last.total)
+        assert row.max_error == max(errors)
+        assert row.problem == ""
+        assert row.values == {"airfoil.rotate.angle_deg": angle, "airfoil.translate.y": up}
+        assert row.seconds > 0.0
+
+
+def test_keys_and_empty_values(passage, here):
+    rows = swept(
+        passage.case,
+        [{"steps": 2, "SLIDING_MODE": "ds"}, {"steps": "", "sliding_mode": "ps"}],
+        here,
+        mesh=passage.mesh,
+    )
+    assert [row.steps for row in rows] == [2, passage.case.steps]
+    *_, last = sv.deform(passage.case.change(steps=2, sliding="ds"), passage.mesh)
+    assert rows[0].min == sv.quality(last.mesh, reference=passage.mesh).min
+    assert rows[0].values == {"STEPS": 2, "SLIDING_MODE": "ds"}
+
+
+def test_a_design_that_fails_is_a_row_with_the_reason(passage, here):
+    designs = {"airfoil.rotate.angle_deg": [1.0, 1.0], "PERIODIC_MODE": ["moving", "moving"]}
+    designs["SLIDING_MODE"] = ["none", "ps"]
+    rows = swept(passage.case, designs, here, mesh=passage.mesh)
+    assert "PERIODIC_MODE= moving needs a sliding method" in rows[0].problem
+    assert np.isnan(rows[0].min)
+    assert rows[1].problem == ""
+
+
+def test_columns_have_several_names(passage):
+    case = passage.case
+    for one, other in [
+        ("airfoil.rotate.degrees", "motion1.angle_deg"),
+        ("AIRFOIL.translate.dy", "motion2.y"),
+        ("airfoil.translate.Y", "Motion2.DY"),
+    ]:
+        assert columns_of(case, [one])[one] == columns_of(case, [other])[other]
+    assert "airfoil.translate.y" in numbers_of(case)
+    named = columns_of(case, ["airfoil.translate.y", "STEPS"])
+    assert own_values(case, named) == {"airfoil.translate.y": 0.12, "STEPS": "5"}
+
+
+def test_numbers_of_every_motion():
+    case = sv.Case(
+        roles={"a": "moving", "b": "moving"},
+        motions=(
+            sv.Translate("a", (1, 2.0)),
+            sv.Translate("a", (0.0, 0.0)),
+            sv.Scale(("a", "b"), (1.1,), (0.0, 0.5)),
+            sv.Radial("", 1.5, 0.1),
+        ),
+    )
+    known = numbers_of(case)
+    assert list(known)[:4] == ["motion1.x", "motion1.y", "motion2.x", "motion2.y"]
+    assert {"a+b.scale.factor", "a+b.scale.point_x", "*.radial.factor", "*.radial.distance"} < set(
+        known
+    )
+    values = {name: place.of(case) for name, place in known.items()}
+    assert (values["motion1.x"], values["a+b.scale.factor"]) == (1.0, 1.1)
+    made = read_designs(case, [{"a+b.scale.py": 7, "*.radial.dr": 3}]).rows[0].case
+    assert made.motions[2].point == (0.0, 7.0)
+    assert made.motions[3].distance == 3.0
+    with pytest.raises(CaseError, match=r"several motions have it; say which, as motion1.x"):
+        columns_of(case, ["a.translate.x"])
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["airfoil.rotat.angle_deg"], "did you mean airfoil.rotate.angle_deg"),
+        (["zzz"], r"the motions have airfoil.rotate.angle_deg, .*airfoil.translate.y"),
+        (["MESH_FILENAME"], "files and the view are those of the case"),
+        (["STEPS", "steps"], "means the same as column STEPS"),
+        (["motion2.y", "airfoil.translate.dy"], "means the same as column motion2.y"),
+        (["motion2.y", "MOTION"], "replaces motions whose numbers"),
+    ],
+)
+def test_columns_that_cannot_be(passage, names, said):
+    with pytest.raises(CaseError, match=said):
+        columns_of(passage.case, names)
+
+
+def test_every_wrong_value_is_told_with_its_line(passage, tmp_path):
+    table = tmp_path / "designs.csv"
+    table.write_text("motion2.y;STEPS\n# a remark\n\n0,1;2\nnan;x\n1;2;3\n")
+    with pytest.raises(CaseError) as problem:
+        read_designs(passage.case, table)
+    assert str(problem.value).splitlines() == [
+        f"{table}:4: column 'motion2.y': '0,1' is not a number; write decimals with a point",
+        f"{table}:5: column 'STEPS': 'x' is not a whole number from 1, or auto",
+        f"{table}:5: column 'motion2.y': 'nan' is not a number",
+        f"{table}:6: has 3 values, and the head 2 columns; give as many",
+    ]
+    with pytest.raises(CaseError, match=r"design 2: column 'motion2.y': inf is not a finite"):
+        read_designs(passage.case, {"motion2.y": [0.0, np.inf]})
+    with pytest.raises(CaseError, match="different numbers of values"):
+        read_designs(passage.case, {"motion2.y": [0.0], "STEPS": [1, 2]})
+    table.write_text("motion2.y\n")
+    with pytest.raises(CaseError, match="has no designs"):
+        read_designs(passage.case, table)
+    with pytest.raises(CaseError, match="table of designs is empty"):
+        read_designs(passage.case, [])
+
+
+def lines_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_stopped_sweep_goes_on(passage, here, tmp_path):
+    asked = {"mesh": passage.mesh, "folder": tmp_path, "meshes": True}
+    rows = sv.sweep(passage.case, DESIGNS, here, **asked)
+    first = next(rows)
+    rows.close()
+    table = tmp_path / "results.csv"
+    assert [int(line["design"]) for line in lines_of(table)] == [first.design]
+    with table.open("a") as file:
+        file.write("3,-8.0,0.1,0.")  # cut off in the middle
+    with pytest.raises(CaseError, match="there are results already"):
+        sv.sweep(passage.case, DESIGNS, here, **asked)
+    again = list(sv.sweep(passage.case, DESIGNS, here, resume=True, **asked))
+    assert again[0] == replace(first, earlier=True)
+    assert sorted(row.design for row in again) == [1, 2, 3]
+    whole = {row.design: row for row in again}
+    for line in lines_of(table):
+        row = whole[int(line["design"])]
+        assert (float(line["min"]), float(line["airfoil.translate.y"])) == (
+            row.min,
+            row.values["airfoil.translate.y"],
+        )
+        assert row.mesh == tmp_path / line["mesh"]
+        *_, last = sv.deform(turned(passage.case, *row.values.values()), passage.mesh)
+        assert np.array_equal(sv.read(row.mesh).points, last.mesh.points)
+    assert [line["design"] for line in lines_of(table)] == ["1", "2", "3"]
+    # A row more at the end of the table is no other table; a mesh that is gone is made again.
+    whole[2].mesh.unlink()
+    longer = {name: [*values, 0.0] for name, values in DESIGNS.items()}
+    more = swept(passage.case, longer, here, resume=True, **asked)
+    assert [row.earlier for row in more] == [True, False, True, False]
+    assert whole[2].mesh.exists()
+
+
+def test_what_failed_is_done_again(passage, here, tmp_path):
+    asked = {"mesh": passage.mesh, "folder": tmp_path}
+    missing = tmp_path / "later.txt"
+    designs = {"DEFORMATION_FILENAME": [str(missing)]}
+    case = passage.case.change(motions=())
+    (row,) = sv.sweep(case, designs, here, **asked)
+    assert "there is no such displacement file" in row.problem
+    nodes = passage.mesh.marker("airfoil").nodes
+    missing.write_text("".join(f"{node} 0.0 0.01\n" for node in nodes))
+    (row,) = sv.sweep(case, designs, here, resume=True, **asked)
+    assert row.problem == ""
+    assert len(lines_of(tmp_path / "results.csv")) == 1
+
+
+def test_results_of_something_else_are_refused(passage, here, tmp_path):
+    asked = {"mesh": passage.mesh, "folder": tmp_path, "resume": True}
+    list(sv.sweep(passage.case, DESIGNS, here, **asked))
+    with pytest.raises(CaseError, match="SLIDING_MODE= ps before, ds now"):
+        sv.sweep(passage.case.change(sliding="ds"), DESIGNS, here, **asked)
+    other = {**DESIGNS, "airfoil.translate.y": [0.0, 0.06, 0.1]}
+    with pytest.raises(CaseError, match=r"design 2 was made with airfoil.translate.y= 0.05"):
+        sv.sweep(passage.case, other, here, **asked)
+    with pytest.raises(CaseError, match="has other columns"):
+        sv.sweep(passage.case, {"STEPS": [1, 2, 3]}, here, **asked)
+    fewer = {name: values[:2] for name, values in DESIGNS.items()}
+    with pytest.raises(CaseError, match="has design 3, and the table of designs has 2"):
+        sv.sweep(passage.case, fewer, here, **asked)
+    moved = passage.mesh.with_points(passage.mesh.points + 1.0)
+    with pytest.raises(CaseError, match="the mesh is another"):
+        sv.sweep(passage.case, DESIGNS, here, **(asked | {"mesh": moved}))
+    table = tmp_path / "results.csv"
+    table.write_text(table.read_text() + "1,2\n")
+    with pytest.raises(CaseError, match=r"results.csv:5: is no row of a sweep"):
+        sv.sweep(passage.case, DESIGNS, here, **asked)
+    (tmp_path / "sweep.json").unlink()
+    with pytest.raises(CaseError, match="is missing or not readable"):
+        sv.sweep(passage.case, DESIGNS, here, **asked)
+    rows = list(sv.sweep(passage.case, DESIGNS, here, **asked | {"resume": False, "force": True}))
+    assert not any(row.earlier for row in rows)
+
+
+def test_asked_in_vain(passage):
+    with pytest.raises(CaseError, match="the case names no mesh"):
+        sv.sweep(passage.case.change(mesh_file=None), DESIGNS)
+    with pytest.raises(CaseError, match="need a folder"):
+        sv.sweep(passage.case, DESIGNS, mesh=passage.mesh, meshes=True)
+    with pytest.raises(CaseError, match="workers is 0"):
+        sv.sweep(passage.case, DESIGNS, mesh=passage.mesh, workers=0)
+
+
+def test_the_mesh_is_sent_to_who_needs_it(passage):
+    task = Task(1, passage.case, "no such mesh")
+    assert work(task).row is None
+    mesh = packed(passage.mesh)
+    assert work(replace(task, mesh=mesh.name, packed=mesh)).row.problem == ""
+    assert work(replace(task, mesh=mesh.name)).row.problem == ""
+    other = work(replace(task, version="0.0.0")).row
+    assert "install the same version" in other.problem
+    for name in "ab":  # another sweep uses the same processes
+        hold(Packed(name, mesh.content))
+    assert work(replace(task, mesh=mesh.name)).row is None
+
+
+class Losing(Executor):
+    """An executor that loses the worker of some calls, and has two that lack the mesh."""
+
+    def __init__(self, losses):
+        self._losses, self.sent, self.calls = list(losses), 0, 0
+
+    def submit(self, fn, /, task):
+        future = Future()
+        self.calls += 1
+        self.sent += task.packed is not None
+        if self.calls <= 2:
+            future.set_result(Answer(f"worker {self.calls}"))
+        elif task.design in self._losses:
+            self._losses.remove(task.design)
+            future.set_exception(BrokenExecutor("killed"))
+        else:
+            future.set_result(Answer("worker 1", Row(task.design, min=0.5)))
+        return future
+
+
+def test_a_lost_worker_loses_one_design_which_is_done_again(passage):
+    executor = Losing([2, 2, 3])
+    rows = swept(passage.case, DESIGNS, executor, mesh=passage.mesh)
+    assert [(row.lost, row.problem) for row in rows] == [(0, ""), (2, ""), (1, "")]
+    assert executor.sent >= 1
+
+
+def test_a_design_that_always_loses_its_worker_is_a_row(passage):
+    rows = swept(passage.case, DESIGNS, Losing([2] * 9), mesh=passage.mesh)
+    assert [row.problem == "" for row in rows] == [True, False, True]
+    assert f"its worker was lost {sweeping.LOST} times" in rows[1].problem
+
+
+def test_an_executor_that_is_broken(passage):
+    with ThreadPoolExecutor(1) as executor:
+        executor.shutdown()
+        with pytest.raises(DeformError, match="the executor takes no more work"):
+            list(sv.sweep(passage.case, DESIGNS, executor, mesh=passage.mesh))
+
+
+def test_a_large_file_is_opened_in_the_other_process_too(passage, tmp_path, monkeypatch):
+    import pickle
+
+    from slideviz.mesh.io import source
+
+    monkeypatch.setattr(source, "KEPT_BYTES", 100)
+    file = tmp_path / "passage.su2"
+    sv.write(file, passage.mesh)
+    mesh = sv.read(file)
+    sent = pickle.loads(packed(mesh).content)
+    moved = mesh.points * 1.5
+    sv.write(tmp_path / "one.su2", mesh.with_points(moved))
+    sv.write(tmp_path / "other.su2", sent.with_points(moved))
+    assert (tmp_path / "one.su2").read_bytes() == (tmp_path / "other.su2").read_bytes()
+    content = packed(mesh).content
+    file.write_bytes(file.read_bytes() + b"% more\n")
+    with pytest.raises(sv.SlidevizError, match="was changed while it was in use"):
+        pickle.loads(content)

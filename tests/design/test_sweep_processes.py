@@ -1,0 +1,140 @@
+"""Processes of a sweep: they hold the mesh, and one that is killed takes one design with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import slideviz as sv
+from slideviz.design import sweep as sweeping
+from slideviz.design.sweep_processes import Processes
+from slideviz.design.sweep_worker import packed
+from slideviz.samples.table import sample
+
+
+@pytest.fixture(scope="module")
+def passage():
+    return sample("passage", 12)
+
+
+def is_running(pid):
+    """Tell whether a process runs; one that ended and was not waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def wait_until(what):
+    give_up = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < give_up
+        time.sleep(0.02)
+
+
+def test_killed_workers_lose_one_design_each_and_none_is_left(passage, monkeypatch):
+    made = []
+
+    class Watched(Processes):
+        def __init__(self, *args):
+            super().__init__(*args)
+            made.append(self)
+
+    monkeypatch.setattr(sweeping, "Processes", Watched)
+    angles = [-0.05 * k for k in range(60)]
+    killed = set()
+    rows = []
+    for row in sv.sweep(passage.case, {"motion1.angle": angles}, mesh=passage.mesh, workers=2):
+        rows.append(row)
+        if len(rows) in (5, 25):
+            pid = made[0].pids[0]
+            os.kill(pid, signal.SIGKILL)
+            killed.add(pid)
+    assert sorted(row.design for row in rows) == list(range(1, 61))
+    assert not any(row.problem for row in rows)
+    # One may have been killed between two designs, or before it began.
+    assert made[0].lost <= sum(row.lost for row in rows) <= len(killed) == 2
+    assert not any(map(is_running, made[0].pids))
+    by_design = sorted(rows, key=lambda row: row.design)
+    rotation, shift = passage.case.motions
+    case = passage.case.change(motions=(replace(rotation, angle_deg=angles[-1]), shift))
+    *_, last = sv.deform(case, passage.mesh)
+    assert by_design[-1].min == sv.quality(last.mesh, reference=passage.mesh).min
+
+
+def test_workers_end_with_their_parent_however_it_ends(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sys, time\n"
+        "from slideviz.design.sweep_processes import Processes\n"
+        "from slideviz.design.sweep_worker import Packed\n"
+        "import pickle\n"
+        "if __name__ == '__main__':\n"
+        "    workers = Processes(1, Packed('none', pickle.dumps(None)))\n"
+        "    workers.submit(divmod, 1, 1).result()\n"
+        "    print(workers.pids[0], flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as parent:
+        pid = int(parent.stdout.readline())
+        assert is_running(pid)
+        parent.kill()
+    wait_until(lambda: not is_running(pid))
+
+
+def test_a_script_without_a_guard_is_told(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import slideviz as sv\n"
+        "from slideviz.samples.table import sample\n"
+        "made = sample('passage', 12)\n"
+        "list(sv.sweep(made.case, {'STEPS': [1, 2]}, mesh=made.mesh, workers=1))\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert 'must stand under `if __name__ == "__main__":`' in done.stderr
+
+
+def test_a_sweep_that_is_given_up_ends_at_once(passage):
+    rows = sv.sweep(passage.case, {"STEPS": [1] * 50}, mesh=passage.mesh, workers=1)
+    next(rows)
+    begin = time.monotonic()
+    rows.close()
+    assert time.monotonic() - begin < 30
+
+
+def test_what_a_process_cannot_do_is_an_error_of_the_call(passage):
+    with Processes(1, packed(passage.mesh)) as workers:
+        with pytest.raises(ZeroDivisionError):
+            workers.submit(divmod, 1, 0).result()
+        assert workers.submit(divmod, 7, 2).result() == (3, 1)
+        assert workers.lost == 0
+
+
+@pytest.mark.slow
+def test_a_killed_worker_of_a_dask_cluster(passage):
+    distributed = pytest.importorskip("distributed")
+    angles = [-0.05 * k for k in range(80)]
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        rows = []
+        asked = {"motion1.angle": angles}
+        for row in sv.sweep(passage.case, asked, client.get_executor(), mesh=passage.mesh):
+            rows.append(row)
+            if len(rows) == 7:
+                os.kill(next(iter(cluster.workers.values())).process.process.pid, signal.SIGKILL)
+    assert sorted(row.design for row in rows) == list(range(1, 81))
+    assert not any(row.problem for row in rows)
+    own = {row.design: row.min for row in sv.sweep(passage.case, asked, mesh=passage.mesh)}
+    assert {row.design: row.min for row in rows} == own

@@ -1,0 +1,145 @@
+"""``slideviz sweep``: the table of results, the report, and signs of what is wrong."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from slideviz.cli import run
+from slideviz.design import sweep as sweeping
+from slideviz.samples.table import write_sample
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    write_sample("passage", tmp_path, 12)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "designs.csv").write_text("airfoil.translate.dy,STEPS\n0.01,1\n0.1,2\n3,1\n")
+    return tmp_path
+
+
+@pytest.fixture
+def in_threads(monkeypatch):
+    """Let threads of this process do what processes do: they start at once."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    def workers(executor, *_):
+        return ThreadPoolExecutor(1)
+
+    monkeypatch.setattr(sweeping, "Processes", type("Threads", (), {"__new__": workers}))
+
+
+def said(capsys, *words):
+    code = run(list(map(str, words)))
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_a_table_of_results(folder, in_threads, capsys):
+    words = ("sweep", "passage.cfg", "designs.csv", "-o", "out", "--json", "report.json")
+    code, out, err = said(capsys, *words)
+    assert (code, err) == (0, "")
+    assert "3 designs of airfoil.translate.dy, STEPS" in out
+    assert "with inverted cells" in out
+    with (folder / "out" / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["design"], row["airfoil.translate.dy"], row["STEPS"]) for row in rows] == [
+        ("1", "0.01", "1"),
+        ("2", "0.1", "2"),
+        ("3", "3.0", "1"),
+    ]
+    report = json.loads((folder / "report.json").read_text())
+    assert report["columns"] == ["airfoil.translate.dy", "STEPS"]
+    assert (report["designs"], report["failed"], report["inverted"]) == (3, 0, [3])
+    assert report["best"]["min"] == max(float(row["min"]) for row in rows)
+    assert (report["worst"]["design"], report["worst"]["min"]) == (3, 0.0)
+    code, out, err = said(capsys, *words[:5])
+    assert code == 1
+    assert "there are results already" in err
+    code, out, err = said(capsys, *words[:5], "--resume")
+    assert code == 0
+    assert "0 designs in" in out
+    assert "(3 were there)" in out
+
+
+def test_a_run_with_the_same_values_gives_the_same_mesh(folder, in_threads, capsys):
+    assert said(capsys, "sweep", "passage.cfg", "designs.csv", "-o", "out", "--meshes", "-q") == (
+        (0, "", "")
+    )
+    motion = "(airfoil, rotate, -8, centroid) ; (airfoil, translate, 0, 0.1)"
+    code, *_ = said(
+        capsys, "run", "passage.cfg", "--set", f"MOTION={motion}", "--steps", 2, "-o", "one.su2"
+    )
+    assert code == 0
+    assert (folder / "one.su2").read_bytes() == (folder / "out" / "design_2.su2").read_bytes()
+
+
+def test_columns_are_listed(folder, capsys):
+    code, out, _ = said(capsys, "sweep", "passage.cfg", "--columns")
+    assert code == 0
+    assert "airfoil.rotate.angle_deg" in out
+    assert "SLIDING_MODE" in out
+
+
+def test_designs_that_fail(folder, in_threads, capsys):
+    (folder / "designs.csv").write_text("SLIDING_MODE\nnone\nps\n")
+    code, _, err = said(capsys, "sweep", "passage.cfg", "designs.csv", "-o", "out", "-q")
+    assert code == 0
+    assert "slideviz: warning: design 1: PERIODIC_MODE= moving needs a sliding method" in err
+    (folder / "designs.csv").write_text("SLIDING_MODE\nnone\n")
+    words = ("sweep", "passage.cfg", "designs.csv", "-o", "out", "-q", "--force")
+    code, _, err = said(capsys, *words)
+    assert code == 1
+    assert "no design could be computed; out/results.csv says why for each" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (("passage.cfg",), "the table of designs is missing"),
+        (("passage.cfg", "none.csv"), "none.csv: there is no such table of designs"),
+        (("passage.cfg", "designs.csv", "--scheduler", "tcp://127.0.0.1:1"), "no scheduler"),
+        (
+            ("passage.cfg", "designs.csv", "--scheduler", "x", "--workers", "2"),
+            "a Dask cluster has its own",
+        ),
+        (("passage.cfg", "designs.csv", "--json", "designs.csv"), "the table of designs"),
+    ],
+    ids=["no table", "no file", "no scheduler", "two kinds", "over the table"],
+)
+def test_what_is_wrong(folder, capsys, monkeypatch, words, problem):
+    from slideviz.cli import sweep_command
+
+    monkeypatch.setattr(sweep_command, "_CONNECTING", 0.5)
+    code, _, err = said(capsys, "sweep", *words)
+    assert code == 1
+    assert problem in err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_signal_ends_it_and_resume_goes_on(folder, number):
+    lines = "\n".join(f"{0.0001 * k},5" for k in range(400))
+    (folder / "designs.csv").write_text(f"airfoil.translate.dy,STEPS\n{lines}\n")
+    words = [sys.executable, "-m", "slideviz", "sweep", "passage.cfg", "designs.csv", "-o", "out"]
+    with subprocess.Popen(
+        [*words, "--workers", "1"],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as child:
+        results = folder / "out" / "results.csv"
+        give_up = time.monotonic() + 60
+        while not results.exists() or results.read_bytes().count(b"\n") < 4:
+            assert time.monotonic() < give_up
+            time.sleep(0.02)
+        child.send_signal(number)
+        _, err = child.communicate(timeout=60)
+    assert child.returncode == 128 + number
+    assert "of 400 designs, and --resume goes on" in err
+    assert err.count("\n") == 1
