@@ -29,7 +29,11 @@ from slideviz.rbf.problem import Watch
 from slideviz.terms import Metric
 
 CHUNK = 1 << 20
-"""Nodes, or cells, that are in memory at a time."""
+"""Nodes, or cells, that are in memory at a time, at most."""
+FEWEST = 1 << 16
+"""Nodes or cells of a part, at least."""
+PARTS = 256
+"""Parts of a file, so that many ranks have some; their number must not depend on that of ranks."""
 Part = tuple[int, int]
 """The first of some nodes or cells, and the one after the last."""
 
@@ -74,7 +78,7 @@ class Output:
                     partial_copy(
                         self._path,
                         self._mesh_file,
-                        f"{self._about} {CHUNK}",
+                        f"{self._about} {parts(self._place.n_points)[0]}",
                         resume=self._resume,
                         replaces=self._replaces,
                         progress=tick,
@@ -99,7 +103,7 @@ class Output:
 
     def found(self) -> str:
         """Return in words what a stopped run has left to go on with."""
-        done, total = self._opened().done, -(-self._place.n_points // CHUNK)
+        done, total = self._opened().done, len(parts(self._place.n_points))
         if done:
             return f"{self._path.name}: goes on after {done} of {total} parts"
         return (
@@ -142,7 +146,8 @@ class Output:
 
 def parts(count: int, done: int = 0) -> list[Part]:
     """Return the parts of so many nodes or cells, without the first that are done."""
-    return [(first, min(first + CHUNK, count)) for first in range(done * CHUNK, count, CHUNK)]
+    size = min(CHUNK, max(FEWEST, -(-count // PARTS)))
+    return [(first, min(first + size, count)) for first in range(done * size, count, size)]
 
 
 @contextmanager
