@@ -18,7 +18,7 @@ from slideviz.cli.options import (
     size,
 )
 from slideviz.cli.run_outcome import CELLS, tell, write_qualities
-from slideviz.cli.run_streamed import is_to_be_streamed, run_streamed
+from slideviz.cli.run_streamed import is_to_be_streamed, require_streamable, run_streamed
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -77,6 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or case.mesh_out or _default_output(case)
     kind = _format_of(output, case)
     qualities = output.with_name(output.stem + "_qual.txt") if case.generate_quality else None
+    require_streamable(arguments, case, output, kind)
     _require_places(arguments, case, output, qualities)
     if is_to_be_streamed(arguments, case, output, kind):
         return run_streamed(arguments, case, begin, output, qualities)

@@ -15,34 +15,52 @@ if TYPE_CHECKING:
     from slideviz.terms import FileFormat
 
 
-def is_to_be_streamed(
+def require_streamable(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
-) -> bool:
-    """Tell whether a run is streamed: as asked for, or as the mesh is too large for the memory.
+) -> None:
+    """Raise where a run is to be streamed and cannot be, before anything is made for it.
 
     Raises
     ------
-    CaseError
-        That is asked for of a run that cannot be.
+    CaseError, MeshError
+        It needs the mesh in memory, or mesh or result are no SU2 binary meshes.
     """
-    from slideviz.deformation.streaming import missing_memory
+    from slideviz.deformation.streaming import require_stream
     from slideviz.errors import CaseError
 
-    needs = [name for name in ("picture", "steps_dir", "steps_file") if getattr(arguments, name)]
-    binary = (kind or output.suffix.lower().removeprefix(".")) == "su2b"
+    if not (arguments.stream or arguments.resume):
+        return
+    for name in _needing_memory(arguments):
+        option = f"--{name.replace('_', '-')}"
+        raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
+    if not (arguments.output or case.mesh_out or case.mesh_out_format):
+        require_stream(case)  # the name of the result is that of the mesh then
+    if not _is_binary(output, kind):
+        raise CaseError(f"{output}: a streamed run writes SU2 binary meshes; end its name in .su2b")
+    require_stream(case)
+
+
+def is_to_be_streamed(
+    arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
+) -> bool:
+    """Tell whether a run is streamed: as asked for, or as the mesh is too large for the memory."""
+    from slideviz.deformation.streaming import missing_memory
+
     if arguments.stream or arguments.resume:
-        if needs:
-            option = f"--{needs[0].replace('_', '-')}"
-            raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
-        if not binary:
-            raise CaseError(
-                f"{output}: a streamed run writes SU2 binary meshes; end its name in .su2b"
-            )
         return True
-    missing = missing_memory(case) if binary and not needs else ""
+    able = _is_binary(output, kind) and not _needing_memory(arguments)
+    missing = missing_memory(case) if able else ""
     if missing and not arguments.quiet:
         print(f"slideviz: note: {missing}; it is streamed", file=sys.stderr, flush=True)
     return bool(missing)
+
+
+def _needing_memory(arguments: argparse.Namespace) -> list[str]:
+    return [name for name in ("picture", "steps_dir", "steps_file") if getattr(arguments, name)]
+
+
+def _is_binary(output: Path, kind: FileFormat | None) -> bool:
+    return (kind or output.suffix.lower().removeprefix(".")) == "su2b"
 
 
 def run_streamed(

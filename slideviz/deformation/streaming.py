@@ -106,7 +106,7 @@ def stream(
     """
     assert case.mesh_file is not None
     path = case.mesh_file
-    _require_streamable(case, path)
+    require_stream(case)
     total = max(1, case.steps)
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
     with watch.phase("read") as tick:
@@ -158,8 +158,16 @@ def _numbered(skin: Mesh) -> Iterator[None]:
         raise NodeError(problem.sentence, *nodes) from problem
 
 
-def _require_streamable(case: Case, path: Path) -> None:
-    """Raise where a case needs more of a mesh than can be streamed."""
+def require_stream(case: Case) -> None:
+    """Raise where a case needs more of a mesh than can be streamed.
+
+    Raises
+    ------
+    CaseError, MeshError
+        For its method, or its mesh is of no format that can be streamed.
+    """
+    path = case.mesh_file
+    assert path is not None
     if case.method == "elastic":
         raise CaseError(
             "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "

@@ -271,6 +271,15 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     ):
         assert run(["run", "square.cfg", "--stream", *more]) == 1
         assert words in capsys.readouterr().err
+    assert not Path("steps").exists()
+    text = ["run", "square.cfg", "--stream", "--set", "MESH_FILENAME=mesh.su2"]
+    for more, words in (
+        ([], "mesh.su2: only SU2 binary meshes can be streamed"),
+        (["-o", "out.vtu"], "out.vtu: a streamed run writes SU2 binary meshes"),
+        (["-o", "out.su2b"], "mesh.su2: only SU2 binary meshes can be streamed"),
+    ):
+        assert run([*text, *more]) == 1
+        assert words in capsys.readouterr().err
 
 
 def test_cells_numbered_both_ways_are_told(tmp_path):
