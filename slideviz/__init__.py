@@ -23,8 +23,9 @@ if TYPE_CHECKING:
         Translate,
     )
     from slideviz.deformation.solver import Step, deform
+    from slideviz.design.deformer import Deformer
     from slideviz.design.sweep import sweep
-    from slideviz.errors import SlidevizError
+    from slideviz.errors import SlidevizError, ToleranceWarning
     from slideviz.mesh.io.convert import convert
     from slideviz.mesh.io.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Case": "case.model",
     "Cells": "mesh.model",
+    "Deformer": "design.deformer",
     "Ffd": "case.model",
     "FromFile": "case.model",
     "Marker": "mesh.model",
@@ -47,6 +49,7 @@ _HOME = {
     "Scale": "case.model",
     "SlidevizError": "errors",
     "Step": "deformation.solver",
+    "ToleranceWarning": "errors",
     "Translate": "case.model",
     "convert": "mesh.io.convert",
     "deform": "deformation.solver",
@@ -59,6 +62,7 @@ _HOME = {
 __all__ = [
     "Case",
     "Cells",
+    "Deformer",
     "Ffd",
     "FromFile",
     "Marker",
@@ -72,6 +76,7 @@ __all__ = [
     "Scale",
     "SlidevizError",
     "Step",
+    "ToleranceWarning",
     "Translate",
     "__version__",
     "convert",

@@ -35,6 +35,10 @@ class UnsoundError(DeformError):
     """A step was computed, but its result cannot be right."""
 
 
+class ToleranceWarning(UserWarning):
+    """What was chosen for one displacement does not suffice for another."""
+
+
 class Cancelled(SlidevizError):
     """The one who pulls the work asked it to stop; nothing is wrong."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Prescribed
-from slideviz.case.motion import ROUNDING, displacements, same
+from slideviz.case.motion import ROUNDING, same
 from slideviz.deformation.classes import find_classes
 from slideviz.deformation.intersection import intersection_message, jump_message
 from slideviz.errors import CaseError, DeformError
@@ -25,15 +25,20 @@ APART = 100.0
 """How much more images may differ in their displacement than in their place, both relative."""
 
 
-def displaced(case: Case, mesh: Mesh) -> Displacements:
+def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
     """Return what moving nodes are asked for, with copies in the domain, and none beyond its sides.
+
+    Parameters
+    ----------
+    moved : Displacements
+        Of all nodes of the moving markers.
 
     Raises
     ------
     CaseError
         A copy is asked to move otherwise than the node that it is a copy of.
     """
-    moved, halo = displacements(case, mesh), mesh.halo
+    halo = mesh.halo
     if halo is None:
         return moved
     asked = np.zeros_like(mesh.points)

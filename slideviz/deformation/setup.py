@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.case.check import idle_settings
+from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
-from slideviz.case.motion import require_valid
+from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
 from slideviz.deformation.prescribed import alikeness, displaced, prescribed
 from slideviz.errors import MeshError
@@ -145,8 +146,13 @@ class Setup:
         slid[copy[both]] = moved
 
 
-def make_setup(case: Case, mesh: Mesh) -> Setup:
+def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Setup:
     """Return what stays the same over the steps of a deformation.
+
+    Parameters
+    ----------
+    moved : Displacements, optional
+        What moving nodes are asked for, as ``displaced`` returns it; None: by the case's motions.
 
     Raises
     ------
@@ -169,7 +175,8 @@ def make_setup(case: Case, mesh: Mesh) -> Setup:
     classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    moved, alike = displaced(asked, mesh), alikeness(case, mesh, pairs)
+    moved = moved or displaced(displacements(asked, mesh), mesh)
+    alike = alikeness(case, mesh, pairs)
     known, target, warnings = prescribed(
         case, mesh, moved, alike, boundary=boundary, fans=fans, classes=classes, frame=frame
     )

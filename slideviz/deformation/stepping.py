@@ -77,12 +77,12 @@ class Stepping:
             total = index + len(ahead)
             watch = Watch(self._report(index + 1, total), seconds)
             goal = setup.coords[setup.known] + setup.target * part
-            solution = _step(setup, coords, goal, watch, before)
-            moved = _moved(setup, coords, solution.displacement, goal)
+            solution = one_step(setup, coords, goal, watch, before)
+            moved = moved_by(setup, coords, solution.displacement, goal)
             points = cartesian(setup.frame, mesh.points, setup.coords, moved)
             if mesh.halo is not None:
                 points = mesh.halo.follow(mesh.points, points)
-                moved = _followed(setup, mesh.halo, points, moved)
+                moved = followed(setup, mesh.halo, points, moved)
             if not within(points, np.finfo(float).max):
                 raise DeformError(f"step {index + 1}: coordinates became infinite; use more steps")
             step = self._made(index + 1, total, points, solution, watch, part)
@@ -166,7 +166,7 @@ def renumbered(steps: list[Step], tried: tuple[Trial, ...]) -> Iterator[Step]:
         yield replace(step, total=len(steps), tried=tried if last else ())
 
 
-def _step(
+def one_step(
     setup: Setup,
     coords: FloatArray,
     goal: FloatArray,
@@ -205,7 +205,7 @@ def _step(
     return found
 
 
-def _moved(
+def moved_by(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
     """Return the new coordinates; known nodes are where they must be."""
@@ -249,7 +249,7 @@ def cartesian(
     return out
 
 
-def _followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
+def followed(setup: Setup, halo: Halo, points: FloatArray, moved: FloatArray) -> FloatArray:
     """Return the coordinates with those of copies where their donors put them.
 
     Periodic images are in place already, to the bit, and stay.

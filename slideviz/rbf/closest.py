@@ -143,8 +143,10 @@ def _before(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **_OPTIONS)
-def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
+def _query(x, corners, order, bounds, out, which):  # type: ignore[no-untyped-def]
     """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
+
+    And into ``which`` (m,) the triangles that they are on.
 
     Of several equally near ones the position decides, not the order of the triangles.
     """
@@ -169,6 +171,7 @@ def _query(x, corners, order, bounds, out):  # type: ignore[no-untyped-def]
                     tied = abs(gap - best) <= TIE * best
                     if gap < best * (1.0 - TIE) or (tied and _before(point, out[i])):
                         out[i] = point
+                        which[i] = order[j]
                     best = min(best, gap)
                 continue
             half = a + (b - a + 1) // 2
@@ -214,10 +217,14 @@ class ClosestPoints:
 
     def query(self, x: FloatArray) -> FloatArray:
         """Return the closest point on the simplices for each x, (m, d)."""
+        return self.nearest(x)[0]
+
+    def nearest(self, x: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the closest point for each x, (m, d), and the simplex that it is on, (m,)."""
         dim = x.shape[1]
         targets = np.zeros((len(x), 3))
         targets[:, :dim] = x
-        out = np.empty_like(targets)
+        out, which = np.empty_like(targets), np.zeros(len(x), np.int64)
         with one_at_a_time(50 * len(x)):
-            _query(targets, self._corners, self._order, self._bounds, out)
-        return out[:, :dim]
+            _query(targets, self._corners, self._order, self._bounds, out, which)
+        return out[:, :dim], which

@@ -9,7 +9,7 @@ from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
 from slideviz.rbf.solve import (
     NOTHING,
     Factor,
@@ -34,6 +34,8 @@ class ExactFit:
         Nodes of which the pivot guard left out a constraint.
     short : str
         Empty: there is no tolerance that it could miss.
+    stages : tuple of Levels
+        The rows in the system after each call of ``add``.
     """
 
     short = ""
@@ -46,6 +48,7 @@ class ExactFit:
         self.history: tuple[Cycle, ...] = ()
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         self.dropped: IntArray = np.empty(0, np.int64)
+        self.stages: tuple[Levels, ...] = ()
 
     def add(self, rows: ConstraintRows) -> None:
         """Solve with these rows and all before them."""
@@ -58,11 +61,14 @@ class ExactFit:
             if KERNELS[problem.basis.kernel].polynomial:
                 self.found, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
+                self.stages += ((row_names(rows),),)
                 return
             weights = np.zeros_like(rows.right)
-            dropped = [self._solve(rows, part, done, weights, tick) for part in _parts(rows)]
-        self.dropped = np.unique(rows.nodes[np.concatenate(dropped)])
+            dropped = [self._solve(rows, part, done, weights, tick) for part in parts(rows)]
+        left_out = np.concatenate(dropped)
+        self.dropped = np.unique(rows.nodes[left_out])
         self.found = gathered(rows, weights)
+        self.stages += ((np.delete(row_names(rows), left_out, axis=0),),)
 
     def _solve(
         self, rows: ConstraintRows, part: IntArray, done: int, weights: FloatArray, tick: Tick
@@ -99,10 +105,21 @@ class ExactFit:
         )
 
 
-def _parts(rows: ConstraintRows) -> list[IntArray]:
+def parts(rows: ConstraintRows) -> list[IntArray]:
     """Return the rows of each block of the system."""
     block = blocks(rows)
     return [np.flatnonzero(block == k) for k in np.unique(block)]
+
+
+def row_names(rows: ConstraintRows) -> IntArray:
+    """Return what tells rows apart however they are ordered, (r, 2): node, and which of its rows.
+
+    Rows of one node are neighbours.
+    """
+    place = np.arange(len(rows.nodes))
+    starts = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]][: len(place)]
+    first = np.maximum.accumulate(np.where(starts, place, 0)) if len(place) else place
+    return np.stack([rows.nodes, place - first], axis=1)
 
 
 def gathered(

@@ -28,6 +28,11 @@ class Field(Protocol):
         """Return the displacement (m, d) at features (k, m), points (m, d) in the step before."""
 
 
+def share(q: FloatArray) -> FloatArray:
+    """Return which share of an error is taken over at q radii from it: Wendland's C2 function."""
+    return (1.0 - q) ** 4 * (4.0 * q + 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Correction:
     """Spreads what boundary nodes lack to the nodes near them (section 2.5.1, Eq. 2.30).
@@ -52,31 +57,73 @@ class Correction:
 
     def near(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return which of points (m, d) take over something, (h,), and what, (h, d)."""
+        hit, distance, nearest, tied = self._nearest(points)
+        taken = self.lacking[nearest]
+        if len(tied):
+            taken[tied] = self._means(points[hit[tied]], distance[tied])
+        return hit, share(distance / self.radius)[:, None] * taken
+
+    def sources(
+        self, points: FloatArray
+    ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]:
+        """Return which sources points (m, d) take over from, in all detail.
+
+        Returns
+        -------
+        hit : (h,)
+            The points that take over something.
+        nearest : (h,)
+            The source that is nearest to each.
+        row, source, weight : (k,)
+            For each of them, by its place in ``hit``, all its sources, and their weights in the
+            mean of their errors.
+        """
+        hit, distance, nearest, tied = self._nearest(points)
+        single = np.ones(len(hit), bool)
+        single[tied] = False
+        alone = np.flatnonzero(single)
+        row, source, weight = self._ties(points[hit[tied]], distance[tied])
+        total = np.bincount(row, weight, len(tied))[row] if len(tied) else weight
+        return (
+            hit,
+            nearest,
+            np.concatenate([alone, tied[row]]),
+            np.concatenate([nearest[alone], source]),
+            np.concatenate([np.ones(len(alone)), weight / total]),
+        )
+
+    def _nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray, IntArray, IntArray]:
+        """Return points within reach (h,), distance and number of the nearest source, and ties."""
         near = self.tree.query(points, k=2, distance_upper_bound=self.radius)
         distance, index = (np.asarray(found) for found in near)
         hit = np.flatnonzero(np.isfinite(distance[:, 0]))
-        distance, taken = distance[hit], self.lacking[index[hit, 0]]
-        q = distance[:, 0] / self.radius
-        share = (1.0 - q) ** 4 * (4.0 * q + 1.0)
+        distance = distance[hit]
         tied = np.flatnonzero(distance[:, 1] <= (1.0 + TIE) * distance[:, 0])
-        if len(tied):
-            taken[tied] = self._means(points[hit[tied]], distance[tied, 0])
-        return hit, share[:, None] * taken
+        return hit, distance[:, 0], index[hit, 0], tied
 
     def _means(self, points: FloatArray, distance: FloatArray) -> FloatArray:
-        """Return the mean (m, d) of the errors of the sources that are nearest to points (m, d).
+        """Return the mean (m, d) of the errors of the sources that are nearest to points (m, d)."""
+        row, source, weight = self._ties(points, distance)
+        total = np.zeros((len(points), self.lacking.shape[1] + 1))
+        np.add.at(total, row, weight[:, None] * np.c_[self.lacking[source], np.ones(len(source))])
+        return total[:, :-1] / total[:, -1:]
+
+    def _ties(
+        self, points: FloatArray, distance: FloatArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return rows, sources and weights (k,) of the sources that are nearest to points (m, d).
 
         The weight of each falls to zero at ``TIE`` beyond the nearest, so that rounding, which
         moves the nodes of a symmetric mesh a little, changes the mean little.
         """
+        if not len(points):
+            return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
         found = self.tree.query_ball_point(points, (1.0 + TIE) * distance)
         row = np.repeat(np.arange(len(points)), [len(each) for each in found])
         source = np.concatenate([np.array(each, np.int64) for each in found])
         beyond = np.linalg.norm(points[row] - self.tree.data[source], axis=1) - distance[row]
         weight = np.clip(1.0 - beyond / np.maximum(TIE * distance[row], 1e-300), 0.0, 1.0)
-        total = np.zeros((len(points), self.lacking.shape[1] + 1))
-        np.add.at(total, row, weight[:, None] * np.c_[self.lacking[source], np.ones(len(source))])
-        return total[:, :-1] / total[:, -1:]
+        return row, source, weight
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,9 @@ import numpy as np
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import gathered, saddle_fit
+from slideviz.rbf.exact import gathered, row_names, saddle_fit
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
 from slideviz.rbf.selection import GrowingFactor, LevelLimit, favour, newton, pool
 from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
 
@@ -60,6 +60,8 @@ class GreedyFit:
     short : str
         Why the last selection ended above the tolerance, and a remedy; empty where it did not.
     history : tuple of Cycle
+    stages : tuple of Levels
+        The rows chosen after each call of ``add``.
     """
 
     def __init__(self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> None:
@@ -74,6 +76,7 @@ class GreedyFit:
         # which nodes add most, and the weights come from the system with the polynomial.
         self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
         self.dropped: IntArray = np.empty(0, np.int64)
+        self.stages: tuple[Levels, ...] = ()
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._level = history[-1].level if history else 1
         self._rows = ConstraintRows(np.empty(0, np.int64), None, np.empty((0, d)))
@@ -111,6 +114,7 @@ class GreedyFit:
         self._barred = np.concatenate([self._barred, np.zeros(more, bool)])
         with self._watch.phase("select"):
             self._select()
+        self.stages += (self.found.levels,)
 
     def _select(self) -> None:
         """Run cycles until the error is below the tolerance, or nothing is left to choose."""
@@ -221,11 +225,12 @@ class GreedyFit:
         )
         if self._tailed:
             found, self._singular = saddle_fit(self._problem, rows)
-            return found
-        weights = np.empty_like(rows.right)
-        for factor in self._grown:
-            weights[factor.turn] = factor.weights()
-        return gathered(rows, weights)
+        else:
+            weights = np.empty_like(rows.right)
+            for factor in self._grown:
+                weights[factor.turn] = factor.weights()
+            found = gathered(rows, weights)
+        return replace(found, levels=(row_names(self._rows)[chosen],))
 
     def _values(self, sum_: Interpolant) -> FloatArray:
         """Return an interpolant in each row, (r, m)."""

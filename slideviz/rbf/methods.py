@@ -24,7 +24,7 @@ from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.problem import Cycle, Interpolant, Problem, Solution, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Solution, Watch
 
 ROUNDING = 1e-14
 """Part of the largest coordinate by which projecting a point of a flat boundary may move it."""
@@ -47,6 +47,7 @@ class Fit(Protocol):
     dropped: IntArray
     short: str
     history: tuple[Cycle, ...]
+    stages: tuple[Levels, ...]
 
     def add(self, rows: ConstraintRows) -> None:
         """Meet further constraints, exactly or to the tolerance."""
@@ -104,7 +105,8 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     values = np.concatenate([problem.values, slid])
     second = _fit(problem, watch, fit.history)
     second.add(full_rows(problem, nodes, values))
-    return _finish(problem, watch, second, nodes, values)
+    found = _finish(problem, watch, second, nodes, values)
+    return replace(found, stages=(*fit.stages, *found.stages))
 
 
 def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
@@ -187,6 +189,7 @@ def _finish(
         short=fit.short,
         lost=lost,
         field=replace(fit.found.field(problem), correction=correction),
+        stages=fit.stages,
     )
 
 

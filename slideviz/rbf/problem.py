@@ -17,6 +17,8 @@ from slideviz.rbf.field import Field, RadialField
 from slideviz.terms import Selection
 
 Project = Callable[[IntArray, FloatArray], FloatArray]
+Levels = tuple[IntArray, ...]
+"""The rows (r, 2) of each level of an interpolant: node, and which of the rows of that node."""
 
 
 @dataclass(eq=False)
@@ -179,6 +181,9 @@ class Solution:
         are set.
     field : Field or None
         What displaced the nodes that are no boundary; None where a method has no such thing.
+    stages : tuple of Levels
+        The rows of each system that was solved, in order: pseudo sliding has up to three, direct
+        sliding one or two; empty where a method has no such systems.
     """
 
     displacement: FloatArray
@@ -194,6 +199,7 @@ class Solution:
     short: str = ""
     lost: float = 0.0
     field: Field | None = None
+    stages: tuple[Levels, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,11 +214,14 @@ class Interpolant:
         Coefficients alpha, ``sum_a w_a n_a`` over the constraints of each node.
     tail : (q, d) float64 or None
         Coefficients beta of the polynomial's terms.
+    levels : Levels
+        The rows that it meets.
     """
 
     nodes: IntArray
     weights: FloatArray
     tail: FloatArray | None = None
+    levels: Levels = ()
 
     def at(self, problem: Problem, nodes: IntArray | slice, tick: Tick = no_tick) -> FloatArray:
         """Return the displacements (m, d) of nodes in the frame."""
@@ -234,4 +243,4 @@ class Interpolant:
         tail = other.tail if self.tail is None else self.tail
         if self.tail is not None and other.tail is not None:
             tail = self.tail + other.tail
-        return Interpolant(unique[order], total[order], tail)
+        return Interpolant(unique[order], total[order], tail, (*self.levels, *other.levels))

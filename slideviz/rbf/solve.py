@@ -256,7 +256,7 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
         Numbers are not finite.
     """
     _require_finite(matrix)
-    system, use = _saddle_system(matrix, terms)
+    system, use = saddle_system(matrix, terms)
     n = len(matrix)
     full = np.concatenate([right, np.zeros((len(use), right.shape[1]))])
     deficient = False
@@ -276,10 +276,10 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
 
 def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:
     """Return the condition number (1-norm) of a system with a polynomial; inf when singular."""
-    return float(np.linalg.cond(_saddle_system(matrix, terms)[0], 1))
+    return float(np.linalg.cond(saddle_system(matrix, terms)[0], 1))
 
 
-def _saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
+def saddle_system(matrix: FloatArray, terms: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return ``[[G, P], [P^T, 0]]`` with the independent terms, and which ones these are."""
     scale = np.maximum(np.abs(terms).max(axis=0), 1e-300)
     r, order = qr(terms / scale, pivoting=True, mode="r")

@@ -1,0 +1,100 @@
+"""What a deformer keeps: number of steps and control nodes, chosen by the solver itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from slideviz.case.model import Case
+from slideviz.deformation.setup import Setup
+from slideviz.deformation.solver import Progress, all_steps, require_memory
+from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
+from slideviz.design.frozen_step import FrozenStep
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.problem import Problem, Solution, Watch
+
+Tell = Callable[[Progress], None]
+
+
+def choose_steps(
+    case: Case, mesh: Mesh, setup: Setup, targets: Sequence[FloatArray], tell: Tell
+) -> tuple[FrozenStep, ...]:
+    """Return the steps of a deformation with their control nodes, enough for all displacements.
+
+    The number of steps is that of the first displacement. The control nodes of each further one
+    begin with those of all before.
+
+    Parameters
+    ----------
+    targets : sequence of (a, d)
+        Displacements of the known nodes, in the frame.
+
+    Raises
+    ------
+    DeformError
+        A step cannot be solved, or its result cannot be right.
+    """
+    require_memory(setup, case)
+    parts, solutions = _reference(case, mesh, replace(setup, target=targets[0]), tell)
+    for target in targets[1:]:
+        solutions = _further(mesh, replace(setup, target=target), parts, solutions, tell)
+    for solution in solutions:
+        if len(solution.dropped) and KERNELS[setup.basis.kernel].polynomial:
+            raise DeformError(
+                f"the system is singular for RBF_KERNEL= {setup.basis.kernel}, so that its "
+                "solution has no derivative; use RBF_KERNEL= wendland-c2, or merge coinciding nodes"
+            )
+    return tuple(
+        FrozenStep(setup, mesh, case.sliding, part, k == 0, solution.stages, solution.dropped)
+        for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
+    )
+
+
+def _reference(
+    case: Case, mesh: Mesh, setup: Setup, tell: Tell
+) -> tuple[list[float], list[Solution]]:
+    """Return which part of the displacement the steps of a run reach, and their solutions."""
+    made: list[Solution] = []
+
+    def solve(problem: Problem, watch: Watch) -> Solution:
+        made.append(setup.solve(problem, watch))
+        return made[-1]
+
+    steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), tell, {})))
+    # Of steps that were tried, those that are in the run: each has the control nodes it found.
+    found = [next(s for s in made if s.control is step.control) for step in steps]
+    return [step.part for step in steps], found
+
+
+def _told(tell: Tell, step: int, total: int, phase: str, fraction: float) -> None:
+    tell(Progress(step, total, phase, fraction))
+
+
+def _further(
+    mesh: Mesh, setup: Setup, parts: Sequence[float], chosen: Sequence[Solution], tell: Tell
+) -> list[Solution]:
+    """Return the solutions of the steps with the control nodes of others, and more where needed."""
+    coords, total = setup.coords, len(parts)
+    made: list[Solution] = []
+    lag: FloatArray | None = None
+    for k, (part, solution) in enumerate(zip(parts, chosen, strict=True)):
+        control = solution.control
+        if made:
+            more = made[-1].control
+            control = np.concatenate([control, more[~np.isin(more, control)]])
+        watch = Watch(partial(_told, tell, k + 1, total))
+        goal = setup.coords[setup.known] + setup.target * part
+        made.append(
+            one_step(setup, coords, goal, watch, replace(solution, control=control, lag=lag))
+        )
+        lag = made[-1].lag
+        coords = moved_by(setup, coords, made[-1].displacement, goal)
+        if mesh.halo is not None:
+            points = cartesian(setup.frame, mesh.points, setup.coords, coords)
+            coords = followed(setup, mesh.halo, mesh.halo.follow(mesh.points, points), coords)
+    return made

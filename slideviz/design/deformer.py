@@ -1,0 +1,409 @@
+"""The deformer: a deformation prepared once, for many displacements, with exact derivatives."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.case.model import Case, Translate
+from slideviz.case.motion import ROUNDING, displacements
+from slideviz.deformation.growth import unsoundness
+from slideviz.deformation.prescribed import alikeness, displaced
+from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
+from slideviz.deformation.solver import Progress
+from slideviz.design.choosing import choose_steps
+from slideviz.design.frozen_step import FrozenStep, State
+from slideviz.design.operations import difference
+from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
+from slideviz.errors import CaseError, DeformError, ToleranceWarning, UnsoundError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
+from slideviz.rbf.images import largest_misfit, spread
+from slideviz.rbf.problem import Solution
+
+TOGETHER = 16
+"""Designs that are deformed together: as many as share the work of the radial functions well."""
+
+Tell = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Input:
+    """How the displacement of known nodes follows from what is given at the moving nodes.
+
+    Attributes
+    ----------
+    points : (s, d) float64
+        The nodes that give theirs to all their images, undeformed.
+    rows, turn : (s,) int64, (s, d, d) float64 or None
+        Whose displacement each has, by the place among the moving nodes, and how it is turned.
+    known, source : (a,) int64
+        Known nodes that move, by their place, and the one of ``points`` that each follows.
+    """
+
+    points: FloatArray
+    rows: IntArray
+    turn: FloatArray | None
+    known: IntArray
+    source: IntArray
+
+
+class Deformer:
+    """A deformation prepared once, for many displacements of the moving nodes.
+
+    Everything discrete is chosen at the reference, the (first) displacement that it is made with,
+    and kept: number of steps, control nodes, the facet, edge or vertex that each sliding node is
+    on, nearest boundary nodes and radius of the correction. So results are smooth functions of the
+    displacement, and `jvp` and `vjp` are their exact derivatives. They depend on the arguments
+    alone, to the bit. It can be pickled.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Undeformed.
+    case : Case
+    nodes : (m,) int64
+        The nodes of the moving markers, ascending.
+    displacement : (m, d) float64
+        What the case's motions ask of them, in the mesh's length unit.
+    warnings : tuple of str
+        About case and mesh.
+
+    Notes
+    -----
+    Displacements, directions and gradients have Cartesian components, also where the mesh repeats
+    by rotation. Nodes that are periodic images of each other must be displaced alike (turned by the
+    angle of the period); the one with the lowest number counts for all of them, and gradients are
+    those with respect to moving all of them, at this one. The same holds for copies in a halo and
+    the nodes that they are copies of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import slideviz as sv
+    >>> mesh = sv.Mesh(
+    ...     np.array([[0.0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]),
+    ...     sv.Cells.from_blocks([(9, [[0, 1, 4, 3], [1, 2, 5, 4]])]),
+    ...     (
+    ...         sv.Marker("left", sv.Cells.from_blocks([(3, [[0, 3]])])),
+    ...         sv.Marker("right", sv.Cells.from_blocks([(3, [[2, 5]])])),
+    ...     ),
+    ... )
+    >>> case = sv.Case(roles={"right": "moving"}, motions=(sv.Translate("right", (0.5, 0.0)),))
+    >>> deformer = sv.Deformer(mesh, case)
+    >>> deformer.nodes
+    array([2, 5])
+    >>> deformer.deform()[:3, 0].round(2)
+    array([0.  , 1.28, 2.5 ])
+    >>> deformer.jvp(deformer.displacement, deformer.displacement)[:3, 0].round(2)
+    array([0.  , 0.28, 0.5 ])
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        case: Case,
+        displacements: FloatArray | None = None,
+        progress: Tell | None = None,
+    ) -> None:
+        """Choose and prepare all that is kept.
+
+        Parameters
+        ----------
+        mesh
+            The undeformed mesh.
+        case
+            Roles, motions and settings. Where ``displacements`` are given it needs no motions.
+        displacements : (m, d) or (k, m, d), optional
+            Of the moving nodes; those of the case's motions if not given. Of several, the control
+            nodes are enough for all of them, and the first is the reference of all else.
+        progress
+            Called often with a ``Progress``; an exception it raises ends the work at once.
+
+        Raises
+        ------
+        CaseError, MeshError
+            The case does not fit the mesh, or displacements are not as the mesh repeats.
+        DeformError
+            The system cannot be solved, or the method has no derivative here.
+        """
+        _require_derivative(case)
+        if displacements is not None and not case.motions:
+            case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
+        asked = _asked(case, mesh)
+        self.mesh, self.case = mesh, case
+        self.nodes, self.displacement = asked.nodes, asked.vectors
+        given = asked.vectors if displacements is None else displacements
+        given = self._checked(given, "displacements")
+        references = given.reshape(-1, *asked.vectors.shape)
+        if len(references) > 1 and case.reduction is not None and case.reduction.multilevel:
+            raise CaseError(
+                "MULTILEVEL= YES chooses control nodes for one displacement, not for "
+                f"{len(references)} together; use MULTILEVEL= NO, or give one displacement"
+            )
+        sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
+        most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
+        setup = make_setup(case, mesh, displaced(most, mesh))
+        if setup.reduction is not None and not sizes.any():
+            raise DeformError(
+                "no displacement is given by which control nodes could be chosen: all are zero; "
+                "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
+            )
+        self._setup, self._input = setup, _input(mesh, setup, asked)
+        self._alike = alikeness(case, mesh, setup.pairs)
+        self.warnings = (*case.warnings, *setup.warnings)
+        targets = [value(self._target(reference)) for reference in references]
+        tell = progress or (lambda _: None)
+        self._steps: tuple[FrozenStep, ...] = choose_steps(case, mesh, setup, targets, tell)
+        self._run(targets[0])  # what is discrete is chosen at the first design, and kept
+
+    def deform(self, displacement: FloatArray | None = None) -> FloatArray:
+        """Return the deformed points, (n, d), or (k, n, d) of k designs.
+
+        Parameters
+        ----------
+        displacement : (m, d) or (k, m, d), optional
+            Of the moving nodes, from the undeformed mesh; the case's own if not given.
+
+        Raises
+        ------
+        DeformError
+            The result cannot be right, or images are displaced differently.
+
+        Warns
+        -----
+        ToleranceWarning
+            The control nodes of the reference do not suffice for a design.
+        """
+        given = self.displacement if displacement is None else displacement
+        points, errors = self._deformed(self._checked(given, "displacement"))
+        self._warn(errors, stacklevel=3)
+        return points
+
+    def max_error(self, displacement: FloatArray) -> float | FloatArray:
+        """Return by how much boundary nodes miss what they must do, at most: a float, or (k,).
+
+        What interpolation misses at the boundary nodes before they are set, or how far sliding ones
+        are off their boundary because they left the facet that they are kept on, in the mesh's
+        length unit.
+        """
+        found = self._deformed(self._checked(displacement, "displacement"))[1]
+        return float(found) if found.ndim == 0 else found
+
+    def jvp(self, displacement: FloatArray, direction: FloatArray) -> FloatArray:
+        """Return the derivative of the points in a direction, (n, d), or in several, (k, n, d).
+
+        Parameters
+        ----------
+        displacement : (m, d)
+            The design.
+        direction : (m, d) or (k, m, d)
+            Changes of the displacement.
+        """
+        _, start, end = self._taped(displacement)
+        return np.array(start.tape.push(start, self._checked(direction, "direction"), end))
+
+    def vjp(self, displacement: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the gradient of ``(weights * points).sum()``, (m, d), or of several, (k, m, d).
+
+        Parameters
+        ----------
+        displacement : (m, d)
+            The design.
+        weights : (n, d) or (k, n, d)
+            Sensitivities of a function with respect to all points, such as those of an adjoint
+            solver: the result is its gradient with respect to the displacement of the moving nodes.
+        """
+        _, start, end = self._taped(displacement)
+        adjoint = self._shaped(weights, self.mesh.points.shape, "weights")
+        return np.array(start.tape.pull(end, adjoint, start))
+
+    def refresh(self, displacement: FloatArray) -> Deformer:
+        """Return a deformer whose choices are those at another design (or at several)."""
+        return Deformer(self.mesh, self.case, displacement)
+
+    def _checked(self, vectors: FloatArray, name: str) -> FloatArray:
+        return self._shaped(vectors, self.displacement.shape, name)
+
+    def _shaped(self, vectors: FloatArray, shape: tuple[int, ...], name: str) -> FloatArray:
+        """Return finite numbers of this shape, or several of them.
+
+        Raises
+        ------
+        CaseError
+            They are none.
+        """
+        out = np.asarray(vectors, np.float64)
+        if out.shape[-2:] != shape or out.ndim not in (2, 3):
+            raise CaseError(
+                f"{name} has the shape {out.shape}; needed is {shape}, a row for each node, or "
+                f"(k, {shape[0]}, {shape[1]}) for k of them"
+            )
+        if not np.isfinite(out).all():
+            raise CaseError(f"{name} has numbers that are not finite")
+        return out
+
+    def _target(self, vectors: Array) -> Array:
+        """Return the displacement (..., a, d) of the known nodes, in the frame."""
+        setup, given = self._setup, self._input
+        self._require_alike(value(vectors))
+        own = take(vectors, given.rows)
+        if given.turn is not None:
+            own = transform(given.turn, own)
+        moved = difference(setup.frame, given.points, own)
+        shape = (len(setup.known), self.mesh.dim)
+        return put(np.zeros(shape), given.known, take(moved, given.source))
+
+    def _require_alike(self, vectors: FloatArray) -> None:
+        """Raise where images, or copies and their originals, are displaced differently."""
+        setup, mesh = self._setup, self.mesh
+        if not len(setup.images) and mesh.halo is None:
+            return
+        for each in vectors.reshape(-1, *vectors.shape[-2:]):
+            moved = displaced(Displacements(self.nodes, each), mesh)
+            values = np.zeros(mesh.points.shape)
+            values[moved.nodes] = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
+            largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
+            allowed = self._alike * largest + ROUNDING * largest_coordinate(mesh.points)
+            spread(values, moved.nodes, setup.classes.stands, allowed)
+
+    def _run(self, target: Array) -> list[State]:
+        """Return the states after all steps."""
+        states = [State(self._setup.coords)]
+        for step in self._steps:
+            states.append(step.run(states[-1], target))
+        return states[1:]
+
+    def _deformed(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return points (..., n, d) and largest errors (...,), all of them checked."""
+        if displacement.ndim == 2:
+            target = value(self._target(displacement))
+            states = self._run(target)
+            return value(states[-1].points), self._require_sound(target, states)
+        together = TOGETHER if len(self._steps) == 1 else 1
+        points, errors = np.empty((len(displacement), *self.mesh.points.shape)), []
+        for first in range(0, len(displacement), together):
+            part = slice(first, first + together)
+            if together == 1:
+                points[first], error = self._deformed(displacement[first])
+                errors.append(error)
+                continue
+            targets = value(self._target(displacement[part]))
+            states = self._run(targets)
+            points[part] = value(states[-1].points)
+            for k, target in enumerate(targets):
+                errors.append(self._require_sound(target, [_one(s, k) for s in states]))
+        return points, np.array(errors)
+
+    def _taped(self, displacement: FloatArray) -> tuple[list[State], Variable, Variable]:
+        """Return the states of a design, and input and points as variables of one tape."""
+        given = self._shaped(displacement, self.displacement.shape, "displacement")
+        if given.ndim == 3:
+            raise CaseError("derivatives are those at one displacement, not at several")
+        start = Tape().variable(given)
+        states = self._run(self._target(start))
+        end = states[-1].points
+        assert isinstance(end, Variable)
+        return states, start, end
+
+    def _require_sound(self, target: FloatArray, states: list[State]) -> FloatArray:
+        """Return the largest error of a design.
+
+        Raises
+        ------
+        DeformError
+            Coordinates became infinite, nodes go far beyond the motion, or images apart.
+        """
+        setup = replace(self._setup, target=target)
+        for index, (step, state) in enumerate(zip(self._steps, states, strict=True), start=1):
+            points, coords = value(state.points), value(state.coords)
+            if not np.isfinite(points).all():
+                raise DeformError(f"step {index}: coordinates became infinite; use more steps")
+            solution = Solution(points, 0, 0.0, setup.held, np.nan, lost=float(state.lost))
+            unsound = unsoundness(setup, self.mesh, solution, coords, step.part)
+            if unsound:
+                raise UnsoundError(f"step {index}: {unsound}")
+            largest_misfit(setup.frame, setup.coords, points, setup.images)
+        off = self._off_track(value(states[-1].coords))
+        return np.array(max(off, *(float(state.max_error) for state in states)))
+
+    def _off_track(self, coords: FloatArray) -> float:
+        """Return how far sliding nodes are off their boundary, at most."""
+        tracks, sliding = self._setup.tracks, self._setup.classes.sliding
+        label, off = tracks.of_node[sliding], 0.0
+        for index in np.unique(label[label >= 0]).tolist():
+            at = coords[sliding[label == index]]
+            gap = np.linalg.norm(tracks.tracks[index].query(at) - at, axis=1)
+            off = max(off, float(gap.max()))
+        return off
+
+    def _tolerance(self) -> float:
+        """Return what errors may be: that of the data reduction, or a part of the motion."""
+        if self._setup.reduction is not None:
+            return self._setup.reduction.tolerance
+        largest = float(np.linalg.norm(self._setup.target, axis=1).max(initial=0.0))
+        return max(AUTO_TOLERANCE * largest, ROUNDING * self.mesh.extent)
+
+    def _warn(self, errors: FloatArray, stacklevel: int) -> None:
+        worst, allowed = float(errors.max(initial=0.0)), self._tolerance()
+        if worst <= allowed:
+            return
+        of = "" if errors.ndim == 0 else f" of {np.count_nonzero(errors > allowed)} designs"
+        warnings.warn(
+            f"the largest error{of} at the boundary is {worst:.3g}, above the tolerance of "
+            f"{allowed:.3g}: control nodes and facets are those of another displacement; choose "
+            "them anew with `deformer = deformer.refresh(displacement)`",
+            ToleranceWarning,
+            stacklevel=stacklevel + 1,
+        )
+
+
+def _one(state: State, k: int) -> State:
+    """Return the state of one of several designs."""
+    return State(
+        value(state.coords)[k],
+        None,
+        np.broadcast_to(state.max_error, len(value(state.coords)))[k],
+        np.broadcast_to(state.lost, len(value(state.coords)))[k],
+        value(state.points)[k],
+    )
+
+
+def _asked(case: Case, mesh: Mesh) -> Displacements:
+    return displacements(case, mesh)
+
+
+def _require_derivative(case: Case) -> None:
+    """Raise DeformError for methods that have no exact derivative here."""
+    if case.method != "rbf":
+        raise DeformError(
+            f"METHOD= {case.method} has no exact derivatives; use METHOD= rbf, or `sv.deform`"
+        )
+
+
+def _input(mesh: Mesh, setup: Setup, asked: Displacements) -> _Input:
+    """Return how the displacement of known nodes follows from that of the moving nodes."""
+    moved = displaced(asked, mesh)
+    _, source = spread(np.zeros(mesh.points.shape), moved.nodes, setup.classes.stands, 0.0)
+    of_known = source[setup.known]
+    known = np.flatnonzero(of_known >= 0)
+    nodes, place = np.unique(of_known[known], return_inverse=True)
+    given, turn = nodes.copy(), None
+    if mesh.halo is not None:
+        turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
+        row = np.full(len(mesh.points), -1)
+        row[mesh.halo.receivers] = np.arange(len(mesh.halo.receivers))
+        copies = row[nodes] >= 0
+        given[copies] = mesh.halo.donors[row[nodes[copies]]]
+        turn[copies] = mesh.halo.rotations[row[nodes[copies]]]
+    rows = np.searchsorted(asked.nodes, given)
+    inside = np.isin(given, asked.nodes)
+    if not inside.all():
+        raise CaseError(
+            f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
+            "is on no moving marker; give both the same role"
+        )
+    return _Input(frozen_array(mesh.points[nodes], np.float64), rows, turn, known, place)

@@ -1,0 +1,290 @@
+"""A fit with its control nodes kept: the systems of one step, solved for any displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from slideviz.design.operations import columns, radial_sum, terms
+from slideviz.design.tape import (
+    Array,
+    Variable,
+    dot,
+    gather,
+    join,
+    multiply,
+    product,
+    reshape,
+    solution,
+    take,
+    transpose,
+    value,
+)
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.constraint_rows import ConstraintRows
+from slideviz.rbf.evaluate import Basis, matrix
+from slideviz.rbf.exact import parts, row_names
+from slideviz.rbf.field import linear_terms
+from slideviz.rbf.kernels import KERNELS
+from slideviz.rbf.problem import Levels
+from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend, saddle_system
+
+Keep = Callable[[str, Callable[[], Any]], Any]
+"""Returns what is kept under a name, and makes it where there is nothing yet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sum:
+    """A sum of radial functions: control nodes, weights (..., c, d), and a polynomial's tail."""
+
+    nodes: IntArray
+    weights: Array
+    tail: Array | None = None
+
+
+@dataclass(eq=False)
+class Rows:
+    """Constraint rows whose data are on a tape: as ``ConstraintRows``, ``right`` (..., r, m)."""
+
+    nodes: IntArray
+    normals: Array | None
+    right: Array
+
+
+class FrozenFit:
+    """The interpolant of one step, whose rows were chosen before.
+
+    Attributes
+    ----------
+    found : Sum or None
+    """
+
+    def __init__(self, basis: Basis, features: Array, dim: int, *, chosen: Keep, fixed: Keep):
+        """Begin without rows.
+
+        Parameters
+        ----------
+        features : (k, n)
+            Of all nodes, at their current positions.
+        chosen, fixed
+            Keep what is discrete, and what never changes because the positions do not.
+        """
+        self._basis, self._features, self._dim = basis, features, dim
+        self._chosen, self._fixed = chosen, fixed
+        self._rows: Rows | None = None
+        self._factors: dict[int, tuple[IntArray, Factor]] = {}
+        self.found: Sum | None = None
+
+    def add(self, rows: Rows, levels: Levels, stage: str) -> None:
+        """Meet further rows too, of which those of each level are in its system."""
+        if self._rows is not None:
+            nodes = np.concatenate([self._rows.nodes, rows.nodes])
+            rows = Rows(nodes, None, join(self._rows.right, rows.right))
+        self._rows = rows
+        names = row_names(ConstraintRows(rows.nodes, None, np.empty((0, 0))))
+        sums: list[Sum] = []
+        for level, wanted in enumerate(levels):
+            index = self._chosen(f"{stage} rows {level}", partial(_at, names, wanted))
+            normals = None if rows.normals is None else take(rows.normals, index)
+            right = take(rows.right, index)
+            if sums:
+                settled = self.at(rows.nodes[index], self._plus(sums))
+                right = right - (settled if normals is None else dot(settled, normals))
+            part = Rows(rows.nodes[index], normals, right)
+            sums.append(self._solved(part, index, level, stage))
+        self.found = self._plus(sums) if sums else None
+
+    def at(self, nodes: IntArray | slice, found: Sum | None = None) -> Array:
+        """Return the displacements (..., m, d) of nodes in the frame."""
+        found = found or self.found
+        x = self._features
+        here = x if isinstance(nodes, slice) else columns(x, nodes)
+        if found is None:
+            return np.zeros((value(here).shape[1], self._dim))
+        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights)
+        if found.tail is not None:
+            s = s + product(terms(self._basis, here), found.tail)
+        return s
+
+    def _plus(self, sums: list[Sum]) -> Sum:
+        """Return the sum of all levels, each node once, in the order of first occurrence."""
+        if len(sums) == 1:
+            return sums[0]
+        nodes, place = _firsts(np.concatenate([each.nodes for each in sums]))
+        weights = gather(join(*(each.weights for each in sums)), place, len(nodes))
+        tails = [each.tail for each in sums if each.tail is not None]
+        tail = None
+        for each in tails:
+            tail = each if tail is None else tail + each
+        return Sum(nodes, weights, tail)
+
+    def _solved(self, rows: Rows, index: IntArray, level: int, stage: str) -> Sum:
+        """Return the interpolant of some rows."""
+        count, m = len(rows.nodes), value(rows.right).shape[-1]
+        solve, extra = self._solver(rows, index, level, stage)
+        right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
+        right[..., :count, :] = value(rows.right)
+        found: Array = solve(right)
+        if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
+            found = solution(self._residual(rows, value(found), extra), value(found), solve)
+        own = take(found, np.arange(count))
+        tail = None
+        if extra:
+            tail = take(found, count + np.arange(extra))
+            tail = reshape(tail, extra * m // self._dim, self._dim)
+        if rows.normals is None:
+            return Sum(rows.nodes, own, tail)
+        nodes, place = _firsts(rows.nodes)
+        return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
+
+    def _residual(self, rows: Rows, found: FloatArray, extra: int) -> Array:
+        """Return what the system lacks at its solution ``found``, as all else changes."""
+        count, m = len(rows.nodes), found.shape[-1]
+        moving = isinstance(self._features, Variable) or isinstance(rows.normals, Variable)
+        if not moving:
+            nothing = -rows.right
+            return join(nothing, np.zeros((extra, m))) if extra else nothing
+        weights: Array = found[:count]
+        if rows.normals is not None:
+            weights = multiply(rows.normals, weights)
+        place = columns(self._features, rows.nodes)
+        s = radial_sum(self._basis, place, place, weights)
+        below: list[Array] = []
+        if extra:
+            t = terms(self._basis, place)
+            tail = found[count:].reshape(-1, self._dim)
+            s = s + product(t, tail)
+            free = product(transpose(t), weights)
+            below = [reshape(free, extra, m)]
+        if rows.normals is not None:
+            s = dot(s, rows.normals)
+        return join(s - rows.right, *below)
+
+    def _solver(
+        self, rows: Rows, index: IntArray, level: int, stage: str
+    ) -> tuple[Callable[[FloatArray], FloatArray], int]:
+        """Return what solves the system of some rows, and how many unknowns a polynomial adds."""
+        place = value(self._features)[:, rows.nodes]
+        normals = None if rows.normals is None else value(rows.normals)
+        if KERNELS[self._basis.kernel].polynomial:
+            return self._saddle(place, normals, f"{stage} factor {level}")
+        if normals is None:
+            factor = self._fixed(
+                f"{stage} factor {level}", lambda: self._extended(place, index, level)
+            )
+            self._factors[level] = index, factor
+            return lambda b: _columnwise(factor.solve, b), 0
+        blocks = self._chosen(
+            f"{stage} blocks {level}",
+            lambda: parts(ConstraintRows(rows.nodes, normals, np.empty((0, 1)))),
+        )
+        factors = self._fixed(
+            f"{stage} factor {level}",
+            lambda: [self._factor(place[:, b], normals[b]) for b in blocks],
+        )
+
+        def solve(right: FloatArray) -> FloatArray:
+            out = np.empty_like(right)
+            for block, factor in zip(blocks, factors, strict=True):
+                out[..., block, :] = _columnwise(factor.solve, right[..., block, :])
+            return out
+
+        return solve, 0
+
+    def _factor(self, place: FloatArray, normals: FloatArray) -> Factor:
+        system = matrix(self._basis, (place, normals))
+        with enough_threads(len(system) ** 3 / 3):
+            factor = extend(NOTHING, system)
+            return factor if not len(factor.dropped) else _whole(system)
+
+    def _extended(self, place: FloatArray, index: IntArray, level: int) -> Factor:
+        """Return the factor of full rows; that of the stage before is a part of it."""
+        before, factor = self._factors.get(level, (index[:0], NOTHING))
+        if not np.array_equal(index[: len(before)], before):
+            before, factor = index[:0], NOTHING
+        new = place[:, len(before) :]
+        if not new.shape[1]:
+            return factor
+        system = matrix(self._basis, (new, None), (place, None))
+        with enough_threads(len(system) * len(index) ** 2 / 3):
+            grown = extend(factor, system)
+            return grown if not len(grown.dropped) else _whole(matrix(self._basis, (place, None)))
+
+    def _saddle(
+        self, place: FloatArray, normals: FloatArray | None, name: str
+    ) -> tuple[Callable[[FloatArray], FloatArray], int]:
+        count = place.shape[1]
+        along = linear_terms(self._basis, place)
+        if normals is not None:
+            along = np.einsum("rq,rd->rqd", along, normals).reshape(count, -1)
+        total = along.shape[1]
+
+        def make() -> tuple[Any, IntArray]:
+            use = self._chosen(
+                f"{name} terms",
+                lambda: saddle_system(matrix(self._basis, (place, normals)), along)[1],
+            )
+            system = np.zeros((count + len(use),) * 2)
+            system[:count, :count] = matrix(self._basis, (place, normals))
+            system[:count, count:] = along[:, use]
+            system[count:, :count] = along[:, use].T
+            return lu_factor(system), np.concatenate([np.arange(count), count + use])
+
+        factor, rows = self._fixed(name, make)
+
+        def solve(right: FloatArray) -> FloatArray:
+            out = np.zeros_like(right)
+            out[..., rows, :] = _columnwise(lambda b: lu_solve(factor, b), right[..., rows, :])
+            return out
+
+        return solve, total
+
+
+def _whole(system: FloatArray) -> Factor:
+    """Return a factor of all rows of a system, also of those that the pivot guard would leave out.
+
+    Raises
+    ------
+    DeformError
+        The positions of a design make the system singular.
+    """
+    try:
+        lower = np.linalg.cholesky(system)
+    except np.linalg.LinAlgError as problem:
+        raise DeformError(
+            f"the system of the {len(system)} control rows chosen for another displacement is "
+            "singular at this design; choose them anew with `refresh(displacement)`"
+        ) from problem
+    every = np.arange(len(system))
+    return Factor(np.asfortranarray(lower), every, every[:0])
+
+
+def _columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
+    """Return the solutions for right-hand sides (..., n, m), all at once."""
+    if right.ndim == 2:
+        return solve(right)
+    n, m = right.shape[-2:]
+    wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
+    found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
+    return np.ascontiguousarray(np.moveaxis(found, 1, 0)).reshape(right.shape)
+
+
+def _firsts(nodes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return each node once, in the order of first occurrence, and the place of each, (r,)."""
+    unique, first, group = np.unique(nodes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return unique[order], rank[group]
+
+
+def _at(names: IntArray, wanted: IntArray) -> IntArray:
+    """Return the places of rows by their names."""
+    place = {tuple(name): k for k, name in enumerate(names.tolist())}
+    return np.array([place[tuple(name)] for name in wanted.tolist()], np.int64)

@@ -1,0 +1,176 @@
+"""The constraints of sliding nodes on a tape: their normals where these turn with the boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.deformation.setup import Setup
+from slideviz.design.tape import (
+    Array,
+    Variable,
+    add,
+    apply,
+    cross,
+    dot,
+    function,
+    gather,
+    inverse,
+    join,
+    length,
+    multiply,
+    put,
+    take,
+    transform,
+    unit,
+    value,
+)
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.topology import TINY
+from slideviz.rbf.axis import corners as corners_of
+
+TURN = {2: np.array([[0.0, 1.0], [-1.0, 0.0]])}
+
+
+def sliding_normals(setup: Setup, coords: Array) -> tuple[IntArray, Array]:
+    """Return nodes (q,) and unit normals (q, d) of the sliding nodes, as ``Setup.constraints``."""
+    nodes, at = setup.constraints(value(coords))
+    if not (setup.tracks.curved and isinstance(coords, Variable)) or not len(nodes):
+        return nodes, at
+    directions = _directions(setup, _fan_normals(setup, coords))
+    owner = _owners(setup)
+    once = setup.once(owner)
+    # Nodes on the axis have directions of their own, which do not turn.
+    turning = once & ~setup.axis[owner]
+    found = take(directions, np.flatnonzero(turning))
+    count = len(value(found))
+    return nodes, join(found, at[count:]) if count < len(at) else found
+
+
+def _owners(setup: Setup) -> IntArray:
+    """Return the node of each direction of ``_directions``."""
+    node = setup.classes.cluster_node
+    _, starts, size = np.unique(node, return_index=True, return_counts=True)
+    keep = np.ones(len(node), bool)
+    for start, count in zip(starts[size > 2], size[size > 2], strict=True):
+        keep[start + 2 : start + count] = False
+    return node[keep]
+
+
+@dataclass(frozen=True, eq=False)
+class _Corners:
+    """The corners of facets as a linear map of the coordinates of nodes."""
+
+    setup: Setup
+
+    def of(self, coords: Array) -> list[Array]:
+        """Return the corners of all facets, one array (f, d) for each place in a facet."""
+        facets, axis = self.setup.boundary.facets, self.setup.axis
+        v = value(coords)
+        touching = np.flatnonzero(axis[facets].any(axis=1) & ~axis[facets].all(axis=1))
+        parts = [take(coords, facets[:, k]) for k in range(facets.shape[1])]
+        if not len(touching):
+            return parts
+        table = facets[touching]
+        nodes, local = np.unique(table, return_inverse=True)
+        maps = self._maps(nodes, local.reshape(table.shape), table)
+        near = take(coords, nodes)
+        return [
+            put(part, touching, _mapped(maps[k], near, v.shape[1])) for k, part in enumerate(parts)
+        ]
+
+    def _maps(self, nodes: IntArray, local: IntArray, table: IntArray) -> FloatArray:
+        """Return the matrices (k, f d, m d) of the corners of facets that touch the axis."""
+        d = self.setup.coords.shape[1]
+        width = table.shape[1]
+        out = np.empty((width, len(table) * d, len(nodes) * d))
+        here = self.setup.axis[nodes]
+        for column in range(len(nodes) * d):
+            probe = np.zeros(len(nodes) * d)
+            probe[column] = 1.0
+            # Renumbered nodes: which are on the axis is all that counts.
+            found = corners_of(probe.reshape(-1, d), local, here)
+            out[:, :, column] = np.moveaxis(found, 1, 0).reshape(width, -1)
+        return out
+
+
+def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
+    """Return a matrix (f d, m d) times the entries of x (m, d), as rows (f, d)."""
+    v = value(x)
+    rows = len(matrix) // d
+
+    def there(t: FloatArray) -> FloatArray:
+        return (t.reshape(*t.shape[:-2], -1) @ matrix.T).reshape(*t.shape[:-2], rows, d)
+
+    def back(g: FloatArray) -> FloatArray:
+        return (g.reshape(*g.shape[:-2], -1) @ matrix).reshape(*g.shape[:-2], len(v), d)
+
+    return apply(there(v), (x, there, back))
+
+
+def _fan_normals(setup: Setup, coords: Array) -> Array:
+    """Return the unit normal of each fan, as ``slideviz.mesh.topology.fan_normals``."""
+    boundary, fans = setup.boundary, setup.fans
+    corners = _Corners(setup).of(coords)
+    if boundary.dim == 2:
+        vectors = transform(TURN[2], corners[1] - corners[0])
+    else:
+        vectors = cross(corners[2] - corners[0], corners[3] - corners[1])
+    width = boundary.facets.shape[1]
+    share = np.full((len(boundary.facets), width), 1.0 / width)
+    if width == 4:
+        share[boundary.facets[:, 2] == boundary.facets[:, 3]] = [1 / 3, 1 / 3, 1 / 6, 1 / 6]
+    centre = multiply(corners[0], share[:, :1])
+    for k in range(1, width):
+        centre = add(centre, multiply(corners[k], share[:, k : k + 1]))
+    gap = length(take(coords, fans.node) - take(centre, fans.facet))
+    size = value(gap)
+    near = inverse(function(gap, np.maximum(size, TINY), (size > TINY).astype(float)))
+    weighted = multiply(take(unit(vectors), fans.facet), near)
+    return unit(gather(weighted, fans.fan, len(fans.fan_node)))
+
+
+def _directions(setup: Setup, normals: Array) -> Array:
+    """Return the directions of the sliding nodes, as ``slideviz.rbf.classify.directions``."""
+    classes = setup.classes
+    node = classes.cluster_node
+    total = unit(gather(take(normals, classes.row_fan), classes.row_cluster, len(node)))
+    _, starts, size = np.unique(node, return_index=True, return_counts=True)
+    first = starts[size == 2]
+    if len(first):
+        one, two = take(total, first), take(total, first + 1)
+        total = put(total, first + 1, unit(two - multiply(one, dot(two, one))))
+    keep = np.ones(len(node), bool)
+    for start, count in zip(starts[size > 2].tolist(), size[size > 2].tolist(), strict=True):
+        rows = np.arange(start, start + count)
+        total = put(total, rows[:2], _leading(take(total, rows)))
+        keep[start + 2 : start + count] = False
+    return take(total, np.flatnonzero(keep))
+
+
+def _leading(rows: Array) -> Array:
+    """Return the two leading right singular vectors of rows (k, 3) of rank 2.
+
+    What is left out is how they turn within the plane that they span, which no result depends on.
+    """
+    a = value(rows)
+    vectors, sizes = np.linalg.svd(a)[2], np.zeros(3)
+    found = np.linalg.svd(a, compute_uv=False)
+    sizes[: len(found)] = found**2
+    lead, rest = vectors[:2], vectors[2]
+    gap = 1.0 / (sizes[:2] - sizes[2])
+
+    def there(t: FloatArray) -> FloatArray:
+        change = np.einsum("...kd,ke->...de", t, a)
+        change = change + np.swapaxes(change, -1, -2)
+        off = np.einsum("d,...de,ie->...i", rest, change, lead) * gap
+        return off[..., None] * rest
+
+    def back(g: FloatArray) -> FloatArray:
+        off = (g @ rest) * gap
+        change = np.einsum("...i,d,ie->...de", off, rest, lead)
+        change = change + np.swapaxes(change, -1, -2)
+        return np.einsum("...de,ke->...kd", change, a)
+
+    return apply(lead, (rows, there, back))

@@ -1,0 +1,328 @@
+"""A tape of array operations, each with its exact derivative, forward and in reverse.
+
+Arrays are (..., n, c): rows are nodes or constraints, columns their components, and what comes
+before are directions (or designs) that go through together. An operation takes constants (arrays)
+and variables. Without a variable it is plain NumPy and is not recorded, so that one program gives
+values and derivatives alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+
+Linear = Callable[[FloatArray], FloatArray]
+Link = tuple[Any, Linear, Linear]
+"""What an operation depends on, and its derivative: of tangents, and of adjoints back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """The value of an operation on a tape.
+
+    Attributes
+    ----------
+    value : (n, c) float64
+    tape : Tape
+    place : int
+        Its number on the tape.
+    """
+
+    value: FloatArray
+    tape: Tape
+    place: int
+
+    __array_ufunc__ = None
+
+    def __add__(self, other: Array) -> Array:
+        return add(self, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Array) -> Array:
+        return add(self, -other)
+
+    def __rsub__(self, other: Array) -> Array:
+        return add(other, -self)
+
+    def __neg__(self) -> Array:
+        return apply(-self.value, (self, np.negative, np.negative))
+
+    def __mul__(self, other: Array | float) -> Array:
+        return multiply(self, np.asarray(other, np.float64))
+
+    __rmul__ = __mul__
+
+
+Array = FloatArray | Variable
+
+
+class Tape:
+    """The operations of one evaluation, in order."""
+
+    def __init__(self) -> None:
+        self._links: list[list[tuple[int, Linear, Linear]]] = []
+
+    def variable(self, value: FloatArray, links: Sequence[Link] = ()) -> Variable:
+        """Return a further variable: an input, or the outcome of an operation."""
+        self._links.append([(source.place, push, pull) for source, push, pull in links])
+        return Variable(value, self, len(self._links) - 1)
+
+    def push(self, start: Variable, tangent: FloatArray, end: Variable) -> FloatArray:
+        """Return the change of ``end`` as ``start`` changes by ``tangent``."""
+        found: dict[int, FloatArray] = {start.place: tangent}
+        for place in range(start.place + 1, end.place + 1):
+            for source, push, _ in self._links[place]:
+                if source in found:
+                    more = push(found[source])
+                    found[place] = found[place] + more if place in found else more
+        shape = (*tangent.shape[:-2], *end.value.shape)
+        return np.broadcast_to(found.get(end.place, np.zeros(shape)), shape)
+
+    def pull(self, end: Variable, adjoint: FloatArray, start: Variable) -> FloatArray:
+        """Return the gradient with respect to ``start`` of a sum with weights of ``end``."""
+        found: dict[int, FloatArray] = {end.place: adjoint}
+        for place in range(end.place, start.place, -1):
+            if place not in found:
+                continue
+            here = found.pop(place)
+            for source, _, pull in self._links[place]:
+                more = pull(here)
+                found[source] = found[source] + more if source in found else more
+        shape = (*adjoint.shape[:-2], *start.value.shape)
+        return np.broadcast_to(found.get(start.place, np.zeros(shape)), shape)
+
+
+def value(x: Array) -> FloatArray:
+    """Return the value of a variable, and a constant as it is."""
+    return x.value if isinstance(x, Variable) else x
+
+
+def apply(result: FloatArray, *links: Link) -> Array:
+    """Return the outcome of an operation; it is recorded where it depends on a variable."""
+    used = [link for link in links if isinstance(link[0], Variable)]
+    return used[0][0].tape.variable(result, used) if used else result
+
+
+def _stretched(tangent: FloatArray, like: FloatArray) -> FloatArray:
+    """Return a tangent with as many columns as the other term of a sum has."""
+    return (
+        tangent if tangent.shape[-1] >= like.shape[-1] else np.repeat(tangent, like.shape[-1], -1)
+    )
+
+
+def _fitted(adjoint: FloatArray, like: FloatArray) -> FloatArray:
+    """Return the adjoint of an array that was stretched along its columns."""
+    if like.shape[-1] == 1 and adjoint.shape[-1] != 1:
+        return adjoint.sum(axis=-1, keepdims=True)
+    return adjoint
+
+
+def add(a: Array, b: Array) -> Array:
+    """Return a + b."""
+    x, y = value(a), value(b)
+    return apply(
+        x + y,
+        (a, lambda t: _stretched(t, y), lambda g: _fitted(g, x)),
+        (b, lambda t: _stretched(t, x), lambda g: _fitted(g, y)),
+    )
+
+
+def multiply(a: Array, b: Array) -> Array:
+    """Return a * b, element by element; one of them may have a single column."""
+    x, y = value(a), value(b)
+    return apply(
+        x * y,
+        (a, lambda t: t * y, lambda g: _fitted(g * y, x)),
+        (b, lambda t: t * x, lambda g: _fitted(g * x, y)),
+    )
+
+
+def function(x: Array, result: FloatArray, slope: FloatArray) -> Array:
+    """Return a function of each element, given its values and its derivatives."""
+    return apply(result, (x, lambda t: t * slope, lambda g: g * slope))
+
+
+def inverse(x: Array) -> Array:
+    """Return 1 / x."""
+    one = 1.0 / value(x)
+    return function(x, one, -one * one)
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Return the scalar product of each row of a with that of b, (..., n, 1)."""
+    x, y = value(a), value(b)
+
+    def along(u: FloatArray, v: FloatArray) -> FloatArray:
+        return np.einsum("...d,...d->...", u, v)[..., None]
+
+    return apply(
+        along(x, y),
+        (a, lambda t: along(t, y), lambda g: g * y),
+        (b, lambda t: along(x, t), lambda g: g * x),
+    )
+
+
+def length(x: Array) -> Array:
+    """Return the length of each row, (..., n, 1); where it is 0 its derivative is 0 too."""
+    v = value(x)
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    unit = v / np.where(size > 0, size, 1.0)
+    return apply(
+        size,
+        (x, lambda t: (t * unit).sum(axis=-1, keepdims=True), lambda g: g * unit),
+    )
+
+
+def unit(x: Array) -> Array:
+    """Return the rows at length 1; zero rows stay zero."""
+    v = value(x)
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    e = v * scale
+
+    def across(t: FloatArray) -> FloatArray:
+        return (t - (t * e).sum(axis=-1, keepdims=True) * e) * scale
+
+    return apply(v / np.where(size > 0, size, 1.0), (x, across, across))
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the vector product of each row of a with that of b, (..., n, 3)."""
+    x, y = value(a), value(b)
+    return apply(
+        np.cross(x, y),
+        (a, lambda t: np.cross(t, y), lambda g: np.cross(y, g)),
+        (b, lambda t: np.cross(x, t), lambda g: np.cross(g, x)),
+    )
+
+
+def transform(matrices: FloatArray, x: Array) -> Array:
+    """Return ``matrices`` (n, e, d) or (e, d) times each row of x (..., n, d)."""
+    there = "...ed,...d->...e"
+    back = "...ed,...e->...d"
+    return apply(
+        np.einsum(there, matrices, value(x)),
+        (
+            x,
+            lambda t: np.einsum(there, matrices, t),
+            lambda g: np.einsum(back, matrices, g),
+        ),
+    )
+
+
+def product(a: Array, b: Array) -> Array:
+    """Return the matrix product of a (n, q) and b (..., q, c)."""
+    x, y = value(a), value(b)
+    return apply(
+        x @ y,
+        (a, lambda t: t @ y, lambda g: g @ np.swapaxes(y, -1, -2)),
+        (b, lambda t: x @ t, lambda g: np.swapaxes(x, -1, -2) @ g),
+    )
+
+
+def reshape(x: Array, rows: int, columns: int) -> Array:
+    """Return the entries, row by row, as (..., rows, columns)."""
+    n, c = value(x).shape[-2:]
+    return apply(
+        value(x).reshape(*value(x).shape[:-2], rows, columns),
+        (
+            x,
+            lambda t: t.reshape(*t.shape[:-2], rows, columns),
+            lambda g: g.reshape(*g.shape[:-2], n, c),
+        ),
+    )
+
+
+def transpose(x: Array) -> Array:
+    """Return rows as columns."""
+
+    def turned(t: FloatArray) -> FloatArray:
+        return np.swapaxes(t, -1, -2)
+
+    return apply(turned(value(x)), (x, turned, turned))
+
+
+def sums(values: FloatArray, rows: IntArray, count: int) -> FloatArray:
+    """Return the sums (..., count, c) of the values (..., m, c) that belong to each row (m,)."""
+    out = np.zeros((*values.shape[:-2], count, values.shape[-1]))
+    np.add.at(out, (..., rows, slice(None)), values)  # type: ignore[arg-type]
+    return out
+
+
+def take(x: Array, rows: IntArray) -> Array:
+    """Return some rows of x (..., n, c), as often as they are named: (..., m, c)."""
+    v = value(x)
+    n = v.shape[-2]
+    return apply(v[..., rows, :], (x, lambda t: t[..., rows, :], lambda g: sums(g, rows, n)))
+
+
+def gather(x: Array, rows: IntArray, count: int) -> Array:
+    """Return the sums (..., count, c) of the rows of x that belong to each row."""
+    v = value(x)
+    return apply(
+        sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
+    )
+
+
+def put(x: Array, rows: IntArray, new: Array) -> Array:
+    """Return x (..., n, c) with some rows (m,), each named once, replaced by ``new``."""
+    v, w = value(x), value(new)
+    ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
+    out = np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))
+    out[..., rows, :] = w
+
+    def without(t: FloatArray) -> FloatArray:
+        kept = t.copy()
+        kept[..., rows, :] = 0.0
+        return kept
+
+    def alone(t: FloatArray) -> FloatArray:
+        placed = np.zeros((*t.shape[:-2], *v.shape[-2:]))
+        placed[..., rows, :] = t
+        return placed
+
+    return apply(out, (x, without, without), (new, alone, lambda g: g[..., rows, :]))
+
+
+def join(*parts: Array) -> Array:
+    """Return the rows of all parts, one after the other."""
+    values = [value(part) for part in parts]
+    ahead = np.broadcast_shapes(*(v.shape[:-2] for v in values))
+    stops = np.cumsum([v.shape[-2] for v in values])
+    total = int(stops[-1])
+    links: list[Link] = []
+    for part, v, stop in zip(parts, values, stops.tolist(), strict=True):
+        here = slice(stop - v.shape[-2], stop)
+
+        def alone(t: FloatArray, here: slice = here) -> FloatArray:
+            out = np.zeros((*t.shape[:-2], total, t.shape[-1]))
+            out[..., here, :] = t
+            return out
+
+        def cut(g: FloatArray, here: slice = here) -> FloatArray:
+            return g[..., here, :]
+
+        links.append((part, alone, cut))
+    full = [np.broadcast_to(v, (*ahead, *v.shape[-2:])) for v in values]
+    return apply(np.concatenate(full, axis=-2), *links)
+
+
+def solution(residual: Array, found: FloatArray, solve: Linear) -> Array:
+    """Return what makes a residual zero that is linear in it, with a symmetric matrix.
+
+    Parameters
+    ----------
+    residual
+        How it depends on all else, at the solution.
+    found
+        The solution.
+    solve : callable
+        The matrix's inverse.
+    """
+    return apply(found, (residual, lambda t: -solve(t), lambda g: -solve(g)))

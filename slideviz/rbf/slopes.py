@@ -1,0 +1,208 @@
+"""Derivatives of sums of radial functions with respect to the positions of their nodes.
+
+    s(x_i) = sum_j w_j phi(|x_i - c_j| / R)
+
+A radial function changes with the square of the distance by phi'(xi) / (2 xi R^2), which needs no
+square root and has no 0/0 for the smooth ones. A node that is a control node itself stays at
+distance zero from itself, so that pair adds nothing, whatever the function.
+
+Both loops run over targets; the part of the control nodes in the reverse pass is the same loop
+with targets and controls exchanged, because the square of the distance is symmetric.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from slideviz.mesh.caching import njit
+from slideviz.mesh.model import FloatArray
+from slideviz.rbf import compiled
+from slideviz.rbf.compiled import _A2, BLOCK, OPTIONS, TARGETS_PER_TASK, _distances, half_chord
+from slideviz.rbf.evaluate import Basis, _rows
+from slideviz.rbf.kernels import KERNELS, SHAPE
+
+NEAR = 1e-12
+"""Parts of R below which two nodes are one."""
+
+
+@njit(**OPTIONS)
+def _slope(kind, q, count):  # type: ignore[no-untyped-def]
+    """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q."""
+    for j in range(count):
+        x = q[j]
+        u = max(1.0 - x, 0.0)
+        if kind == 0:
+            q[j] = -10.0 * u * u * u
+        elif kind == 2:
+            q[j] = -28.0 / 3.0 * u**5 * (5.0 * x + 1.0)
+        elif kind == 3:
+            q[j] = -11.0 * u**7 * ((16.0 * x + 7.0) * x + 1.0)
+        elif kind == 9:
+            q[j] = 0.5 / np.sqrt(_A2 + x * x)
+        elif kind == 10:
+            q[j] = -0.5 * SHAPE / ((_A2 + x * x) * np.sqrt(_A2 + x * x))
+        elif kind == 11:
+            q[j] = 1.0
+        elif kind == 12:
+            q[j] = -1.0 / ((1.0 + x * x) * (1.0 + x * x))
+        elif kind == 13:
+            q[j] = -np.exp(-x * x)
+        elif x <= NEAR or (kind != 8 and x >= 1.0):
+            q[j] = 0.0
+        elif kind == 1:
+            q[j] = -u / x
+        elif kind == 4:
+            q[j] = -2.5 * u**4 / x
+        elif kind == 5:
+            q[j] = 110.0 / 3.0 + ((-20.0 / 3.0 * x + 30.0) * x - 60.0) * x + 20.0 * np.log(x)
+        elif kind == 6:
+            q[j] = -30.0 + ((-15.0 * x + 90.0) * x - 45.0) * x - 90.0 * x * np.log(x)
+        elif kind == 7:
+            q[j] = -20.0 + ((-40.0 * x - 60.0) * x + 120.0) * x + 120.0 * x * x * np.log(x)
+        else:
+            q[j] = np.log(x) + 0.5
+
+
+@njit(inline="always", **OPTIONS)
+def _sine(g):  # type: ignore[no-untyped-def]
+    """Return sin g for |g| <= 2, to 1e-15."""
+    t, term, total = g * g, g, g
+    for k in range(1, 12):
+        term *= -t / ((2.0 * k) * (2.0 * k + 1.0))
+        total += term
+    return total
+
+
+@njit(parallel=True, **OPTIONS)
+def _reverse(x, c, wx, wc, half, scale, kind, out):  # type: ignore[no-untyped-def]
+    """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N)."""
+    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
+    twice = 2.0 * scale * scale
+    for task in prange(tasks):
+        q = np.empty(BLOCK)
+        first = task * TARGETS_PER_TASK
+        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
+            x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
+            a0, a1, a2 = wx[0, i], wx[1, i], wx[2, i]
+            s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+            for start in range(0, c.shape[1], BLOCK):
+                count = min(BLOCK, c.shape[1] - start)
+                _distances(x[:, i], c, start, count, half, scale, q)
+                _slope(kind, q, count)
+                for j in range(start, start + count):
+                    p = (a0 * wc[0, j] + a1 * wc[1, j] + a2 * wc[2, j]) * q[j - start]
+                    if half > 0.0:
+                        g = half * (x1 * c[2, j] - x2 * c[1, j])
+                        turn = x0 * c[0, j] * _sine(g) * half
+                        s0 += p * (x0 - c[0, j] + c[0, j] * half_chord(g))
+                        s1 += p * turn * c[2, j]
+                        s2 -= p * turn * c[1, j]
+                    else:
+                        s0 += p * (x0 - c[0, j])
+                        s1 += p * (x1 - c[1, j])
+                        s2 += p * (x2 - c[2, j])
+                    s3 += p * (x3 - c[3, j])
+            out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
+            out[3, i] = twice * s3
+
+
+@njit(parallel=True, **OPTIONS)
+def _forward(x, c, w, dx, dc, half, scale, kind, out):  # type: ignore[no-untyped-def]
+    """Write the change of s as x and c change by dx and dc, to out (3, N)."""
+    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
+    twice = 2.0 * scale * scale
+    for task in prange(tasks):
+        q = np.empty(BLOCK)
+        first = task * TARGETS_PER_TASK
+        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
+            x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
+            d0, d1, d2, d3 = dx[0, i], dx[1, i], dx[2, i], dx[3, i]
+            s0, s1, s2 = 0.0, 0.0, 0.0
+            for start in range(0, c.shape[1], BLOCK):
+                count = min(BLOCK, c.shape[1] - start)
+                _distances(x[:, i], c, start, count, half, scale, q)
+                _slope(kind, q, count)
+                for j in range(start, start + count):
+                    change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
+                    if half > 0.0:
+                        g = half * (x1 * c[2, j] - x2 * c[1, j])
+                        change += (d0 * c[0, j] + x0 * dc[0, j]) * half_chord(g)
+                        turn = d1 * c[2, j] + x1 * dc[2, j] - d2 * c[1, j] - x2 * dc[1, j]
+                        change += x0 * c[0, j] * _sine(g) * half * turn
+                    else:
+                        change += (x1 - c[1, j]) * (d1 - dc[1, j])
+                        change += (x2 - c[2, j]) * (d2 - dc[2, j])
+                    p = q[j - start] * change
+                    s0 += w[0, j] * p
+                    s1 += w[1, j] * p
+                    s2 += w[2, j] * p
+            out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
+
+
+def pull_positions(
+    basis: Basis,
+    targets: FloatArray,
+    controls: FloatArray,
+    adjoint: FloatArray,
+    weights: FloatArray,
+) -> FloatArray:
+    """Return the gradient of sum_i adjoint_i . s(x_i) with respect to the targets, (k, N).
+
+    With targets and controls, and adjoint and weights, exchanged: that with respect to controls.
+
+    Parameters
+    ----------
+    targets, controls : (k, N), (k, n)
+        Features, as ``Frame.features`` gives them.
+    adjoint, weights : (N, d), (n, d)
+    """
+    x, c = _rows(targets, 4), _rows(controls, 4)
+    out = np.empty((4, x.shape[1]))
+    with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
+        _reverse(
+            x,
+            c,
+            _rows(adjoint.T, 3),
+            _rows(weights.T, 3),
+            basis.half,
+            1.0 / basis.radius,
+            KERNELS[basis.kernel].code,
+            out,
+        )
+    return out[: len(targets)]
+
+
+def push_positions(
+    basis: Basis,
+    targets: FloatArray,
+    controls: FloatArray,
+    weights: FloatArray,
+    *,
+    moved: FloatArray | None = None,
+    moved_controls: FloatArray | None = None,
+) -> FloatArray:
+    """Return the change (N, d) of s as features of targets and controls change.
+
+    Parameters
+    ----------
+    moved, moved_controls : (k, N), (k, n), optional
+        The changes; None: zero.
+    """
+    x, c = _rows(targets, 4), _rows(controls, 4)
+    dx = np.zeros_like(x) if moved is None else _rows(moved, 4)
+    dc = np.zeros_like(c) if moved_controls is None else _rows(moved_controls, 4)
+    out = np.empty((3, x.shape[1]))
+    with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
+        _forward(
+            x,
+            c,
+            _rows(weights.T, 3),
+            dx,
+            dc,
+            basis.half,
+            1.0 / basis.radius,
+            KERNELS[basis.kernel].code,
+            out,
+        )
+    return np.ascontiguousarray(out[: weights.shape[1]].T)
