@@ -82,10 +82,23 @@ def sweep(
 
     Examples
     --------
+    Two squares side by side; the left side stays, the right side moves by two distances:
+
+    >>> from concurrent.futures import ThreadPoolExecutor
     >>> import slideviz as sv
-    >>> made = sample("square", size=8, variant="motion")
-    >>> designs = {"motion1.dx": [0.0, 0.1, 0.2]}
-    >>> rows = sorted(sv.sweep(made.case, designs, mesh=made.mesh), key=lambda row: row.design)
+    >>> mesh = sv.Mesh(
+    ...     [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]],
+    ...     sv.Cells.from_blocks([(9, [[0, 1, 4, 3], [1, 2, 5, 4]])]),
+    ...     (
+    ...         sv.Marker("left", sv.Cells.from_blocks([(3, [[0, 3]])])),
+    ...         sv.Marker("right", sv.Cells.from_blocks([(3, [[2, 5]])])),
+    ...     ),
+    ... )
+    >>> case = sv.Case(roles={"right": "moving"}, motions=(sv.Translate("right", (0.5, 0.0)),))
+    >>> with ThreadPoolExecutor(1) as pool:
+    ...     rows = list(sv.sweep(case, {"motion1.dx": [0.0, 0.5]}, executor=pool, mesh=mesh))
+    >>> [round(row.min, 2) for row in rows]
+    [1.0, 0.88]
     """
     asked = read_designs(case, designs)
     if workers is not None and workers < 1:
