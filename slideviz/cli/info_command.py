@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from slideviz.cli.options import add_shared
+
+if TYPE_CHECKING:
+    from slideviz.cli.report import Counts
+    from slideviz.mesh.model import Mesh
+    from slideviz.mesh.quality import Quality
 
 
 def add_info(calls: argparse._SubParsersAction) -> None:
@@ -14,29 +20,43 @@ def add_info(calls: argparse._SubParsersAction) -> None:
     call.add_argument("mesh", type=Path)
     add_shared(call, "zone")
     add_shared(call, "json")
+    add_shared(call, "stream")
     call.set_defaults(command=info)
 
 
 def info(arguments: argparse.Namespace) -> int:
     """Print the content of a mesh file."""
-    from slideviz import quality, read
-    from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, require_places
-    from slideviz.cli.report import info_report, save_json, table
-    from slideviz.mesh.check import unused_nodes
-    from slideviz.mesh.periodic import find_pairs
 
     require_places(arguments, Output(arguments.json, "--json"))
+    if arguments.stream:
+        from slideviz.cli.report import Counts
+        from slideviz.cli.streamed import rated
+
+        with rated(arguments) as (skin, whole, _):
+            counts = Counts(whole.points, whole.unused, whole.types)
+            return _told(arguments, skin, counts, whole.quality)
+    from slideviz import quality, read
+    from slideviz.cli.report import Counts
+
     mesh = read(arguments.mesh, zone=arguments.zone)
-    found = quality(mesh)
-    report = info_report(mesh, find_pairs(mesh), len(unused_nodes(mesh)), found)
+    return _told(arguments, mesh, Counts.of(mesh), quality(mesh))
+
+
+def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Quality) -> int:
+    """Print or write what is in a mesh, of which the boundaries at least are there."""
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.report import info_report, save_json, table
+    from slideviz.mesh.periodic import find_pairs
+
+    report = info_report(mesh, find_pairs(mesh), counts, found)
     if arguments.json:
         text = save_json(arguments.json, report)
         if text is not None:
             print(text, end="")
             return DONE
     zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
-    print(f"{arguments.mesh}: {mesh.dim}D{zone}, {len(mesh.points)} points")
+    print(f"{arguments.mesh}: {mesh.dim}D{zone}, {counts.points} points")
     print(table([(count, name) for name, count in report["cells_by_type"].items()]))
     extents = zip("xyz", report["extents"], strict=False)
     print("  " + ", ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, (low, high) in extents))

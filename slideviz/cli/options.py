@@ -50,9 +50,9 @@ def reference_of(
     return (case.mesh_file, base) if same else None
 
 
-def words_of(found: tuple[Path, Mesh] | None) -> str:
+def words_of(reference: Path | None) -> str:
     """Return the line about what the quality is measured against."""
-    return f"{NONE}; {REMEDY}" if found is None else f"reference: {found[0]}"
+    return f"{NONE}; {REMEDY}" if reference is None else f"reference: {reference}"
 
 
 SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
@@ -62,6 +62,10 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "json": (
         ("--json",),
         {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"},
+    ),
+    "stream": (
+        ("--stream",),
+        {"action": "store_true", "help": "for meshes larger than memory (.su2b)"},
     ),
     "set": (
         ("--set",),

@@ -10,6 +10,8 @@ from slideviz.cli.options import add_reference, add_shared, given_case, referenc
 from slideviz.terms import METRICS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from slideviz.mesh.quality import Quality
 
 
@@ -33,6 +35,7 @@ def add_quality(calls: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="mesh with quality (.vtu, .vtkhdf), or .csv",
     )
+    add_shared(call, "stream")
     call.set_defaults(command=quality)
 
 
@@ -40,17 +43,12 @@ def quality(arguments: argparse.Namespace) -> int:
     """Print the quality of a mesh, compared with the undeformed one if it is given."""
     from slideviz import quality as rate
     from slideviz import read, write
-    from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.places import Output, require_places
-    from slideviz.cli.report import (
-        cell_data,
-        histogram_lines,
-        quality_lines,
-        quality_report,
-        save_json,
-        table,
-    )
+    from slideviz.cli.report import cell_data, worst_cells
+    from slideviz.cli.streamed import rated, require_no_file
 
+    if arguments.stream:
+        require_no_file(arguments)
     is_table = arguments.output is not None and arguments.output.suffix.lower() == ".csv"
     case = given_case(arguments)
     require_places(
@@ -58,20 +56,45 @@ def quality(arguments: argparse.Namespace) -> int:
         Output(arguments.output, "-o", is_mesh=not is_table),
         Output(arguments.json, "--json"),
     )
+    if arguments.stream:
+        with rated(arguments, case) as (skin, whole, path):
+            return _told(arguments, skin.name, whole.quality, whole.worst, path)
     mesh = read(arguments.mesh, zone=arguments.zone)
     base = reference_of(arguments, mesh, case)
     found = rate(mesh, reference=base[1] if base else None, metric=arguments.metric)
-    report = quality_report(mesh, found) | {"reference": str(base[0]) if base else None}
     if is_table:
         _write_csv(arguments.output, found)
     elif arguments.output:
         write(arguments.output, mesh, cell_data=cell_data(arguments.output, found))
+    path = base[0] if base else None
+    return _told(arguments, mesh.name, found, worst_cells(mesh, found), path)
+
+
+def _told(
+    arguments: argparse.Namespace,
+    name: str,
+    found: Quality,
+    worst: Sequence[tuple[int, int]],
+    reference: Path | None,
+) -> int:
+    """Write or print the quality of a mesh, and return the exit code."""
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.report import (
+        histogram_lines,
+        quality_lines,
+        quality_report,
+        save_json,
+        table,
+    )
+
+    report = quality_report(name, found, worst)
+    report |= {"reference": str(reference) if reference else None}
     text = save_json(arguments.json, report) if arguments.json else None
     if text is not None:
         print(text, end="")
     else:
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
-        print(f"  {words_of(base)}")
+        print(f"  {words_of(reference)}")
         print(quality_lines(found))
         print("worst cells:")
         print(table([(w["cell"], w["type"], f"{w['quality']:.6f}") for w in report["worst"]]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from slideviz.case.model import Case
 from slideviz.case.reduction_keys import get_reduction
 from slideviz.deformation.solver import Step, folded_at
 from slideviz.errors import CaseError
+from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
@@ -19,6 +21,8 @@ from slideviz.mesh.quality import Quality
 
 LISTED = 100
 """Inverted cells named in a report."""
+WORST = 10
+"""Cells of lowest quality named in a report."""
 
 PHASES = (
     *("read", "classify", "select", "solve", "evaluate", "project", "correct"),
@@ -106,24 +110,46 @@ def inverted_cells(quality: Quality) -> list[int]:
     return [int(i) for i in quality.inverted_cells(LISTED)]
 
 
-def quality_report(mesh: Mesh, quality: Quality) -> dict[str, Any]:
-    """Return the JSON object of ``quality --json``."""
+def quality_report(name: str, quality: Quality, worst: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """Return the JSON object of ``quality --json``; ``worst`` are cells and their types."""
     counts, edges = quality.histogram()
     return {
-        "mesh": mesh.name,
+        "mesh": name,
         **quality.summary(),
         "metric": quality.metric,
         "inverted_cells": inverted_cells(quality),
         "worst": [
-            {"cell": int(i), "type": type_name(mesh, int(i)), "quality": float(quality.values[i])}
-            for i in quality.worst(10)
+            {"cell": cell, "type": ELEMENTS[vtk].name, "quality": float(quality.values[cell])}
+            for cell, vtk in worst
         ],
         "histogram": {"counts": counts.tolist(), "edges": edges.tolist()},
     }
 
 
-def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality) -> dict[str, Any]:
-    """Return the JSON object of ``info --json``."""
+def worst_cells(mesh: Mesh, quality: Quality, count: int = WORST) -> list[tuple[int, int]]:
+    """Return numbers and types of the cells of lowest quality."""
+    return [(int(cell), int(mesh.cells.types[cell])) for cell in quality.worst(count)]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many points a mesh has, and points that no cell uses, and cells of each type."""
+
+    points: int
+    unused: int
+    types: Mapping[int, int]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Counts:
+        """Return those of a mesh in memory."""
+        types = {vtk: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()}
+        return cls(len(mesh.points), len(unused_nodes(mesh)), types)
+
+
+def info_report(
+    mesh: Mesh, pairs: Sequence[Any], counts: Counts, quality: Quality
+) -> dict[str, Any]:
+    """Return the JSON object of ``info --json``; of ``mesh`` its boundaries are looked at."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     halo = mesh.halo
     return {
@@ -131,12 +157,10 @@ def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality)
         "dimension": mesh.dim,
         "zone": mesh.zone,
         "zones": mesh.zones,
-        "points": len(mesh.points),
-        "unused_points": unused,
-        "cells": len(mesh.cells),
-        "cells_by_type": {
-            ELEMENTS[vtk].name: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()
-        },
+        "points": counts.points,
+        "unused_points": counts.unused,
+        "cells": sum(counts.types.values()),
+        "cells_by_type": {ELEMENTS[vtk].name: count for vtk, count in counts.types.items()},
         "extents": [[float(a), float(b)] for a, b in zip(low, high, strict=True)],
         "markers": [
             {"name": m.name, "elements": len(m.cells), "nodes": len(m.nodes)} for m in mesh.markers
@@ -165,11 +189,6 @@ def info_report(mesh: Mesh, pairs: Sequence[Any], unused: int, quality: Quality)
 def counted(number: int, what: str) -> str:
     """Return a number of things in words: 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def type_name(mesh: Mesh, cell: int) -> str:
-    """Return the name of a cell's type."""
-    return ELEMENTS[int(mesh.cells.types[cell])].name
 
 
 def save_json(path: Path, report: Mapping[str, Any]) -> str | None:

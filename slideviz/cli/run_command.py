@@ -51,10 +51,8 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
     add_zoom(call)
     add_shared(call, "zone")
-    call.add_argument(
-        "--stream",
-        action="store_true",
-        help="for meshes larger than memory (.su2b): only the boundary is in memory",
+    add_shared(
+        call, "stream", help="for meshes larger than memory (.su2b): only the boundary is in memory"
     )
     call.add_argument(
         "--resume", action="store_true", help="go on where a streamed run was stopped"

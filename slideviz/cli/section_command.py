@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.mesh.model import FloatArray, Mesh
     from slideviz.mesh.periodic import Pair
+    from slideviz.mesh.quality import Quality
     from slideviz.plots.section_picture import Shown
     from slideviz.sections.model import Section
 
@@ -84,12 +85,30 @@ def add_section(calls: argparse._SubParsersAction) -> None:
     add("--metric", choices=tuple(METRICS), default="knupp", help="as for quality")
     add_shared(call, "zone")
     add_shared(call, "json", help="numbers of the cut as JSON; - is the terminal")
+    add_shared(call, "stream")
     call.set_defaults(command=section, wrong_usage=call.error)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What a section is cut of.
+
+    ``mesh`` and ``base`` (undeformed, where there is a reference) may be parts: the cells that the
+    section can cut. ``outer`` has points (n, d) that tell how far the whole reaches, ``reference``
+    is the file of the undeformed mesh.
+    """
+
+    mesh: Mesh
+    base: Mesh | None
+    found: Quality
+    chosen: Section
+    matrices: dict[int, FloatArray]
+    outer: FloatArray
+    reference: Path | None
 
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
-    from slideviz import quality, read
     from slideviz.cli.places import Output, require_places
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
@@ -107,19 +126,16 @@ def section(arguments: argparse.Namespace) -> int:
     require_picture_name(arguments.output)
     case = given_case(arguments)
     require_places(arguments, Output(arguments.output, "-o"), Output(arguments.json, "--json"))
-    mesh = read(arguments.mesh, zone=arguments.zone)
-    known = reference_of(arguments, mesh, case)
-    base = known[1] if known else None
-    found = quality(mesh, reference=base, metric=arguments.metric)
-    painted = paint(mesh, found, arguments.color, base)
+    scene = (_streamed if arguments.stream else _in_memory)(arguments, case)
+    mesh, chosen = scene.mesh, scene.chosen
+    painted = paint(mesh, scene.found, arguments.color, scene.base)
     painted = replace(painted, colour_map=arguments.map)
-    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
     cutter = Cutter.of(mesh)
-    pieces = show_passages(cutter, mesh.points, chosen, matrices)
-    note = "" if base is not None or painted.label == "skew" else NONE
-    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, matrices), note=note)
+    pieces = show_passages(cutter, mesh.points, chosen, scene.matrices)
+    note = "" if scene.base is not None or painted.label == "skew" else NONE
+    shown = Shown(pieces, painted, surroundings(cutter, mesh.points, scene.matrices), note=note)
     if not shown.drawn:
-        why = chosen.shape.miss(chosen, mesh.points[cutter.used])
+        why = chosen.shape.miss(chosen, scene.outer)
         raise CaseError(f"{mesh.name}: the {chosen.describe(mesh.dim)} {why}")
     if arguments.range:
         shown = replace(shown, paint=painted.within(*arguments.range))
@@ -135,26 +151,47 @@ def section(arguments: argparse.Namespace) -> int:
         axes=arguments.axes,
     )
     section_picture([shown], chosen, arguments.output, style)
-    return _report(arguments, mesh, chosen, shown, known)
+    return _report(arguments, scene, shown)
 
 
-def _report(
-    arguments: argparse.Namespace,
-    mesh: Mesh,
-    chosen: Section,
-    shown: Shown,
-    known: tuple[Path, Mesh] | None,
-) -> int:
+def _in_memory(arguments: argparse.Namespace, case: Case | None) -> _Scene:
+    from slideviz import quality, read
+
+    mesh = read(arguments.mesh, zone=arguments.zone)
+    known = reference_of(arguments, mesh, case)
+    path, base = known or (None, None)
+    found = quality(mesh, reference=base, metric=arguments.metric)
+    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
+    outer = mesh.points[mesh.cells.nodes]
+    return _Scene(mesh, base, found, chosen, matrices, outer, path)
+
+
+def _streamed(arguments: argparse.Namespace, case: Case | None) -> _Scene:
+    from slideviz.cli.section_streamed import cells_near, skins
+
+    mesh, base, reference = skins(arguments, case)
+    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
+    near, before, found = cells_near(
+        mesh, (arguments.mesh, arguments.zone), reference, arguments.metric, chosen, matrices
+    )
+    path = reference[0] if reference else None
+    return _Scene(near, before, found, chosen, matrices, mesh.points, path)
+
+
+def _report(arguments: argparse.Namespace, scene: _Scene, shown: Shown) -> int:
     """Write or print the numbers of the cut, and return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
     from slideviz.cli.report import save_json
 
+    mesh, chosen = scene.mesh, scene.chosen
     summary = shown.paint.summary(shown.ids)
+    if mesh.part is not None:
+        summary["worst_cell"] = int(mesh.part.cells[int(summary["worst_cell"])])
     report: dict[str, Any] = {
         "mesh": mesh.name,
         "section": _as_json(chosen),
         "color": shown.paint.label,
-        "reference": str(known[0]) if known else None,
+        "reference": str(scene.reference) if scene.reference else None,
         "passages": len(shown.pieces),
         "picture": str(arguments.output),
         **summary,
@@ -165,8 +202,8 @@ def _report(
     else:
         print(f"{Path(mesh.name).name}: {chosen.describe(mesh.dim)}")
         print(f"  {shown.paint.sentence(shown.ids)}, worst is cell {summary['worst_cell']}")
-        if shown.note or known:
-            print(f"  {words_of(known)}")
+        if shown.note or scene.reference:
+            print(f"  {words_of(scene.reference)}")
         print(f"  {arguments.output}")
     return INVERTED if summary["inverted"] else DONE
 

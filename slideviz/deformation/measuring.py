@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -38,11 +39,7 @@ class PointFiles:
 
     def cells_of(self, block: Block) -> tuple[Mesh, Mesh]:
         """Return the cells of a block as a mesh, before and after."""
-        low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
-        if high - low <= SPARSE * len(block.types):
-            nodes, flat = np.arange(low, high), block.nodes - low
-        else:
-            nodes, flat = np.unique(block.nodes, return_inverse=True)
+        nodes, flat = nodes_of(block)
         cells = Cells.from_types(block.types, flat)
         base = Mesh(self.points(self.before, nodes), cells, name=self.before.name)
         return base, base.with_points(self.points(self.after, nodes))
@@ -62,6 +59,29 @@ class PointFiles:
             out[a:b] = rows["x"][nodes[a:b] - first]
             a = b
         return out
+
+
+def nodes_of(block: Block) -> tuple[IntArray, IntArray]:
+    """Return numbers of points (k,), ascending, among them those of a block, and their places."""
+    low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
+    if high - low <= SPARSE * len(block.types):
+        return np.arange(low, high), block.nodes - low
+    nodes, flat = np.unique(block.nodes, return_inverse=True)
+    return nodes, flat
+
+
+def require_one_way(signs: NDArray[np.int8], name: str, first: int, also: str = "") -> None:
+    """Raise where cells, up to those of the block that begins with ``first``, are numbered unlike.
+
+    Only their neighbours tell cells that are numbered the other way round from folded ones.
+    ``also`` is one more remedy.
+    """
+    if len(signs) > 1:
+        raise MeshError(
+            f"{name}: some cells are numbered the other way round than others (near element "
+            f"{first}), which only the whole mesh can tell from folded ones; {also}run it without "
+            "--stream, or mesh again"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +150,7 @@ class Rating:
     def __init__(self, stack: ExitStack, folder: Path, count: int, metric: Metric) -> None:
         self._metric = metric
         kinds = (float, float, np.uint8, np.uint8)
-        self._files = [_Scratch(stack, folder, count, kind) for kind in kinds]
+        self._files = [Scratch(stack, folder, count, kind) for kind in kinds]
         self._values, self._before, self._status, self._old = (f.array for f in self._files)
         self._signs = np.zeros(0, np.int8)
         self.inverted: dict[int, tuple[int, IntArray]] = {}
@@ -138,12 +158,7 @@ class Rating:
     def add(self, found: Measured, listed: int) -> None:
         """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
         self._signs = np.unique(np.concatenate([self._signs, found.signs]))
-        if len(self._signs) > 1:
-            raise MeshError(
-                f"{found.name}: some cells are numbered the other way round than others (near "
-                f"element {found.first}), which only the whole mesh can tell from folded ones; run "
-                "it without --stream, or mesh again"
-            )
+        require_one_way(self._signs, found.name, found.first)
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status
         self._before[ids], self._old[ids] = found.before, found.old
@@ -170,13 +185,16 @@ class Rating:
             file.release()
 
 
-class _Scratch:
+class Scratch:
     """An array in a file, which is removed with ``stack``; what was looked at can be let go."""
 
     def __init__(self, stack: ExitStack, folder: Path, count: int, kind: type) -> None:
         path = stack.enter_context(draft(folder))
         with path.open("w+b") as file:
-            file.truncate(max(count * np.dtype(kind).itemsize, 1))
+            size = max(count * np.dtype(kind).itemsize, 1)
+            file.truncate(size)
+            if hasattr(os, "posix_fallocate"):  # else a full disk would end the process
+                os.posix_fallocate(file.fileno(), 0, size)
             self._map = mmap.mmap(file.fileno(), 0)
         self.array: NDArray = np.frombuffer(self._map, kind, count)
 

@@ -35,6 +35,7 @@ from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import read_skin
 from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
+from slideviz.terms import FileFormat
 
 NEEDED = 5.0
 """Memory of a run that is not streamed over the size of its file: 4.2 on hexahedra."""
@@ -173,7 +174,18 @@ def require_stream(case: Case) -> None:
             "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "
             "or idw, or run it without --stream"
         )
-    if case.mesh_format == "su2" or format_of(path, None) != "su2b":
+    require_binary(path, case.mesh_format)
+
+
+def require_binary(path: Path, file_format: FileFormat | None = None) -> None:
+    """Raise where a mesh is of no format that can be streamed.
+
+    Raises
+    ------
+    MeshError
+        It is no SU2 binary mesh.
+    """
+    if file_format == "su2" or format_of(path, None) != "su2b":
         raise MeshError(
             f"{path}: only SU2 binary meshes can be streamed; make one with `slideviz convert "
             f"{path.name} {path.stem}.su2b`"

@@ -1,0 +1,161 @@
+"""``slideviz section --stream``: of a mesh larger than memory, the cells that a section can cut."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from slideviz.cli.progress import Bar
+from slideviz.cli.streamed import reference_file
+from slideviz.deformation.rated import Rated, Zone, rated_blocks
+from slideviz.deformation.steps import Progress
+from slideviz.deformation.streaming import require_binary
+from slideviz.errors import CaseError
+from slideviz.mesh.io.su2b_elements import taken
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
+from slideviz.mesh.quality import Quality
+from slideviz.mesh.skin import read_skin
+from slideviz.sections.model import Section
+from slideviz.session.passages import keeps, moved
+from slideviz.terms import Metric
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+
+
+def skins(
+    arguments: argparse.Namespace, case: Case | None
+) -> tuple[Mesh, Mesh | None, Zone | None]:
+    """Return the skin of a mesh, and skin and file of the undeformed one where there is one.
+
+    Raises
+    ------
+    CaseError
+        The mesh is 2D.
+    MeshError
+        It is no SU2 binary mesh, or has a mistake, or the reference has other cells.
+    """
+    require_binary(arguments.mesh)
+    mesh = read_skin(arguments.mesh, arguments.zone)
+    if mesh.dim == 2:
+        raise CaseError(
+            f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
+        )
+    reference = reference_file(arguments, mesh, case)
+    return mesh, read_skin(*reference) if reference else None, reference
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Some cells: their numbers (k,), types (k,), nodes and quality; points (n,) by number."""
+
+    ids: IntArray
+    types: np.ndarray
+    flat: IntArray
+    values: FloatArray
+    size: FloatArray
+    skew: FloatArray
+    status: np.ndarray
+    signs: np.ndarray
+    nodes: IntArray
+    points: FloatArray
+    before: FloatArray
+
+    @classmethod
+    def of(cls, part: Rated, chosen: IntArray) -> _Kept:
+        """Return the chosen cells (k,) of a block."""
+        cells, found = taken(part.mesh.cells, chosen), part.quality
+        base = part.mesh if part.base is None else part.base
+        return cls(
+            part.ids[chosen],
+            cells.types,
+            part.nodes[cells.connectivity],
+            found.values[chosen],
+            found.size[chosen],
+            found.skew[chosen],
+            found.status[chosen],
+            found.signs[chosen],
+            part.nodes[cells.nodes],
+            part.mesh.points[cells.nodes],
+            base.points[cells.nodes],
+        )
+
+
+def cells_near(
+    skin: Mesh,
+    mesh: Zone,
+    reference: Zone | None,
+    metric: Metric,
+    section: Section,
+    matrices: Mapping[int, FloatArray],
+) -> tuple[Mesh, Mesh | None, Quality]:
+    """Return the cells that a section can cut in any passage, and no others.
+
+    Parameters
+    ----------
+    skin : Mesh
+        That of the mesh.
+    mesh, reference : file and zone
+    matrices : Mapping of int to (4, 4)
+        The transformation of each passage.
+
+    Returns
+    -------
+    mesh, base : Mesh
+        The cells now and, where there is a reference, undeformed, in the order of the whole.
+    quality : Quality
+        Theirs, as in the whole mesh.
+    """
+    ways = [matrix for matrix in matrices.values() if not keeps(section, matrix)]
+    if len(ways) < len(matrices):
+        ways.append(np.eye(4))
+    kept: list[_Kept] = []
+    with Bar() as bar:
+        tick = lambda part: bar.phase(Progress(1, 1, "quality", part))  # noqa: E731
+        for part in rated_blocks(mesh, reference, metric, tick):
+            near = np.zeros(len(part.ids), bool)
+            for matrix in ways:
+                near |= _meets(section, moved(part.mesh.points, matrix), part.mesh.cells)
+            kept.append(_Kept.of(part, np.flatnonzero(near)))
+    return _joined(skin, kept, metric, with_base=reference is not None)
+
+
+def _meets(section: Section, points: FloatArray, cells: Cells) -> np.ndarray:
+    """Tell which cells have nodes on both sides of a section, or on it, (m,)."""
+    level = np.nan_to_num(section.distance(points), nan=np.inf)[cells.connectivity]
+    starts = cells.offsets[:-1]
+    low, high = np.minimum.reduceat(level, starts), np.maximum.reduceat(level, starts)
+    return np.asarray((low <= 0) & (high >= 0))
+
+
+def _joined(
+    skin: Mesh, kept: Sequence[_Kept], metric: Metric, *, with_base: bool
+) -> tuple[Mesh, Mesh | None, Quality]:
+    assert skin.part is not None
+    every = _Kept(
+        *(np.concatenate([getattr(one, each.name) for one in kept]) for each in fields(_Kept))
+    )
+    order = np.argsort(every.ids, kind="stable")
+    nodes, first = np.unique(every.nodes, return_index=True)
+    flat = np.searchsorted(nodes, every.flat)
+    mesh = Mesh(
+        every.points[first].reshape(-1, skin.dim),
+        taken(Cells.from_types(every.types, flat), order),
+        name=skin.name,
+        zone=skin.zone,
+        zones=skin.zones,
+        part=Part(nodes, every.ids[order], skin.part.n_points, skin.part.n_cells),
+    )
+    found = Quality(
+        values=every.values[order],
+        size=every.size[order],
+        skew=every.skew[order],
+        status=every.status[order],
+        signs=every.signs[order],
+        metric=metric,
+    )
+    return mesh, mesh.with_points(every.before[first]) if with_base else None, found
