@@ -3,10 +3,12 @@
 import importlib.util
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,12 +17,14 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
+from slideviz.deformation import output
 from slideviz.deformation.streaming import stream
-from slideviz.mesh import ranks, threads
+from slideviz.mesh import ranks, skin, threads
 from slideviz.mesh.io.partial import names_of
 from slideviz.mesh.io.su2b_layout import MAGIC
 from slideviz.samples.table import write_sample
 from tests.builders import grid
+from tests.deformation.test_streaming import made
 
 MPI = shutil.which("mpirun") and importlib.util.find_spec("mpi4py")
 needs_mpi = pytest.mark.skipif(
@@ -110,6 +114,44 @@ def test_bits_are_those_of_one_process(square, alone, count):
     assert done(started(square, count, *WORDS)) == (0, "", "")
     assert results(square) == alone
     assert not list(square.glob(".*"))
+
+
+class Sent(ranks.Alone):
+    """One process that sends itself all that ranks send each other."""
+
+    size = 3
+
+    @contextmanager
+    def sharing(self, make, *given):
+        make, given = sent((make, given))
+        with make(*given) as work:
+            yield lambda tasks: (sent(work(sent(task))) for task in tasks)
+
+
+def sent(thing):
+    return pickle.loads(pickle.dumps(thing, 5))
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "sets"),
+    [
+        ("square", 25, ("STEPS=2", "SLIDING_MODE=ds", "RBF_KERNEL=thin-plate")),
+        ("cylindrical", 9, ("STEPS=2", "METHOD=idw")),
+        ("polar", 12, ("STEPS=auto",)),
+        ("stator", 5000, ("STEPS=2",)),
+    ],
+)
+def test_what_moves_nodes_can_be_sent(tmp_path, monkeypatch, name, size, sets):
+    """Every kind of field and frame."""
+    case = made(tmp_path, name, size, sets)
+    one = stream(case, tmp_path / "one.su2b")
+    monkeypatch.setattr(output, "CHUNK", 500)
+    monkeypatch.setattr(skin, "BLOCK", 300)
+    other = stream(case, tmp_path / "other.su2b", ranks=Sent())
+    assert (tmp_path / "one.su2b").read_bytes() == (tmp_path / "other.su2b").read_bytes()
+    assert np.array_equal(one.quality.values, other.quality.values)
+    assert one.quality.summary() == other.quality.summary()
+    assert one.folded == other.folded
 
 
 @needs_mpi
@@ -266,8 +308,6 @@ def test_threads_are_limited_for_a_time():
 
 
 def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
-    from slideviz.deformation import output
-
     class StoppedError(BaseException):
         pass
 
