@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture:
         require_detail(arguments.zoom, mesh)
     seconds["read"] += time.perf_counter()
-    steps = _pull(arguments, case, mesh)
+    steps = pull(arguments, case, mesh)
     last = steps[-1]
     seconds["quality"] = -time.perf_counter()
     found = quality(last.mesh, reference=mesh, metric=case.quality_metric)
@@ -178,7 +178,7 @@ def _format_of(output: Path, case: Case) -> FileFormat | None:
     return kind
 
 
-def _pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
+def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
     from slideviz import deform, write
     from slideviz.cli.progress import Bar

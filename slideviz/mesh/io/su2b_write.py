@@ -109,11 +109,12 @@ def require_binary(mesh: Mesh) -> None:
 def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
     """Return what an SU2 binary file does not keep of the text file of a mesh, in words."""
     document = mesh.document
+    boxes = ("its FFD boxes",) if mesh.ffd else ()
     if document is None:
-        return ("its FFD boxes",) if mesh.ffd else ()
+        return boxes
     keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
     named = ", ".join(dict.fromkeys(key.upper() for key in keys))
-    lost = [f"its other sections ({named})"] if keys else []
+    lost = [f"its other sections ({named})"] if keys else [*boxes]
     return (*lost, "its other zones") if mesh.zones > 1 else tuple(lost)
 
 

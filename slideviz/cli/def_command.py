@@ -1,0 +1,153 @@
+"""``slideviz def``: deforms a mesh as a configuration of SU2 says, in place of SU2_DEF."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slideviz.cli.options import add_shared, changed
+
+if TYPE_CHECKING:
+    from slideviz.case.model import Case
+    from slideviz.design.su2_config import Su2Config
+    from slideviz.mesh.model import Mesh
+
+_OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
+"""What a run can write besides, which SU2's commands do not."""
+
+
+def add_def(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``def`` to the parser."""
+    call = calls.add_parser("def", help="deform as a configuration of SU2 says, like SU2_DEF")
+    add_config(call)
+    add_shared(call, "json", help="report as JSON; - is the terminal")
+    call.add_argument("--force", action="store_true", help="allow writing over the input mesh")
+    call.set_defaults(command=run_def, **dict.fromkeys(_OF_A_RUN))
+
+
+def add_config(call: argparse.ArgumentParser) -> None:
+    """Add the arguments that ``def`` and ``dot`` share."""
+    call.add_argument("case", type=Path, metavar="CONFIG", help="the configuration of SU2 (.cfg)")
+    add_shared(call, "set", help="change one of slideviz's keys for this run; may be repeated")
+    add_shared(call, "quiet")
+
+
+def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
+    """Return the configuration, with the changes of ``--set``, and its mesh."""
+    from slideviz import read
+    from slideviz.cli.places import note_case
+    from slideviz.design.su2_config import read_config
+    from slideviz.errors import CaseError
+
+    config = read_config(arguments.case)
+    config = replace(config, case=changed(config.case, arguments.set))
+    note_case(arguments, config.case)
+    if not arguments.quiet and config.ignored:
+        count = len(config.ignored)
+        words = f"{count} other key{'s' * (count > 1)} of SU2 in {arguments.case} not needed here"
+        print(f"slideviz: note: {words}", file=sys.stderr)
+    file = config.case.mesh_file
+    assert file is not None
+    if not file.exists() and (arguments.case.parent / file).exists():
+        raise CaseError(
+            f"{file}: is not in the working folder, but beside {arguments.case}; as SU2 does, this "
+            f"takes paths from the working folder: go to {arguments.case.parent} first"
+        )
+    return config, read(file, zone=config.case.zone, file_format=config.case.mesh_format)
+
+
+def run_def(arguments: argparse.Namespace) -> int:
+    """Deform a mesh as a configuration of SU2 says, and write it with its boxes."""
+    from slideviz import quality, write
+    from slideviz.cli.places import Output, require_places, tell_lost
+    from slideviz.cli.report import folded_cells, run_report
+    from slideviz.cli.run_command import pull
+    from slideviz.cli.run_outcome import CELLS, tell, write_qualities
+    from slideviz.design.su2_surface import at_rest, make_surface
+
+    begin = time.perf_counter()
+    config, mesh = read_configuration(arguments)
+    output, kind = config.case.mesh_out, config.case.mesh_out_format
+    assert output is not None
+    remedy = "choose another name in MESH_OUT_FILENAME, or say --force to write over it"
+    replaces = config.case.mesh_file if arguments.force else None
+    place = Output(
+        output, "MESH_OUT_FILENAME", False, is_mesh=kind is None, replaces=replaces, remedy=remedy
+    )
+    rated = output.with_name(output.stem + "_qual.txt") if config.case.generate_quality else None
+    require_places(
+        arguments, place, Output(rated, "GENERATE_QUALITY", False), Output(arguments.json, "--json")
+    )
+    if config.variables[0].kind == "FFD_SETTING":
+        return _set_boxes(arguments, config, mesh, begin)
+    seconds = {"read": time.perf_counter() - begin}
+    surface = make_surface(config, mesh)
+    tell_lost(output, surface.boxed(mesh), kind)
+    case = surface.case()
+    moves = surface.displacement.any()
+    steps = pull(arguments, case, mesh) if moves else [at_rest(case, mesh)]
+    seconds["quality"] = -time.perf_counter()
+    found = quality(steps[-1].mesh, reference=mesh, metric=case.quality_metric)
+    before = quality(mesh, metric=case.quality_metric)
+    seconds["quality"] += time.perf_counter()
+    seconds["write"] = -time.perf_counter()
+    deformed = surface.boxed(steps[-1].mesh)
+    write(output, deformed, overwrite=arguments.force, base=mesh, file_format=kind)
+    if rated:
+        write_qualities(rated, found)
+    seconds["write"] += time.perf_counter()
+    seconds["total"] = time.perf_counter() - begin
+    folded = folded_cells(steps, mesh, found)
+    report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
+    report["design"] = {
+        "variables": [
+            {"kind": variable.kind, "value": variable.value, "idle": idle}
+            for variable, idle in zip(config.variables, surface.idle, strict=True)
+        ],
+        "boxes": {name: len(found.nodes) for name, found in surface.inside.items()},
+        "ignored": list(config.ignored),
+    }
+    return tell(arguments, report, {"mesh": output, CELLS: rated}, found, before, folded)
+
+
+def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
+    """Write the mesh with the boxes that the configuration defines; nothing moves."""
+    from slideviz import write
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.places import tell_lost
+    from slideviz.cli.report import save_json
+    from slideviz.design.su2_surface import set_boxes
+
+    case: Case = config.case
+    boxed, boxes = set_boxes(config, mesh)
+    assert case.mesh_out is not None
+    tell_lost(case.mesh_out, boxed, case.mesh_out_format)
+    write(case.mesh_out, boxed, overwrite=arguments.force, file_format=case.mesh_out_format)
+    counts = {box.name: sum(len(nodes) for nodes, _ in box.embedded.values()) for box in boxes}
+    report = {
+        "case": str(config.source),
+        "mesh": str(case.mesh_file),
+        "design": {
+            "variables": [{"kind": "FFD_SETTING", "value": 0.0, "idle": True}],
+            "boxes": counts,
+            "ignored": list(config.ignored),
+        },
+        "seconds": {"total": round(time.perf_counter() - begin, 6)},
+        "warnings": list(case.warnings),
+    }
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    elif not arguments.quiet:
+        for name, count in counts.items():
+            print(f"FFD box {name}: {count} surface nodes")
+        print(f"mesh: {case.mesh_out}")
+    for name, count in counts.items():
+        if not count:
+            words = f"no node of {', '.join(config.markers)} is in the FFD box {name}"
+            print(f"slideviz: warning: {words}", file=sys.stderr)
+    return DONE

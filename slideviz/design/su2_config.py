@@ -1,0 +1,230 @@
+"""Configurations of SU2: what of them concerns a deformation and its gradients.
+
+Such a file has hundreds of keys; those that concern other things are counted and left alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.case.key import MOTION
+from slideviz.case.keys import KEYS
+from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
+from slideviz.case.model import Case
+from slideviz.case.words import list_of, nearest, shown
+from slideviz.design.su2_variables import KINDS, Variable, read_variables
+from slideviz.errors import CaseError
+from slideviz.terms import Role
+
+ROLE_KEYS: dict[str, Role] = {
+    "MARKER_SYM": "sliding",
+    "MARKER_DEFORM_MESH_SYM_PLANE": "sliding",
+    "MARKER_DEFORM_TANGENTIAL": "sliding",
+    "MARKER_PERIODIC": "periodic",
+    "MARKER_DEFORM_NORMAL": "periodic",
+}
+"""What boundaries do that SU2, or ParaBlade's branch of it, lists; the later ones win."""
+FILES = {
+    "MESH_FILENAME": "mesh.su2",
+    "MESH_OUT_FILENAME": "mesh_out.su2",
+    "DV_FILENAME": "surface_positions.dat",
+    "DV_SENS_FILENAME": "surface_sensitivity.dat",
+    "DV_UNORDERED_SENS_FILENAME": "unordered_sensitivity.dat",
+    "SOLUTION_ADJ_FILENAME": "solution_adj",
+    "GRAD_OBJFUNC_FILENAME": "of_grad.dat",
+}
+"""Keys that name files, with SU2's defaults."""
+WORDS = {
+    "DV_SENSITIVITY_FORMAT": "SU2_NATIVE",
+    "OBJECTIVE_FUNCTION": "DRAG",
+    "OPT_RELAX_FACTOR": "1.0",
+    "FFD_CONTINUITY": "",
+    "FFD_SYMMETRY_PLANE": "NO",
+    "FFD_COORD_SYSTEM": "CARTESIAN",
+    "FFD_FIX_I": "NONE",
+    "FFD_FIX_J": "NONE",
+    "FFD_FIX_K": "NONE",
+}
+"""Other keys of one value or list, with SU2's defaults; but what moves is held only if asked."""
+LISTS = ("DV_KIND", "DV_PARAM", "DV_VALUE", "DV_MARKER", "MARKER_DEFORM_MESH")
+NOT_HERE = ("MARKER_MOVING", "MESH_FORMAT", "MESH_OUT_FORMAT", *FILES)
+"""Keys of ours that mean something else in SU2, or are read in another way."""
+OURS = {
+    name: key
+    for name, key in KEYS.items()
+    if name not in NOT_HERE and (key.group != MOTION or name.startswith("FFD_"))
+}
+SU2_CONTINUITY = "2ND_DERIVATIVE"
+"""SU2's default of FFD_CONTINUITY."""
+CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
+"""FFD_CONTINUITY, and how many planes of control points it holds."""
+
+
+@dataclass(frozen=True)
+class Su2Config:
+    """A configuration of SU2, as far as it concerns a deformation.
+
+    Attributes
+    ----------
+    case : Case
+        Roles and settings, without motions; the files of the meshes, as SU2 has them.
+    markers : tuple of str
+        The boundaries that the design variables move.
+    variables : tuple of Variable
+    files, words : dict
+        The values of ``FILES`` and ``WORDS``.
+    ignored : tuple of str
+        The keys that concern other things.
+    """
+
+    case: Case
+    markers: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    files: dict[str, Path]
+    words: dict[str, str]
+    ignored: tuple[str, ...]
+
+    @property
+    def source(self) -> Path:
+        """Return the file."""
+        assert self.case.source is not None
+        return self.case.source
+
+
+def read_config(path: Path) -> Su2Config:
+    """Return what of a configuration concerns a deformation. Paths are those of the working folder.
+
+    Raises
+    ------
+    CaseError
+        It cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+    """
+    text, warnings = read_text(path, "case file")
+    entries, problems = entries_of(text)
+    rows = {entry.key: entry for entry in entries}  # of two, SU2 would complain
+    for entry in entries:
+        if rows[entry.key] is not entry:
+            sentence = f"{entry.key} is given again in line {rows[entry.key].line}; keep one"
+            problems.append((entry.line, sentence))
+    reader = _Reader(rows, problems)
+    case, markers = reader.case()
+    variables = read_variables(rows, problems)
+    ignored = tuple(key for key in rows if key not in _read_keys())
+    files = {key: Path(reader.word(key, default)) for key, default in FILES.items()}
+    words = {key: reader.word(key, default) for key, default in WORDS.items()}
+    reader.check(words)
+    if problems:
+        raise CaseError(listed(path, problems))
+    case = case.change(
+        source=path,
+        mesh_file=files["MESH_FILENAME"],
+        mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
+        warnings=warnings,
+    )
+    return Su2Config(case, markers, variables, files, words, ignored)
+
+
+def _read_keys() -> set[str]:
+    formats = {"MESH_FORMAT", "MESH_OUT_FORMAT"}
+    return {*OURS, *ROLE_KEYS, *FILES, *WORDS, *LISTS, *formats}
+
+
+def _with_ending(path: Path, case: Case) -> Path:
+    return path if path.suffix else path.with_suffix(f".{case.mesh_out_format or 'su2'}")
+
+
+class _Reader:
+    """Reads the keys of a configuration, and notes what is wrong with them."""
+
+    def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
+        self.rows, self.problems = rows, problems
+
+    def word(self, key: str, default: str) -> str:
+        """Return the value of a key, without quotes."""
+        entry = self.rows.get(key)
+        return default if entry is None else entry.value.strip('"') or default
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Return the list of markers after a key."""
+        entry = self.rows.get(key)
+        if entry is None:
+            return ()
+        try:
+            kind = KEYS["MARKER_PERIODIC" if key == "MARKER_PERIODIC" else "MARKER_FIXED"].kind
+            return tuple(kind.read(entry.value))
+        except CaseError as problem:
+            self.note(entry, str(problem))
+            return ()
+
+    def note(self, entry: Entry, sentence: str) -> None:
+        """Note what is wrong with a key."""
+        self.problems += [(entry.line, f"{entry.key}: {line}") for line in sentence.splitlines()]
+
+    def case(self) -> tuple[Case, tuple[str, ...]]:
+        """Return roles and settings, and the boundaries that move."""
+        case = Case(generate_quality=False)
+        roles: dict[str, Role] = {}
+        for key, role in ROLE_KEYS.items():
+            roles |= dict.fromkeys(self.names(key), role)
+        for name, row in OURS.items():
+            entry = self.rows.get(name)
+            if entry is None or name in ROLE_KEYS:
+                continue
+            try:
+                case = row.put(case, row.kind.read(entry.value))
+            except CaseError as problem:
+                self.note(entry, str(problem))
+        moving = self.names("DV_MARKER") or self.names("MARKER_DEFORM_MESH")
+        roles |= {**case.roles, **dict.fromkeys(moving, "moving")}
+        case = case.change(roles=roles, **self.formats())
+        slides = "sliding" in roles.values() or "periodic" in roles.values()
+        if slides and "SLIDING_MODE" not in self.rows:
+            case = case.change(sliding="ps")
+        if "periodic" in roles.values() and "PERIODIC_MODE" not in self.rows:
+            case = case.change(periodic="fixed" if case.sliding == "none" else "moving")
+        return case, moving
+
+    def formats(self) -> dict[str, str | None]:
+        """Return the formats of the meshes as a case has them."""
+        found: dict[str, str | None] = {}
+        for key, field in (("MESH_FORMAT", "mesh_format"), ("MESH_OUT_FORMAT", "mesh_out_format")):
+            entry = self.rows.get(key)
+            value = "SU2" if entry is None else entry.value.upper()
+            if value not in ("SU2", "SU2B", "CGNS"):
+                assert entry is not None
+                self.note(entry, f"{shown(value)} is not one of SU2, SU2B, CGNS")
+            # Without the key the ending tells, as it does for CGNS.
+            found[field] = None if entry is None or value == "CGNS" else value.lower()
+        return found
+
+    def check(self, words: dict[str, str]) -> None:
+        """Note values that are none, and keys of ours that do not belong here."""
+        for key, allowed in (
+            ("FFD_CONTINUITY", ("", *CONTINUITIES)),
+            ("FFD_COORD_SYSTEM", ("CARTESIAN",)),
+            ("FFD_SYMMETRY_PLANE", ("YES", "NO")),
+            ("DV_SENSITIVITY_FORMAT", ("SU2_NATIVE", "UNORDERED_ASCII")),
+        ):
+            if words[key].upper() not in allowed:
+                listed = ", ".join(filter(None, allowed))
+                said = f"{shown(words[key])} is not supported; supported: {listed}"
+                self.note(self.rows[key], said)
+        for key in ("MOTION", "DEFORMATION_FILENAME"):
+            if key in self.rows:
+                said = "belongs into a case file (slideviz run); here DV_KIND says what moves"
+                self.note(self.rows[key], said)
+        for key in ("FFD_FIX_I", "FFD_FIX_J", "FFD_FIX_K"):
+            if any(not word.text.isdecimal() for word in list_of(words[key])):
+                self.note(self.rows[key], f"{shown(words[key])} is no list of whole numbers")
+        try:
+            float(words["OPT_RELAX_FACTOR"])
+        except ValueError:
+            entry = self.rows["OPT_RELAX_FACTOR"]
+            self.note(entry, f"{shown(entry.value)} is not a number")
+        if "DV_KIND" not in self.rows:
+            said = f"DV_KIND is missing: which design variables there are ({', '.join(KINDS)})"
+            close = nearest("DV_KIND", self.rows)
+            self.problems.append(
+                (max((e.line for e in self.rows.values()), default=1), said + close)
+            )

@@ -1,0 +1,325 @@
+"""What design variables do to the moving boundaries: displacement, and its exact derivatives.
+
+As in SU2 each variable acts on the undeformed boundary, and what all of them do is added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from slideviz.case.boxes import boxes_for, defined_boxes, embedding
+from slideviz.case.check import marker_problems, raise_all
+from slideviz.case.ffd_keys import ffd_contradictions
+from slideviz.case.model import Case, Prescribed
+from slideviz.case.words import nearest
+from slideviz.deformation.setup import make_setup
+from slideviz.deformation.steps import Step
+from slideviz.design.su2_config import SU2_CONTINUITY, Su2Config
+from slideviz.design.su2_planes import held_planes
+from slideviz.design.su2_positions import read_positions
+from slideviz.design.su2_variables import BOXED, Variable
+from slideviz.errors import CaseError
+from slideviz.ffd.box import Box, Embedding
+from slideviz.ffd.section import with_boxes
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+RIGID = ("TRANSLATION", "ROTATION", "SCALE")
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The moving boundaries of a configuration, and its design.
+
+    Attributes
+    ----------
+    config : Su2Config
+    mesh : Mesh
+    nodes : (m,) int64
+        Of all moving boundaries, ascending.
+    boxes : dict of str to Box
+        Those that variables move.
+    inside : dict of str to Embedding
+        The nodes in each box; their numbers are places among ``nodes``.
+    idle : tuple of bool
+        The variables whose control points are held, which do nothing.
+    warnings : tuple of str
+    """
+
+    config: Su2Config
+    mesh: Mesh
+    nodes: IntArray
+    boxes: dict[str, Box]
+    inside: dict[str, Embedding]
+    idle: tuple[bool, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def scale(self) -> float:
+        """Return OPT_RELAX_FACTOR, which multiplies all values."""
+        return float(self.config.words["OPT_RELAX_FACTOR"])
+
+    @cached_property
+    def displacement(self) -> FloatArray:
+        """Return the displacement of the nodes, (m, d), in the mesh's length unit."""
+        points = self.mesh.points[self.nodes]
+        total = np.zeros_like(points)
+        for place, variable in enumerate(self.config.variables):
+            if variable.kind == "SURFACE_FILE":
+                path = self.config.files["DV_FILENAME"]
+                return read_positions(path, self.nodes, self.mesh) - points
+            total += self._moved(place, variable, points)
+        return total
+
+    def slope(self, place: int, undeformed: bool = False) -> FloatArray:
+        """Return the derivative of the displacement for the value of a variable, (m, d).
+
+        Parameters
+        ----------
+        place : int
+            Of the variable.
+        undeformed : bool
+            At the design that leaves everything in place instead of this one.
+        """
+        variable = self.config.variables[place]
+        points = self.mesh.points[self.nodes]
+        if variable.kind == "ROTATION":
+            angle = 0.0 if undeformed else self.scale * variable.value
+            rate = np.radians(self.scale)
+            return rate * _turned(variable.numbers, points, angle, derivative=True)
+        if variable.kind == "SCALE":
+            return self.scale * points
+        # The others are linear; what SURFACE_FILE does has no value to change.
+        return self._moved(place, replace(variable, value=1.0), points)
+
+    def _moved(self, place: int, variable: Variable, points: FloatArray) -> FloatArray:
+        """Return what a variable does to points (m, d)."""
+        value, dim = self.scale * variable.value, self.mesh.dim
+        if variable.kind == "TRANSLATION":
+            return np.broadcast_to(value * np.array(variable.numbers[:dim]), points.shape)
+        if variable.kind == "ROTATION":
+            return _turned(variable.numbers, points, value)
+        if variable.kind == "SCALE":
+            return (value - 1.0) * points
+        out = np.zeros_like(points)
+        if variable.kind in BOXED and not self.idle[place]:
+            inside = self.inside[variable.box]
+            change = self.boxes[variable.box].change(variable.index, variable.numbers)
+            out[inside.nodes] = value * inside.sums(change)[:, :dim]
+        return out
+
+    def case(self) -> Case:
+        """Return the case with this displacement as its motion."""
+        case = self.config.case
+        others = set(self.mesh.marker_names) - set(self.config.markers)
+        kinds = {variable.kind for variable in self.config.variables}
+        if not others and kinds <= {*RIGID} and case.kernel == Case().kernel:
+            # All boundaries move as a body does, or grow: this kernel has that exactly inside.
+            case = case.change(kernel="thin-plate")
+        warnings = (*case.warnings, *self.warnings)
+        motion = Prescribed(self.nodes, self.displacement)
+        return case.change(motions=(motion,), warnings=warnings)
+
+    def boxed(self, mesh: Mesh) -> Mesh:
+        """Return a deformed mesh with the boxes where the design has them."""
+        moved = []
+        for name, box in self.boxes.items():
+            change = np.zeros(box.points.shape)
+            for place, variable in enumerate(self.config.variables):
+                if variable.box == name and not self.idle[place]:
+                    shift = np.array(variable.numbers) * (self.scale * variable.value)
+                    change += box.change(variable.index, tuple(shift.tolist()))
+            moved.append(box.moved(change))
+        return with_boxes(mesh, moved) if moved else mesh
+
+
+def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
+    """Return what the variables of a configuration move.
+
+    Raises
+    ------
+    CaseError
+        Boundaries or boxes are not there, a box has no such control point or no node inside.
+    """
+    _require_markers(config, mesh)
+    nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in config.markers]))
+    variables = config.variables
+    names = tuple(dict.fromkeys(v.box for v in variables if v.kind in BOXED))
+    known = boxes_for(config.case, mesh) if names else {}
+    _require_boxes(config, mesh, known)
+    boxes, inside, warnings = {}, {}, []
+    for name in names:
+        on = {marker: embedding(known[name], mesh, marker) for marker in config.markers}
+        boxes[name], inside[name] = _embedded(known[name], on, nodes)
+        if not len(inside[name].nodes):
+            raise CaseError(
+                f"{config.source}: no node of {', '.join(config.markers)} is in the FFD box "
+                f"{name!r}; correct the box or DV_MARKER"
+            )
+    idle, held = _idle(config, mesh, boxes)
+    warnings += [*held, *_overlaps(inside)]
+    return Surface(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
+
+
+def at_rest(case: Case, mesh: Mesh) -> Step:
+    """Return the step of a design that moves nothing: the first of an optimiser, often."""
+    setup = make_setup(case, mesh)
+    return Step(
+        index=1,
+        total=1,
+        mesh=mesh,
+        control_nodes=0,
+        max_error=0.0,
+        condition=np.nan,
+        node_counts=setup.classes.counts(),
+        seconds={},
+        warnings=(*case.warnings, *setup.warnings),
+        candidates=setup.candidates,
+    )
+
+
+def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
+    """Return the mesh with the boxes that a configuration defines, and these: FFD_SETTING.
+
+    Raises
+    ------
+    CaseError
+        There are none, or a box is not possible.
+    """
+    _require_markers(config, mesh)
+    raise_all(tuple(text for _, text in ffd_contradictions(config.case)))
+    boxes = []
+    for box in defined_boxes(config.case, mesh).values():
+        on = {name: embedding(box, mesh, name)[0] for name in config.markers}
+        listed = {name: (found.nodes, found.uvw) for name, found in on.items() if len(found.nodes)}
+        boxes.append(replace(box, embedded=listed))
+    if not boxes:
+        raise CaseError(f"{config.source}: FFD_SETTING needs FFD_DEFINITION, which has no box")
+    return with_boxes(mesh, boxes, anew=True), tuple(boxes)
+
+
+def _require_markers(config: Su2Config, mesh: Mesh) -> None:
+    if not config.markers:
+        raise CaseError(f"{config.source}: DV_MARKER names no boundary; nothing would move")
+    unknown = marker_problems(config.case, mesh)
+    raise_all(tuple(f"{config.source}: {text}" for text in unknown))
+
+
+def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None:
+    """Raise where a variable moves what is not there."""
+    problems = []
+    for place, variable in enumerate(config.variables, start=1):
+        if variable.kind not in BOXED:
+            continue
+        if variable.box not in known:
+            has = f"it has {', '.join(known)}" if known else "define it with FFD_DEFINITION"
+            why = nearest(variable.box, known) or f"; {has}"
+            problems.append(f"variable {place}: {mesh.name} has no FFD box {variable.box!r}{why}")
+        elif wrong := known[variable.box].problem(variable.index):
+            problems.append(f"variable {place}: {wrong}")
+        elif mesh.dim == 2 and variable.numbers[2]:
+            problems.append(f"variable {place}: its direction leaves the plane; write dz = 0")
+    raise_all(tuple(f"{config.source}: {text}" for text in problems))
+
+
+def _embedded(
+    box: Box, on: dict[str, tuple[Embedding, float]], nodes: IntArray
+) -> tuple[Box, Embedding]:
+    """Return a box that lists its nodes on each marker, and all of them by their places."""
+    listed = {name: (found.nodes, found.uvw) for name, (found, _) in on.items() if len(found.nodes)}
+    every = np.concatenate([found.nodes for found, _ in on.values()])
+    uvw = np.concatenate([found.uvw for found, _ in on.values()])
+    one, first = np.unique(every, return_index=True)
+    inside = box.embed(np.searchsorted(nodes, one), uvw[first])
+    return (box if box.embedded else replace(box, embedded=listed)), inside
+
+
+def _idle(
+    config: Su2Config, mesh: Mesh, boxes: dict[str, Box]
+) -> tuple[tuple[bool, ...], list[str]]:
+    """Return which variables do nothing since their control points are held, and warnings."""
+    asked = config.words["FFD_CONTINUITY"].upper()
+    continuity = asked or SU2_CONTINUITY
+    held = {name: held_planes(config, mesh, box, continuity) for name, box in boxes.items()}
+    idle = tuple(
+        variable.kind in BOXED
+        and any(
+            at in planes for at, planes in zip(_checked(variable), held[variable.box], strict=True)
+        )
+        for variable in config.variables
+    )
+    warnings = []
+    for name, planes in held.items():
+        mine = zip(config.variables, idle, strict=True)
+        stuck = [place for place, (v, is_idle) in enumerate(mine, 1) if v.box == name and is_idle]
+        if stuck and asked:
+            warnings.append(
+                f"FFD_CONTINUITY= {asked} holds {_words(planes)} of the box {name}: "
+                f"{_listed(stuck)} of DV_KIND will do nothing"
+            )
+        elif stuck:
+            warnings.append(
+                f"SU2 would hold {_words(planes)} of the box {name}, since the surface leaves it "
+                f"there, by its default FFD_CONTINUITY= {continuity}, so that {_listed(stuck)} of "
+                "DV_KIND did nothing; here they move. Write that key to hold them, or "
+                "FFD_CONTINUITY= USER_INPUT to hold what FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
+            )
+    return (idle if asked else (False,) * len(idle)), warnings
+
+
+def _checked(variable: Variable) -> tuple[int, int, int]:
+    """Return the index that SU2 looks for among the held planes."""
+    i, j, k = variable.index
+    return (i, j, 0) if variable.kind == "FFD_CONTROL_POINT_2D" else (i, j, k)
+
+
+def _words(held: Sequence[set[int]]) -> str:
+    return ", ".join(
+        f"{letter} = {', '.join(map(str, sorted(planes)))}"
+        for letter, planes in zip("ijk", held, strict=True)
+        if planes
+    )
+
+
+def _listed(places: list[int]) -> str:
+    more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+    return f"variable{'s' * (len(places) > 1)} {', '.join(map(str, places[:6]))}{more}"
+
+
+def _overlaps(inside: dict[str, Embedding]) -> list[str]:
+    """Return a warning where nodes are in several boxes."""
+    every = [found.nodes for found in inside.values()]
+    shared = sum(map(len, every)) - len(np.unique(np.concatenate([*every, np.empty(0, int)])))
+    said = (
+        f"{shared} nodes are in several of the FFD boxes {', '.join(inside)}: what these do is "
+        "added up, where SU2 takes the last"
+    )
+    return [said] if shared else []
+
+
+def _turned(
+    numbers: tuple[float, ...], points: FloatArray, angle_deg: float, derivative: bool = False
+) -> FloatArray:
+    """Return the change of points (m, d) by a turn about a line, or its derivative by radians.
+
+    The line goes through both points of ``numbers``, in 2D through the first along z. Rodrigues:
+    ``sin(a) k x v + (1 - cos(a)) k x (k x v)``.
+    """
+    dim, angle = points.shape[1], np.radians(angle_deg)
+    first, second = np.array(numbers).reshape(2, 3)
+    axis = second - first if dim == 3 else np.array([0.0, 0.0, 1.0])
+    length = np.linalg.norm(axis)
+    if length == 0.0:
+        raise CaseError("ROTATION: its two points are one; the line between them has no direction")
+    arm = np.zeros((len(points), 3))
+    arm[:, :dim] = points - first[:dim]
+    across = np.cross(axis / length, arm)
+    twice = np.cross(axis / length, across)
+    if derivative:
+        out = np.cos(angle) * across + np.sin(angle) * twice
+    else:
+        out = np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * twice
+    return np.asarray(out[:, :dim])

@@ -1,0 +1,428 @@
+"""``slideviz def``: SU2's configurations, design variables and files."""
+
+import json
+import lzma
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from slideviz.design.su2_config import read_config
+from slideviz.design.su2_surface import make_surface
+from slideviz.errors import CaseError
+from slideviz.ffd.section import boxes_of
+
+DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
+FILES = """
+MESH_FILENAME= mesh.su2
+MESH_OUT_FILENAME= out.su2
+DV_MARKER= ( low )
+"""
+CORNERS = "(BOX, -0.1, -0.1, 0, 1.1, -0.1, 0, 1.1, 0.2, 0, -0.1, 0.2, 0" + ", 0" * 12 + ")"
+BOXED = f"FFD_DEFINITION= {CORNERS}\nFFD_DEGREE= (3, 1, 0)\n"
+
+
+def square(n=6):
+    """A square of n cells a side with the boundaries low, high, left and right."""
+    axis = np.linspace(0.0, 1.0, n + 1)
+    points = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    number = np.arange(len(points)).reshape(n + 1, n + 1)
+    quads = [number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]]
+    sides = {"low": number[0], "high": number[-1], "left": number[:, 0], "right": number[:, -1]}
+    return sv.Mesh(
+        points,
+        sv.Cells.from_blocks([(9, np.stack(quads, axis=-1).reshape(-1, 4))]),
+        tuple(
+            sv.Marker(name, sv.Cells.from_blocks([(3, np.stack([side[:-1], side[1:]], axis=1))]))
+            for name, side in sides.items()
+        ),
+    )
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """The working folder, with a mesh."""
+    monkeypatch.chdir(tmp_path)
+    sv.write("mesh.su2", square())
+    return tmp_path
+
+
+def config(text):
+    Path("a.cfg").write_text(FILES + text)
+    return read_config(Path("a.cfg"))
+
+
+def surface(text):
+    read = config(text)
+    return make_surface(read, sv.read("mesh.su2"))
+
+
+def unpacked(name):
+    """A file of the design cases in the working folder; skips where they are not here."""
+    path = DESIGN / name
+    packed = path.with_name(f"{name}.xz")
+    if not path.is_file() and not packed.is_file():
+        pytest.skip("the design cases are not here")
+    data = path.read_bytes() if path.is_file() else lzma.decompress(packed.read_bytes())
+    Path(name).write_bytes(data)
+
+
+def bernstein(u):
+    return np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u**2 * (1 - u), u**3])
+
+
+def test_kinds_do_what_su2_says_and_add_up(here):
+    one = {
+        "TRANSLATION": ("(0, 1, 0)", 0.1, lambda x: np.full_like(x, 0.1) * [0, 1]),
+        "SCALE": ("(1.0)", 1.2, lambda x: 0.2 * x),
+        "ROTATION": (
+            "(0.5, 1, 0, 0.5, 1, 1)",
+            30.0,
+            lambda x: (
+                (x - [0.5, 1]) @ np.array([[3**0.5 / 2, 0.5], [-0.5, 3**0.5 / 2]]) - (x - [0.5, 1])
+            ),
+        ),
+    }
+    total = 0.0
+    for kind, (params, value, formula) in one.items():
+        found = surface(f"DV_KIND= {kind}\nDV_PARAM= {params}\nDV_VALUE= {value}\n")
+        expected = formula(found.mesh.points[found.nodes])
+        np.testing.assert_allclose(found.displacement, expected, atol=1e-15)
+        total = total + expected
+    kinds, params, values = (", ".join(one), ";".join(p for p, _, _ in one.values()), "")
+    values = ", ".join(str(v) for _, v, _ in one.values())
+    found = surface(f"DV_KIND= {kinds}\nDV_PARAM= {params}\nDV_VALUE= {values}\n")
+    np.testing.assert_allclose(found.displacement, total, atol=1e-15)
+    half = surface("DV_KIND= TRANSLATION\nDV_PARAM= (2, 0, 0)\nDV_VALUE= 1\nOPT_RELAX_FACTOR= 0.5")
+    np.testing.assert_allclose(half.displacement, [[1.0, 0.0]] * 7, atol=1e-15)
+
+
+def test_rotation_in_3d_turns_about_its_line(here):
+    from tests.builders import cube
+
+    sv.write("mesh.su2", cube(3))
+    names = ", ".join(sv.read("mesh.su2").marker_names[:1])
+    text = f"DV_KIND= ROTATION\nDV_PARAM= (1, 2, 3, 2, 1, 4)\nDV_VALUE= 40\nDV_MARKER= ({names})\n"
+    Path("a.cfg").write_text("MESH_FILENAME= mesh.su2\n" + text)
+    found = make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
+    motion = sv.Rotate("", 40.0, (1.0, 2.0, 3.0), (1.0, -1.0, 1.0))
+    from slideviz.case.motion import displacement_of
+
+    expected = displacement_of([motion], found.mesh.points[found.nodes])
+    np.testing.assert_allclose(found.displacement, expected, atol=1e-13)
+
+
+def test_control_points_of_a_defined_box_move_the_surface(here):
+    text = (
+        f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT\n"
+        "DV_PARAM= (BOX, 1, 0, 0.0, 2.0); (BOX, 2, 1, 0, 0, 1, 0)\nDV_VALUE= 0.05, 0.1\n"
+    )
+    found = surface(text)
+    x = found.mesh.points[found.nodes, 0]
+    u, v = bernstein((x + 0.1) / 1.2), 1 / 3
+    expected = 0.1 * u[1] * (1 - v) + 0.05 * u[2] * v  # k = 0 alone counts half
+    np.testing.assert_allclose(found.displacement[:, 1], expected, atol=1e-14)
+
+
+def test_whole_command_moves_mesh_and_box_and_reports(here, capsys):
+    config(
+        f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, -1, 0.0, 1.0)\n"
+        "DV_VALUE= 0.05\nMARKER_SYM= (left, right)\nMACH_NUMBER= 0.5\nSOLVER= RANS\n"
+    )
+    assert run(["def", "a.cfg", "--json", "a.json"]) == 0
+    out = capsys.readouterr()
+    assert "note: 2 other keys of SU2 in a.cfg not needed here" in out.err
+    report = json.loads(Path("a.json").read_text())
+    assert report["design"]["boxes"] == {"BOX": 7}
+    assert report["design"]["ignored"] == ["MACH_NUMBER", "SOLVER"]
+    assert report["sliding"] == "ps"
+    assert report["node_counts"]["sliding_edge"] == 10
+    old, new = sv.read("mesh.su2"), sv.read("out.su2")
+    low = old.marker("low").nodes
+    moved = (new.points - old.points)[low, 1]
+    np.testing.assert_allclose(moved, 0.05 * bernstein((old.points[low, 0] + 0.1) / 1.2)[1])
+    left = old.marker("left").nodes
+    assert np.ptp(new.points[left, 0]) == 0.0
+    (box,) = boxes_of(new)
+    assert box.points[1, :, :, 1].ravel().tolist() == pytest.approx([-0.05, -0.05, 0.25, 0.25])
+    nodes, uvw = box.embedded["low"]
+    np.testing.assert_allclose(box.at(uvw)[:, :2], new.points[nodes], atol=1e-14)
+    # From there on the box of the mesh counts, whatever the configuration defines.
+    Path("b.cfg").write_text(Path("a.cfg").read_text().replace("mesh.su2", "out.su2", 1))
+    Path("b.cfg").write_text(Path("b.cfg").read_text().replace("= out.su2\nDV", "= two.su2\nDV"))
+    assert run(["def", "b.cfg", "-q"]) == 0
+    np.testing.assert_allclose(sv.read("two.su2").points[low, 1], 2 * moved, atol=1e-14)
+
+
+def test_design_of_zeros_keeps_every_byte(here):
+    config("DV_KIND= TRANSLATION\nDV_PARAM= (1, 0, 0)\nDV_VALUE= 0.0\nSLIDING_MODE= none\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert Path("out.su2").read_bytes() == Path("mesh.su2").read_bytes()
+
+
+def test_all_boundaries_moved_as_a_body_move_the_mesh_as_one(here):
+    every = "DV_MARKER= (low, high, left, right)\n"
+    text = (
+        "DV_KIND= ROTATION, TRANSLATION\nDV_PARAM= (0, 0, 0, 0, 0, 1); (1, 0, 0)\nDV_VALUE= 90, 5\n"
+    )
+    Path("a.cfg").write_text(FILES.replace("DV_MARKER= ( low )\n", every) + text)
+    assert run(["def", "a.cfg", "-q"]) == 0
+    points = sv.read("mesh.su2").points
+    expected = np.column_stack([5 - points[:, 1], points[:, 0]])
+    np.testing.assert_allclose(sv.read("out.su2").points, expected, atol=1e-11)
+
+
+def test_surface_file_gives_positions_in_any_order(here):
+    Path("p.dat").write_text("3\t0.5\t0.1\n1, 0.2 0.05\n30 7 7\n")
+    found = surface("DV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n")
+    new = found.mesh.points[found.nodes] + found.displacement
+    assert new[3].tolist() == pytest.approx([0.5, 0.1])
+    assert new[1].tolist() == pytest.approx([0.2, 0.05])
+    assert not found.displacement[[0, 2, 4, 5, 6]].any()
+    Path("p.dat").write_text("3 0.5\n")
+    with pytest.raises(CaseError, match=r"p.dat:1: '3 0.5' has 2 columns; needed are 3"):
+        _ = surface("DV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n").displacement
+    with pytest.raises(CaseError, match=r"surface_positions\.dat: there is no such displacement"):
+        _ = surface("DV_KIND= SURFACE_FILE\n").displacement
+
+
+def test_real_surface_file_is_met_to_the_digit(here):
+    for name in ("naca0012_inv.su2", "surface_bump.dat"):
+        unpacked(name)
+    Path("a.cfg").write_text(
+        "MESH_FILENAME= naca0012_inv.su2\nMESH_OUT_FILENAME= out\nMESH_OUT_FORMAT= SU2\n"
+        "DV_KIND= SURFACE_FILE\nDV_MARKER= (airfoil)\nDV_PARAM= (1.0)\nDV_VALUE= 1.0\n"
+        "DV_FILENAME= surface_bump.dat\n"
+    )
+    assert run(["def", "a.cfg", "-q"]) == 0
+    table = np.loadtxt("surface_bump.dat")
+    moved = sv.read("out.su2").points[table[:, 0].astype(int)]
+    np.testing.assert_allclose(moved, table[:, 1:], rtol=0, atol=1e-15)
+
+
+def test_control_points_of_two_real_boxes(here):
+    unpacked("naca0012_two_ffd_boxes.su2")
+    Path("a.cfg").write_text(
+        "MESH_FILENAME= naca0012_two_ffd_boxes.su2\nMESH_OUT_FILENAME= out.su2\n"
+        "DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D\n"
+        "DV_MARKER= ( airfoil_upper, airfoil_lower )\n"
+        "DV_PARAM= ( UPPER, 2, 1, 0.0, 1.0 ) ; ( LOWER, 1, 0, 0.0, -1.0)\nDV_VALUE= 0.01, 0.02\n"
+    )
+    assert run(["def", "a.cfg", "-q"]) == 0
+    old, new = sv.read("naca0012_two_ffd_boxes.su2"), sv.read("out.su2")
+    before, after = boxes_of(old), boxes_of(new)
+    for k, at, by in ((0, (2, 1), 0.01), (1, (1, 0), -0.02)):
+        assert np.argwhere(after[k].points != before[k].points).tolist() == [
+            [*at, 0, 1],
+            [*at, 1, 1],
+        ]
+        (nodes, uvw), *_ = after[k].embedded.values()
+        np.testing.assert_allclose(after[k].at(uvw)[:, :2], new.points[nodes], atol=1e-12)
+        assert np.abs(new.points[nodes] - old.points[nodes]).max() > 0.1 * abs(by)
+    inside = np.concatenate([nodes for box in before for nodes, _ in box.embedded.values()])
+    others = np.setdiff1d(old.marker("airfoil_upper").nodes, inside)
+    np.testing.assert_array_equal(new.points[others], old.points[others])
+
+
+@pytest.mark.parametrize(
+    ("name", "markers"),
+    [
+        ("naca0012_two_ffd_boxes.su2", "airfoil_lower, airfoil_upper"),
+        ("burner_hx.su2", "wall_hx"),
+    ],
+)
+def test_ffd_setting_makes_the_boxes_that_su2_made(name, markers, here):
+    unpacked(name)
+    original = boxes_of(sv.read(name))
+    whole = Path(name).read_text()
+    Path("bare.su2").write_text(whole[: whole.index("FFD_NBOX")])
+    boxes, degrees = [], []
+    for box in original:
+        corners = np.column_stack([box.corners[:4, :2], np.zeros(4)]).ravel().tolist()
+        boxes.append(f"({box.name}, {', '.join(map(repr, corners + [0.0] * 12))})")
+        degrees.append(f"({box.degrees[0]}, {box.degrees[1]}, 0)")
+    Path("a.cfg").write_text(
+        f"MESH_FILENAME= bare.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= FFD_SETTING\n"
+        f"DV_PARAM= (1.0)\nDV_VALUE= 0.0\nDV_MARKER= ({markers})\n"
+        f"FFD_DEFINITION= {'; '.join(boxes)}\nFFD_DEGREE= {'; '.join(degrees)}\n"
+    )
+    assert run(["def", "a.cfg", "-q"]) == 0
+    bare = Path("bare.su2").read_text()
+    assert Path("out.su2").read_text().startswith(bare), "nothing else changes"
+    made = boxes_of(sv.read("out.su2"))
+    for ours, theirs in zip(made, original, strict=True):
+        np.testing.assert_allclose(ours.points, theirs.points, rtol=1e-14, atol=1e-18)
+        for marker, (nodes, uvw) in theirs.embedded.items():
+            assert ours.embedded[marker][0].tolist() == nodes.tolist()
+            # SU2 keeps coordinates off 0 and 1 by FFD_TOLERANCE, 1e-10 or so.
+            np.testing.assert_allclose(ours.embedded[marker][1], uvw, atol=1e-8)
+
+
+def test_continuity_holds_planes_where_it_is_asked_for(here):
+    text = (
+        "FFD_DEFINITION= (BOX, 0.2, -0.1, 0, 0.9, -0.1, 0, 0.9, 0.2, 0, 0.2, 0.2, 0"
+        + ", 0" * 12
+        + ")\nFFD_DEGREE= (6, 1, 0)\nDV_KIND= "
+        + ", ".join(["FFD_CONTROL_POINT_2D"] * 7)
+        + "\nDV_PARAM= "
+        + "; ".join(f"(BOX, {i}, 0, 0, 1)" for i in range(7))
+        + "\nDV_VALUE= 1, 1, 1, 1, 1, 1, 1\n"
+    )
+    expected = {
+        "NO_DERIVATIVE": [0, 6],
+        "1ST_DERIVATIVE": [0, 1, 5, 6],
+        "2ND_DERIVATIVE": [0, 1, 2, 4, 5, 6],
+        "USER_INPUT": [],
+        "USER_INPUT\nFFD_FIX_I= (1, 3, 99)": [1, 3],
+        "USER_INPUT\nFFD_FIX_J= (1)": [],
+    }
+    for value, held in expected.items():
+        found = surface(f"{text}FFD_CONTINUITY= {value}\n")
+        assert np.flatnonzero(found.idle).tolist() == held, value
+        assert bool(found.warnings) == bool(held)
+    silent = surface(text)
+    assert not any(silent.idle)
+    assert "SU2 would hold i = 0, 1, 2, 4, 5, 6 of the box BOX" in silent.warnings[0]
+
+
+def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
+    from slideviz.design.su2_planes import _meets
+
+    side = np.array([[0.0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]])
+    through = np.array([[[-1.0, 0.9, 0.9], [1.0, 0.8, 0.8]], [[-1.0, 0.1, 0.1], [1.0, 0.2, 0.1]]])
+    assert all(_meets(one[None], side) for one in through)
+    past = np.array([[[-1.0, 1.2, 0.9], [1.0, 1.2, 0.8]], [[0.1, 0.5, 0.5], [1.0, 0.5, 0.5]]])
+    assert not _meets(past, side)
+
+
+def test_roles_follow_from_the_lists_of_su2_and_of_ours(here):
+    rest = "DV_KIND= TRANSLATION\nDV_PARAM= (1, 0, 0)\nDV_VALUE= 0.1\n"
+    case = config(f"{rest}MARKER_SYM= ( high )\nMARKER_FAR= (left)\n").case
+    assert dict(case.roles) == {"high": "sliding", "low": "moving"}
+    assert (case.sliding, case.periodic) == ("ps", "none")
+    case = config(f"{rest}MARKER_PERIODIC= (left, right, 0, 0, 0, 0, 0, 0, 1, 0, 0)\n").case
+    assert case.markers_with("periodic") == ("left", "right")
+    assert (case.sliding, case.periodic) == ("ps", "moving")
+    blade = "MARKER_DEFORM_TANGENTIAL= (high)\nMARKER_DEFORM_NORMAL= (left, right)\n"
+    case = config(f"{rest}{blade}SLIDING_MODE= none\nSTEPS= 3\nMARKER_SYM= (NONE)\n").case
+    assert case.markers_with("sliding") == ("high",)
+    assert (case.sliding, case.periodic, case.steps) == ("none", "fixed", 3)
+    case = config(f"{rest}MARKER_SYM= (high, low)\nMARKER_FIXED= (high)\n").case
+    assert dict(case.roles) == {"high": "fixed", "low": "moving"}
+    assert config(f"{rest}MARKER_MOVING= (high)\n").case.markers_with("moving") == ("low",)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("DV_KIND= HICKS_HENNE\nDV_VALUE= 1", r"a.cfg:5: DV_KIND: HICKS_HENNE not supported; supp"),
+        ("DV_KIND= FFD_TWIST, SCALE, AIRFOIL", "DV_KIND: FFD_TWIST, AIRFOIL not supported; "),
+        ("DV_VALUE= 1", "DV_KIND is missing: which design variables there are"),
+        ("DV_KIND= SCALE, SURFACE_FILE\nDV_VALUE= 1, 1", "SURFACE_FILE must stand alone; make two"),
+        ("DV_KIND= SCALE", "DV_VALUE is missing: a value for each variable"),
+        ("DV_KIND= SCALE, SCALE\nDV_VALUE= 1", "DV_VALUE has 1 values for 2 variables"),
+        ("DV_KIND= SCALE\nDV_VALUE= x", "DV_VALUE: 'x' is not a number"),
+        ("DV_KIND= TRANSLATION\nDV_VALUE= 1", "DV_PARAM is missing"),
+        (
+            "DV_KIND= TRANSLATION\nDV_VALUE= 1\nDV_PARAM= (1, 0)",
+            r"a.cfg:7: DV_PARAM: variable 1: 2 numbers are given; TRANSLATION needs \(x, y, z\)",
+        ),
+        (
+            "DV_KIND= TRANSLATION, SCALE\nDV_VALUE= 1, 1\nDV_PARAM= (1, 0, 0)",
+            "DV_PARAM has 1 groups for 2 variables",
+        ),
+        (
+            "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1, 0, 0, 0, 1)",
+            r"6 parameters are given; FFD_CONTROL_POINT_2D needs \(BOX, i, j, dx, dy\)",
+        ),
+        (
+            "DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\nDV_PARAM= (BOX, 1.5, 0, 0, 1)",
+            "an index is no whole number from -1",
+        ),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nSLIDING_MODE= sideways", "SLIDING_MODE: 'sideways' is not"),
+        (
+            "DV_KIND= SCALE\nDV_VALUE= 1\nFFD_COORD_SYSTEM= POLAR",
+            "FFD_COORD_SYSTEM: 'POLAR' is",
+        ),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_CONTINUITY= 3RD", "FFD_CONTINUITY: '3RD' is not supp"),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nMESH_FORMAT= BOX", "MESH_FORMAT: 'BOX' is not one of SU2, "),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nMOTION= (a, scale, 2)", "MOTION: belongs into a case file"),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nOPT_RELAX_FACTOR= x", "OPT_RELAX_FACTOR: 'x' is not a numb"),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nDV_VALUE= 2", "a.cfg:6: DV_VALUE is given again in line 7"),
+        ("DV_KIND= SCALE\nDV_VALUE= 1\nFFD_FIX_I= (a)", r"FFD_FIX_I: '\(a\)' is no list of whole"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(text, message, here):
+    with pytest.raises(CaseError, match=message):
+        config(text + "\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("DV_PARAM= (BOXX, 0, 0, 0, 1)", "a.cfg: variable 1: mesh.su2 has no FFD box 'BOXX'; did "),
+        ("DV_PARAM= (BOX, 9, 0, 0, 1)", "no control point with i = 9; i goes from 0 to 3"),
+        (
+            "DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (high)",
+            "no node of high is in the FFD box",
+        ),
+        ("DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (hihg)", "no marker 'hihg'; did you mean high?"),
+        ("DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (NONE)", "DV_MARKER names no boundary; nothing"),
+    ],
+)
+def test_what_the_mesh_does_not_have_is_told(text, message, here):
+    text = f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D\nDV_VALUE= 1\n{text}\n"
+    files = FILES if "DV_MARKER" not in text else FILES.replace("DV_MARKER= ( low )\n", "")
+    Path("a.cfg").write_text(files + text)
+    with pytest.raises(CaseError, match=message):
+        make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
+
+
+def test_paths_are_those_of_the_working_folder(here, capsys):
+    Path("deep").mkdir()
+    config("DV_KIND= SCALE\nDV_VALUE= 1.1\n")
+    Path("a.cfg").rename("deep/a.cfg")
+    assert run(["def", "deep/a.cfg", "-q"]) == 0
+    assert Path("out.su2").is_file()
+    Path("mesh.su2").rename("deep/mesh.su2")
+    assert run(["def", "deep/a.cfg"]) == 1
+    assert "is not in the working folder, but beside deep/a.cfg" in capsys.readouterr().err
+
+
+def test_input_mesh_is_not_written_over_unasked(here, capsys):
+    config("DV_KIND= SCALE\nDV_VALUE= 1.1\n")
+    same = Path("a.cfg").read_text().replace("out.su2", "mesh.su2")
+    Path("a.cfg").write_text(same)
+    before = Path("mesh.su2").read_bytes()
+    assert run(["def", "a.cfg"]) == 1
+    assert "say --force to write over it" in capsys.readouterr().err
+    assert Path("mesh.su2").read_bytes() == before
+    assert run(["def", "a.cfg", "--force", "-q"]) == 0
+    assert Path("mesh.su2").read_bytes() != before
+
+
+def test_inverted_cells_are_code_3(here):
+    config("DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.5\n")
+    assert run(["def", "a.cfg", "-q"]) == 3
+    assert Path("out.su2").is_file()
+
+
+def test_set_changes_our_keys(here):
+    config("DV_KIND= SCALE\nDV_VALUE= 1.1\n")
+    assert run(["def", "a.cfg", "--set", "STEPS=2", "--json", "a.json", "-q"]) == 0
+    assert json.loads(Path("a.json").read_text())["steps"] == 2
+
+
+def test_ffd_setting_without_definition_is_told(here, capsys):
+    config("DV_KIND= FFD_SETTING\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    assert "FFD_SETTING needs FFD_DEFINITION, which has no box" in capsys.readouterr().err
+
+
+def test_binary_mesh_is_written_without_boxes_and_says_so(here, capsys):
+    config(f"{BOXED}DV_KIND= FFD_SETTING\nMESH_OUT_FORMAT= SU2B\n".replace("out.su2", "out.su2b"))
+    assert run(["def", "a.cfg"]) == 0
+    assert sv.read("out.su2", file_format="su2b").points.shape == (49, 2)
+    assert "an SU2 binary mesh" in capsys.readouterr().err
