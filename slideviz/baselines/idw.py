@@ -25,10 +25,7 @@ from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick
 from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
-
-TINY = 1e-24
-"""Square of the distance, over the reference length, below which nodes coincide: there the
-weight is so large that no other node counts."""
+from slideviz.rbf.slopes import TINY
 
 
 @dataclass(frozen=True)
@@ -45,6 +42,10 @@ class Weights:
 
     power: float
     fixed_weight: float = 1.0
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Return g_j of nodes with the displacements ``values`` (n, d)."""
+        return np.where(np.any(values != 0, axis=1), 1.0, self.fixed_weight)
 
 
 def weighted_means(
@@ -185,7 +186,7 @@ def _field(
     problem: Problem, known: IntArray, values: FloatArray, weights: Weights
 ) -> WeightedField:
     nodes, values = merge(problem, known, values)
-    own = np.where(np.any(values != 0, axis=1), 1.0, weights.fixed_weight)
+    own = weights.of(values)
     return WeightedField(problem.basis, problem.features[:, nodes], values, own, weights.power)
 
 

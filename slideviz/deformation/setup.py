@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -32,6 +32,9 @@ from slideviz.rbf.images import COINCIDENT
 from slideviz.rbf.methods import SLIDING_METHODS
 from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
+
+if TYPE_CHECKING:
+    from slideviz.baselines.idw import Weights
 
 EXACT_NODES = 2000
 """Control candidates up to which DATA_REDUCTION= AUTO takes them all."""
@@ -226,10 +229,9 @@ def _method(
 ) -> Callable[[Problem, Watch], Solution]:
     """Return what METHOD and SLIDING_MODE choose."""
     if case.method == "idw":
-        from slideviz.baselines.idw import Weights, deform_idw
+        from slideviz.baselines.idw import deform_idw
 
-        power = case.idw_power or float(mesh.dim)
-        return partial(deform_idw, weights=Weights(power, case.idw_fixed_weight))
+        return partial(deform_idw, weights=idw_weights(case, mesh.dim))
     if case.method == "elastic":
         from slideviz.baselines.conditions import Body
         from slideviz.baselines.elastic import deform_elastic
@@ -237,6 +239,13 @@ def _method(
 
         return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
     return SLIDING_METHODS[case.sliding]
+
+
+def idw_weights(case: Case, dim: int) -> Weights:
+    """Return the settings of inverse distance weighting."""
+    from slideviz.baselines.idw import Weights
+
+    return Weights(case.idw_power or float(dim), case.idw_fixed_weight)
 
 
 def _require_finite(mesh: Mesh) -> None:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deformation.setup import Setup
+from slideviz.deformation.setup import Setup, idw_weights
 from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen_step import FrozenStep
@@ -49,8 +49,11 @@ def choose_steps(
                 f"the system is singular for RBF_KERNEL= {setup.basis.kernel}, so that its "
                 "solution has no derivative; use RBF_KERNEL= wendland-c2, or merge coinciding nodes"
             )
+    weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     return tuple(
-        FrozenStep(setup, mesh, case.sliding, part, k == 0, solution.stages, solution.dropped)
+        FrozenStep(
+            setup, mesh, case.sliding, part, k == 0, solution.stages, solution.dropped, weights
+        )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )
 

@@ -11,21 +11,22 @@ import numpy as np
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, Translate
 from slideviz.case.motion import ROUNDING, displacements
-from slideviz.deformation.growth import unsoundness
+from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
 from slideviz.deformation.prescribed import alikeness, displaced
 from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen_step import FrozenStep, State
-from slideviz.design.operations import difference
+from slideviz.design.loops import farthest
+from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.errors import CaseError, DeformError, ToleranceWarning, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
-from slideviz.rbf.images import largest_misfit, spread
+from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
 
-TOGETHER = 16
-"""Designs that are deformed together: as many as share the work of the radial functions well."""
+TOGETHER = 25_000_000
+"""Coordinates of designs that are deformed together: 200 MB, which share the radial functions."""
 
 Tell = Callable[[Progress], None]
 
@@ -153,6 +154,7 @@ class Deformer:
                 "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
         self._setup, self._input = setup, _input(mesh, setup, asked)
+        self._size = largest_coordinate(mesh.points)
         self._alike = alikeness(case, mesh, setup.pairs)
         self.warnings = (*case.warnings, *setup.warnings)
         targets = [value(self._target(reference)) for reference in references]
@@ -282,8 +284,8 @@ class Deformer:
         if displacement.ndim == 2:
             target = value(self._target(displacement))
             states = self._run(target)
-            return value(states[-1].points), self._require_sound(target, states)
-        together = TOGETHER if len(self._steps) == 1 else 1
+            return value(states[-1].points), self._errors(target, states)
+        together = max(1, TOGETHER // self.mesh.points.size) if len(self._steps) == 1 else 1
         points, errors = np.empty((len(displacement), *self.mesh.points.shape)), []
         for first in range(0, len(displacement), together):
             part = slice(first, first + together)
@@ -294,8 +296,7 @@ class Deformer:
             targets = value(self._target(displacement[part]))
             states = self._run(targets)
             points[part] = value(states[-1].points)
-            for k, target in enumerate(targets):
-                errors.append(self._require_sound(target, [_one(s, k) for s in states]))
+            errors += self._errors(targets, states).tolist()
         return points, np.array(errors)
 
     def _taped(self, displacement: FloatArray) -> tuple[list[State], Variable, Variable]:
@@ -309,35 +310,57 @@ class Deformer:
         assert isinstance(end, Variable)
         return states, start, end
 
-    def _require_sound(self, target: FloatArray, states: list[State]) -> FloatArray:
-        """Return the largest error of a design.
+    def _errors(self, targets: FloatArray, states: list[State]) -> FloatArray:
+        """Return the largest error of each design, (...,).
 
         Raises
         ------
         DeformError
             Coordinates became infinite, nodes go far beyond the motion, or images apart.
         """
-        setup = replace(self._setup, target=target)
+        errors = self._off_track(value(states[-1].coords))
         for index, (step, state) in enumerate(zip(self._steps, states, strict=True), start=1):
-            points, coords = value(state.points), value(state.coords)
-            if not np.isfinite(points).all():
-                raise DeformError(f"step {index}: coordinates became infinite; use more steps")
-            solution = Solution(points, 0, 0.0, setup.held, np.nan, lost=float(state.lost))
-            unsound = unsoundness(setup, self.mesh, solution, coords, step.part)
-            if unsound:
-                raise UnsoundError(f"step {index}: {unsound}")
-            largest_misfit(setup.frame, setup.coords, points, setup.images)
-        off = self._off_track(value(states[-1].coords))
-        return np.array(max(off, *(float(state.max_error) for state in states)))
+            self._require_sound(index, step.part, targets, state)
+            errors = np.maximum(errors, state.max_error)
+        return errors
 
-    def _off_track(self, coords: FloatArray) -> float:
-        """Return how far sliding nodes are off their boundary, at most."""
+    def _require_sound(self, index: int, part: float, targets: FloatArray, state: State) -> None:
+        """Raise where the results of a step cannot be right: what every run checks."""
+        shape = self.mesh.points.shape
+        coords = value(state.coords).reshape(-1, *shape)
+        points = value(state.points).reshape(-1, *shape)
+        targets = targets.reshape(len(coords), *targets.shape[-2:])
+        lost = np.broadcast_to(state.lost.reshape(-1), len(coords))
+        far = farthest(coords, self._setup.coords)
+        for k, target in enumerate(targets):
+            if not np.isfinite(far[k]):
+                raise DeformError(f"step {index}: coordinates became infinite; use more steps")
+            largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
+            if far[k] > GROWTH * largest or lost[k] > HOPELESS * largest:
+                solution = Solution(points[k], 0, 0.0, self.nodes[:0], np.nan, lost=float(lost[k]))
+                setup = replace(self._setup, target=target)
+                unsound = unsoundness(setup, self.mesh, solution, coords[k], part)
+                if unsound:
+                    raise UnsoundError(f"step {index}: {unsound}")
+            self._require_alike_after(points[k])
+
+    def _require_alike_after(self, points: FloatArray) -> None:
+        """Raise where periodic images have moved differently."""
+        setup = self._setup
+        if not len(setup.images):
+            return
+        found = misfits(setup.frame, setup.coords, points, setup.images)
+        if not found.max() <= FAR * self._size:  # else it is rounding, without a closer look
+            largest_misfit(setup.frame, setup.coords, points, setup.images)
+
+    def _off_track(self, coords: FloatArray) -> FloatArray:
+        """Return how far sliding nodes are off their boundary, at most, (...,)."""
         tracks, sliding = self._setup.tracks, self._setup.classes.sliding
-        label, off = tracks.of_node[sliding], 0.0
+        label, off = tracks.of_node[sliding], np.zeros(coords.shape[:-2])
         for index in np.unique(label[label >= 0]).tolist():
-            at = coords[sliding[label == index]]
+            at = flat(coords[..., sliding[label == index], :])
             gap = np.linalg.norm(tracks.tracks[index].query(at) - at, axis=1)
-            off = max(off, float(gap.max()))
+            off = np.maximum(off, gap.reshape(*off.shape, -1).max(axis=-1))
         return off
 
     def _tolerance(self) -> float:
@@ -361,26 +384,15 @@ class Deformer:
         )
 
 
-def _one(state: State, k: int) -> State:
-    """Return the state of one of several designs."""
-    return State(
-        value(state.coords)[k],
-        None,
-        np.broadcast_to(state.max_error, len(value(state.coords)))[k],
-        np.broadcast_to(state.lost, len(value(state.coords)))[k],
-        value(state.points)[k],
-    )
-
-
 def _asked(case: Case, mesh: Mesh) -> Displacements:
     return displacements(case, mesh)
 
 
 def _require_derivative(case: Case) -> None:
     """Raise DeformError for methods that have no exact derivative here."""
-    if case.method != "rbf":
+    if case.method == "elastic":
         raise DeformError(
-            f"METHOD= {case.method} has no exact derivatives; use METHOD= rbf, or `sv.deform`"
+            "METHOD= elastic has no exact derivatives; use METHOD= rbf or idw, or `sv.deform`"
         )
 
 

@@ -267,11 +267,10 @@ def _whole(system: FloatArray) -> Factor:
 
 def _columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
     """Return the solutions for right-hand sides (..., n, m), all at once."""
-    if right.ndim == 2:
-        return solve(right)
     n, m = right.shape[-2:]
     wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
-    found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
+    with enough_threads(2.0 * n * wide.size):
+        found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
     return np.ascontiguousarray(np.moveaxis(found, 1, 0)).reshape(right.shape)
 
 

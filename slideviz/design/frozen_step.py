@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
 from slideviz.design.frozen_fit import FrozenFit, Keep, Rows
+from slideviz.design.loops import keep_rest, shift
 from slideviz.design.normals import sliding_normals
+from slideviz.design.operations import columns, features, points, weighted_mean
 from slideviz.design.operations import coords as coords_of
-from slideviz.design.operations import features, points
 from slideviz.design.tape import (
     Array,
     Variable,
@@ -109,6 +111,8 @@ class FrozenStep:
         Rows of the systems.
     dropped : (m,) int64
         Nodes that the pivot guard left out of them.
+    weights : Weights or None
+        Of inverse distance weighting, where that is the method.
     choices, constants : Kept
         What is discrete, and in the first step also what follows from positions alone.
     """
@@ -120,6 +124,7 @@ class FrozenStep:
     first: bool
     stages: tuple[Levels, ...]
     dropped: IntArray
+    weights: Weights | None = None
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
 
@@ -147,29 +152,33 @@ class FrozenStep:
         setup, frame = self.setup, self.setup.frame
         if len(setup.images):
             first, second = setup.images.T
-            displacement = put(displacement, second, take(displacement, first))
+            displacement = put(displacement, second, take(displacement, first), own=True)
         on = np.flatnonzero(setup.axis)
         if len(on):
             held = np.ones(setup.coords.shape[1])
             held[:2] = 0.0
-            displacement = put(displacement, on, multiply(take(displacement, on), held[None]))
-        moved = put(_shifted(coords, displacement), setup.known, goal)
+            still = multiply(take(displacement, on), held[None])
+            displacement = put(displacement, on, still, own=True)
+        moved = put(_shifted(coords, displacement, own=True), setup.known, goal, own=True)
         at = _at_rest(points(frame, moved), moved, setup.coords, self.mesh.points)
         halo = self.mesh.halo
         if halo is None:
             return moved, at
         donor, start = self.mesh.points[halo.donors], self.mesh.points[halo.receivers]
         follow = transform(halo.rotations, take(at, halo.donors) - donor)
-        at = put(at, halo.receivers, _shifted(start, follow))
+        own = at is not moved
+        at = put(at, halo.receivers, _shifted(start, follow), own=own)
         copies = np.setdiff1d(halo.receivers, setup.images)
-        return put(moved, copies, coords_of(frame, take(at, copies))), at
+        return put(moved, copies, coords_of(frame, take(at, copies)), own=own), at
 
 
-def _shifted(start: Array, by: Array) -> Array:
-    """Return start + by; rows that do not move keep every bit."""
+def _shifted(start: Array, by: Array, *, own: bool = False) -> Array:
+    """Return start + by, in the place of the latter if it is nobody else's.
+
+    Rows that do not move keep every bit.
+    """
     x, u = value(start), value(by)
-    # Adding zero would turn -0.0 into 0.0.
-    out = np.where(u == 0, x, x + u)
+    out = shift(x, u if own else u.copy())
     return apply(out, (start, lambda t: t, lambda g: g), (by, lambda t: t, lambda g: g))
 
 
@@ -177,9 +186,8 @@ def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> 
     """Return the points, with every bit of those whose coordinates did not change."""
     if at is moved:
         return at
-    rest = np.all(value(moved) == start, axis=-1, keepdims=True)
-    out = np.where(rest, before, value(at))
-    return replace(at, value=out) if isinstance(at, Variable) else out
+    keep_rest(value(at), value(moved), start, before)
+    return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +217,8 @@ class _Solving:
 
     def run(self) -> _Solved:
         """Return what the method finds."""
+        if self._step.weights is not None:
+            return self._weighted(self._step.weights)
         if self._step.sliding == "ps":
             return self._pseudo()
         if self._step.sliding == "ds" and len(self._normal_nodes):
@@ -253,6 +263,30 @@ class _Solving:
         second = self._fit()
         self._meet(second, nodes, values)
         return self._finished(second, nodes, values)
+
+    def _weighted(self, weights: Weights) -> _Solved:
+        """Inverse distance weighting (`slideviz.baselines.idw.deform_idw`)."""
+        setup, nodes, values = self._setup, self._known, self._values
+
+        def mean(name: str, targets: IntArray | slice) -> Array:
+            merged, given = self._merged(nodes, values)
+            own = self._step.choices(f"weights {name}", lambda: weights.of(value(given)))
+            x = self._features
+            at = x if isinstance(targets, slice) else columns(x, targets)
+            return weighted_mean(setup.basis, at, columns(x, merged), given, own, weights.power)
+
+        for name, level in (("edge", self._edge), ("surface", self._surface)):
+            if len(level):
+                free = mean(name, level)
+                if setup.tracks.curved:
+                    free = self._within(level, free)
+                slid = self._project(level, free, name)
+                nodes, values = np.concatenate([nodes, level]), join(values, slid)
+        displacement = mean("all", slice(None))
+        errors = np.linalg.norm(value(values) - value(displacement)[..., nodes, :], axis=-1)
+        displacement = put(displacement, nodes, values, own=True)
+        most = errors.max(axis=-1, initial=0.0)
+        return _Solved(displacement, None, most, np.zeros(most.shape))
 
     def _off(self, slid: FloatArray, free: FloatArray) -> IntArray:
         """Return which slid nodes leave a straight edge of a curved surface."""
@@ -428,7 +462,7 @@ class _Solving:
         spread = self._step.choices("correction", choose)
         if spread is not None:
             displacement = self._spread(displacement, spread, errors)
-        displacement = put(displacement, nodes, values)
+        displacement = put(displacement, nodes, values, own=True)
         return _Solved(displacement, lag, size.max(axis=-1, initial=0.0), lost)
 
     def _corrected(
@@ -471,7 +505,8 @@ class _Solving:
         taken = gather(taken, spread.row, count)
         part = self._keep("shares", lambda: self._shares(spread))
         taken = multiply(taken, part)
-        return put(displacement, spread.targets, take(displacement, spread.targets) + taken)
+        more = take(displacement, spread.targets) + taken
+        return put(displacement, spread.targets, more, own=True)
 
     def _shares(self, spread: _Spread) -> Array:
         """Return the share that each target takes over, by its distance from the nearest node."""

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
+from slideviz.baselines.idw import weighted_means
 from slideviz.design.tape import Array, Linear, Variable, apply, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.slopes import pull_positions, push_positions
+from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 
 PAIRS = 8_000_000
 """Pairs whose radial functions are in memory at a time when many columns share them."""
+
+CACHED = 500_000
+"""Of these, as many as are multiplied at once: they stay in the cache."""
 
 
 def flat(rows: FloatArray) -> FloatArray:
@@ -99,10 +104,6 @@ def radial_sum(basis: Basis, targets: Array, controls: Array, weights: Array) ->
     """Return s (..., N, d) at features (k, N), from features (k, n) and weights (..., n, d)."""
     x, c, w = value(targets), value(controls), value(weights)
 
-    def pushed(**moved: FloatArray) -> FloatArray:
-        ((name, change),) = moved.items()
-        return _each(lambda t: push_positions(basis, x, c, w, **{name: t}), change)
-
     def turned(g: FloatArray) -> FloatArray:
         return many(basis, c, x, g)
 
@@ -110,12 +111,12 @@ def radial_sum(basis: Basis, targets: Array, controls: Array, weights: Array) ->
         many(basis, x, c, w),
         (
             targets,
-            lambda t: pushed(moved=t),
+            lambda t: _each(lambda each: push_positions(basis, x, c, w, moved=each), t),
             lambda g: _each(lambda each: pull_positions(basis, x, c, each, w), g),
         ),
         (
             controls,
-            lambda t: pushed(moved_controls=t),
+            lambda t: _each(lambda each: push_positions(basis, x, c, w, moved_controls=each), t),
             lambda g: _each(lambda each: pull_positions(basis, c, x, w, each), g),
         ),
         (weights, lambda t: many(basis, x, c, t), turned),
@@ -140,10 +141,14 @@ def many(
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d))
     size = max(1, PAIRS // max(1, n))
+    least = max(1, CACHED // max(1, n))
     for start in range(0, total, size):
-        part = slice(start, min(total, start + size))
-        values = matrix(basis, (targets[:, part], None), (controls, None)) @ wide
-        out[:, part] = np.moveaxis(values.reshape(-1, len(out), d), 1, 0)
+        stop = min(total, start + size)
+        values = matrix(basis, (targets[:, start:stop], None), (controls, None))
+        for first in range(start, stop, least):
+            last = min(stop, first + least)
+            found = values[first - start : last - start] @ wide
+            out[:, first:last] = np.moveaxis(found.reshape(-1, len(out), d), 1, 0)
     return out.reshape(*ahead, total, d)
 
 
@@ -168,4 +173,65 @@ def terms(basis: Basis, x: Array) -> Array:
             lambda t: np.einsum("nqk,...kn->...nq", slopes, t),
             lambda g: np.einsum("nqk,...nq->...kn", slopes, g),
         ),
+    )
+
+
+def weighted_mean(
+    basis: Basis, targets: Array, sources: Array, values: Array, own: FloatArray, power: float
+) -> Array:
+    """Return means (..., N, d) of values (..., n, d), weighted with their inverse distance.
+
+    Parameters
+    ----------
+    own : (n,)
+        A further weight of each source.
+    """
+    x, c, v = value(targets), value(sources), value(values)
+
+    def mean(each: FloatArray) -> FloatArray:
+        return _each(lambda t: weighted_means(basis, x, c, t, own, power=power), each)
+
+    out = mean(v)
+    if not any(isinstance(part, Variable) for part in (targets, sources, values)):
+        return out
+    total = sum_powers(basis, x, c, own[:, None], power)
+    heavy, means = own[:, None] * v, out.copy()  # who owns the outcome may change it
+
+    def pushed(
+        moved: FloatArray | None = None, moved_sources: FloatArray | None = None
+    ) -> FloatArray:
+        above, below = (
+            push_positions(
+                basis, x, c, weights, moved=moved, moved_controls=moved_sources, power=power
+            )
+            for weights in (heavy, own[:, None])
+        )
+        return (above - means * below) / total
+
+    def pulled(g: FloatArray, *, of_sources: bool) -> FloatArray:
+        above, below = g / total, (g * means).sum(axis=1, keepdims=True) / total
+        if of_sources:
+            return pull_positions(basis, c, x, heavy, above, power) - pull_positions(
+                basis, c, x, own[:, None], below, power
+            )
+        return pull_positions(basis, x, c, above, heavy, power) - pull_positions(
+            basis, x, c, below, own[:, None], power
+        )
+
+    def back(g: FloatArray) -> FloatArray:
+        return own[:, None] * sum_powers(basis, c, x, g / total, power)
+
+    return apply(
+        out,
+        (
+            targets,
+            lambda t: _each(pushed, t),
+            lambda g: _each(partial(pulled, of_sources=False), g),
+        ),
+        (
+            sources,
+            lambda t: _each(lambda each: pushed(moved_sources=each), t),
+            lambda g: _each(partial(pulled, of_sources=True), g),
+        ),
+        (values, mean, lambda g: _each(back, g)),
     )

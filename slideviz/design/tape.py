@@ -270,12 +270,20 @@ def gather(x: Array, rows: IntArray, count: int) -> Array:
     )
 
 
-def put(x: Array, rows: IntArray, new: Array) -> Array:
-    """Return x (..., n, c) with some rows (m,), each named once, replaced by ``new``."""
+def put(x: Array, rows: IntArray, new: Array, *, own: bool = False) -> Array:
+    """Return x (..., n, c) with some rows (m,), each named once, replaced by ``new``.
+
+    Parameters
+    ----------
+    own
+        Whether nobody else needs the values of x, so that they can be changed in their place.
+    """
     v, w = value(x), value(new)
     ahead = np.broadcast_shapes(v.shape[:-2], w.shape[:-2])
-    out = np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))
+    fits = own and v.shape[:-2] == ahead
+    out = v if fits else np.array(np.broadcast_to(v, (*ahead, *v.shape[-2:])))
     out[..., rows, :] = w
+    shape = v.shape[-2:]
 
     def without(t: FloatArray) -> FloatArray:
         kept = t.copy()
@@ -283,7 +291,7 @@ def put(x: Array, rows: IntArray, new: Array) -> Array:
         return kept
 
     def alone(t: FloatArray) -> FloatArray:
-        placed = np.zeros((*t.shape[:-2], *v.shape[-2:]))
+        placed = np.zeros((*t.shape[:-2], *shape))
         placed[..., rows, :] = t
         return placed
 

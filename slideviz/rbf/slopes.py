@@ -25,9 +25,16 @@ from slideviz.rbf.kernels import KERNELS, SHAPE
 NEAR = 1e-12
 """Parts of R below which two nodes are one."""
 
+INVERSE = 14
+"""The number of xi^-power, the weight of inverse distance weighting."""
+
+TINY = 1e-24
+"""Square of xi below which nodes coincide: there that weight is so large that no other node
+counts."""
+
 
 @njit(**OPTIONS)
-def _slope(kind, q, count):  # type: ignore[no-untyped-def]
+def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
     """Replace xi by phi'(xi) / (2 xi) in the first ``count`` entries of q."""
     for j in range(count):
         x = q[j]
@@ -48,6 +55,8 @@ def _slope(kind, q, count):  # type: ignore[no-untyped-def]
             q[j] = -1.0 / ((1.0 + x * x) * (1.0 + x * x))
         elif kind == 13:
             q[j] = -np.exp(-x * x)
+        elif kind == INVERSE:
+            q[j] = 0.0 if x * x <= TINY else -0.5 * power * (x * x) ** (-0.5 * power - 1.0)
         elif x <= NEAR or (kind != 8 and x >= 1.0):
             q[j] = 0.0
         elif kind == 1:
@@ -75,7 +84,7 @@ def _sine(g):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **OPTIONS)
-def _reverse(x, c, wx, wc, half, scale, kind, out):  # type: ignore[no-untyped-def]
+def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-untyped-def]
     """Write sum_j (wx_i . wc_j) dphi_ij/dx_i to out (4, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     twice = 2.0 * scale * scale
@@ -89,7 +98,7 @@ def _reverse(x, c, wx, wc, half, scale, kind, out):  # type: ignore[no-untyped-d
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 _distances(x[:, i], c, start, count, half, scale, q)
-                _slope(kind, q, count)
+                _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     p = (a0 * wc[0, j] + a1 * wc[1, j] + a2 * wc[2, j]) * q[j - start]
                     if half > 0.0:
@@ -108,7 +117,7 @@ def _reverse(x, c, wx, wc, half, scale, kind, out):  # type: ignore[no-untyped-d
 
 
 @njit(parallel=True, **OPTIONS)
-def _forward(x, c, w, dx, dc, half, scale, kind, out):  # type: ignore[no-untyped-def]
+def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no-untyped-def]
     """Write the change of s as x and c change by dx and dc, to out (3, N)."""
     tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
     twice = 2.0 * scale * scale
@@ -122,7 +131,7 @@ def _forward(x, c, w, dx, dc, half, scale, kind, out):  # type: ignore[no-untype
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
                 _distances(x[:, i], c, start, count, half, scale, q)
-                _slope(kind, q, count)
+                _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
                     if half > 0.0:
@@ -140,12 +149,44 @@ def _forward(x, c, w, dx, dc, half, scale, kind, out):  # type: ignore[no-untype
             out[0, i], out[1, i], out[2, i] = twice * s0, twice * s1, twice * s2
 
 
+@njit(parallel=True, **OPTIONS)
+def _sum_powers(x, c, w, half, scale, power, out):  # type: ignore[no-untyped-def]
+    """Write sum_j w_j xi_ij^-power to out (3, N)."""
+    tasks = (x.shape[1] + TARGETS_PER_TASK - 1) // TARGETS_PER_TASK
+    for task in prange(tasks):
+        q = np.empty(BLOCK)
+        first = task * TARGETS_PER_TASK
+        for i in range(first, min(first + TARGETS_PER_TASK, x.shape[1])):
+            s0, s1, s2 = 0.0, 0.0, 0.0
+            for start in range(0, c.shape[1], BLOCK):
+                count = min(BLOCK, c.shape[1] - start)
+                _distances(x[:, i], c, start, count, half, scale, q)
+                for j in range(count):
+                    p = max(q[j] * q[j], TINY) ** (-0.5 * power)
+                    s0 += w[0, start + j] * p
+                    s1 += w[1, start + j] * p
+                    s2 += w[2, start + j] * p
+            out[0, i], out[1, i], out[2, i] = s0, s1, s2
+
+
+def sum_powers(
+    basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray, power: float
+) -> FloatArray:
+    """Return sum_j w_j (|x_i - c_j| / R)^-power at the targets, (N, d)."""
+    x, c = _rows(targets, 4), _rows(controls, 4)
+    out = np.empty((3, x.shape[1]))
+    with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
+        _sum_powers(x, c, _rows(weights.T, 3), basis.half, 1.0 / basis.radius, power, out)
+    return np.ascontiguousarray(out[: weights.shape[1]].T)
+
+
 def pull_positions(
     basis: Basis,
     targets: FloatArray,
     controls: FloatArray,
     adjoint: FloatArray,
     weights: FloatArray,
+    power: float = 0.0,
 ) -> FloatArray:
     """Return the gradient of sum_i adjoint_i . s(x_i) with respect to the targets, (k, N).
 
@@ -156,6 +197,8 @@ def pull_positions(
     targets, controls : (k, N), (k, n)
         Features, as ``Frame.features`` gives them.
     adjoint, weights : (N, d), (n, d)
+    power
+        That of inverse distance weighting, in place of the radial function; 0: none.
     """
     x, c = _rows(targets, 4), _rows(controls, 4)
     out = np.empty((4, x.shape[1]))
@@ -167,7 +210,8 @@ def pull_positions(
             _rows(weights.T, 3),
             basis.half,
             1.0 / basis.radius,
-            KERNELS[basis.kernel].code,
+            INVERSE if power else KERNELS[basis.kernel].code,
+            power,
             out,
         )
     return out[: len(targets)]
@@ -181,6 +225,7 @@ def push_positions(
     *,
     moved: FloatArray | None = None,
     moved_controls: FloatArray | None = None,
+    power: float = 0.0,
 ) -> FloatArray:
     """Return the change (N, d) of s as features of targets and controls change.
 
@@ -188,6 +233,8 @@ def push_positions(
     ----------
     moved, moved_controls : (k, N), (k, n), optional
         The changes; None: zero.
+    power
+        As of ``pull_positions``.
     """
     x, c = _rows(targets, 4), _rows(controls, 4)
     dx = np.zeros_like(x) if moved is None else _rows(moved, 4)
@@ -202,7 +249,8 @@ def push_positions(
             dc,
             basis.half,
             1.0 / basis.radius,
-            KERNELS[basis.kernel].code,
+            INVERSE if power else KERNELS[basis.kernel].code,
+            power,
             out,
         )
     return np.ascontiguousarray(out[: weights.shape[1]].T)
