@@ -181,8 +181,9 @@ class Deformer:
             The control nodes of the reference do not suffice for a design.
         """
         given = self.displacement if displacement is None else displacement
-        points, errors = self._deformed(self._checked(given, "displacement"))
-        self._warn(errors, stacklevel=3)
+        given = self._checked(given, "displacement")
+        points, errors = self._deformed(given)
+        self._warn(errors, self._tolerance(given))
         return points
 
     def max_error(self, displacement: FloatArray) -> float | FloatArray:
@@ -363,24 +364,25 @@ class Deformer:
             off = np.maximum(off, gap.reshape(*off.shape, -1).max(axis=-1))
         return off
 
-    def _tolerance(self) -> float:
-        """Return what errors may be: that of the data reduction, or a part of the motion."""
+    def _tolerance(self, designs: FloatArray) -> FloatArray:
+        """Return what errors may be, (...,): by the data reduction, or a part of the motion."""
         if self._setup.reduction is not None:
-            return self._setup.reduction.tolerance
-        largest = float(np.linalg.norm(self._setup.target, axis=1).max(initial=0.0))
-        return max(AUTO_TOLERANCE * largest, ROUNDING * self.mesh.extent)
+            return np.full(designs.shape[:-2], self._setup.reduction.tolerance)
+        largest = np.linalg.norm(designs, axis=-1).max(axis=-1, initial=0.0)
+        return AUTO_TOLERANCE * largest + ROUNDING * self.mesh.extent
 
-    def _warn(self, errors: FloatArray, stacklevel: int) -> None:
-        worst, allowed = float(errors.max(initial=0.0)), self._tolerance()
-        if worst <= allowed:
+    def _warn(self, errors: FloatArray, allowed: FloatArray) -> None:
+        above = errors > allowed
+        if not above.any():
             return
-        of = "" if errors.ndim == 0 else f" of {np.count_nonzero(errors > allowed)} designs"
+        worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
+        of = "" if errors.ndim == 0 else f" of {np.count_nonzero(above)} designs"
         warnings.warn(
-            f"the largest error{of} at the boundary is {worst:.3g}, above the tolerance of "
-            f"{allowed:.3g}: control nodes and facets are those of another displacement; choose "
-            "them anew with `deformer = deformer.refresh(displacement)`",
+            f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
+            f"{allowed[worst]:.3g}: control nodes and facets are those of another displacement; "
+            "choose them anew with `deformer = deformer.refresh(displacement)`",
             ToleranceWarning,
-            stacklevel=stacklevel + 1,
+            stacklevel=3,
         )
 
 

@@ -1,0 +1,252 @@
+"""Derivatives of deformations: dot products, and central differences of the frozen map."""
+
+from __future__ import annotations
+
+import itertools
+import lzma
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.mesh.periodic import axis_basis
+from tests import builders
+from tests.test_halo import MESHES, both, case_of
+from tests.test_laws import METHODS, box, box_case, sector, sector_case
+
+SHARED = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
+pytestmark = pytest.mark.filterwarnings("ignore::slideviz.errors.ToleranceWarning")
+REDUCED = Reduction(tolerance=1e-3)
+
+
+def motions(mesh, marker):
+    return (Translate(marker, (0.04, -0.03, 0.015)[: mesh.dim]), Rotate(marker, 2.0))
+
+
+def wave(points):
+    """A smooth direction that is not alike anywhere."""
+    x, y = points[:, 0], points[:, -1]
+    rows = [np.sin(3 * x + k) + np.cos(2 * y - k) * points[:, 1] for k in range(points.shape[1])]
+    return np.stack(rows, axis=1)
+
+
+def alike(deformer, vectors):
+    """The vectors with those of images and copies as the mesh repeats."""
+    setup, mesh, out = deformer._setup, deformer.mesh, vectors.copy()
+    row = {node: k for k, node in enumerate(deformer.nodes.tolist())}
+    if mesh.halo is not None:
+        halo = mesh.halo
+        for copy, origin, turn in zip(halo.receivers, halo.donors, halo.rotations, strict=True):
+            if int(copy) in row:
+                out[row[int(copy)]] = turn @ out[row[int(origin)]]
+        return out
+    first: dict[int, int] = {}
+    for k, node in enumerate(deformer.nodes.tolist()):
+        other = first.setdefault(int(setup.classes.stands[node]), k)
+        turn = np.eye(mesh.dim)
+        if setup.frame.cylindrical:
+            apart = setup.coords[node, 1] - setup.coords[deformer.nodes[other], 1]
+            c, s = np.cos(apart / setup.frame.radius), np.sin(apart / setup.frame.radius)
+            basis = axis_basis(setup.frame.axis)[:, : mesh.dim]
+            turn = basis.T @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ basis
+        out[k] = turn @ out[other]
+    return out
+
+
+def check(case, mesh):
+    """Both checks at a design that is not the reference, and the result at the reference."""
+    deformer = sv.Deformer(mesh, case)
+    *_, last = sv.deform(case, mesh)
+    np.testing.assert_allclose(deformer.deform(), last.mesh.points, rtol=0, atol=2e-12)
+    rng = np.random.default_rng(1)
+    design = alike(deformer, 1.1 * deformer.displacement)
+    direction = alike(deformer, wave(mesh.points[deformer.nodes]))
+    weights = rng.standard_normal(mesh.points.shape)
+    forward, reverse = deformer.jvp(design, direction), deformer.vjp(design, weights)
+    gap = abs((weights * forward).sum() - (reverse * direction).sum())
+    assert gap <= 1e-11 * np.abs(weights * forward).sum()
+    step = 1e-5 * mesh.extent
+    ahead, behind = (deformer.deform(design + s * direction) for s in (step, -step))
+    change = (ahead - behind) / (2 * step)
+    np.testing.assert_allclose(forward, change, rtol=0, atol=1e-6 * np.abs(change).max())
+    return deformer
+
+
+def table():
+    """Every method, periodicity, dimension, number of steps, with and without data reduction.
+
+    Each method and periodicity is among the fast ones, with the rest in turn.
+    """
+    frames = ("cartesian", "translational", "rotational")
+    cells = itertools.product(frames, METHODS, (2, 3), (1, 5), (None, REDUCED))
+    rows = []
+    for k, (frame, method, dim, steps, reduction) in enumerate(cells):
+        if frame == "cartesian" and method[1] != "none":
+            continue
+        fast = (dim, steps, reduction is None) == (
+            2 + k // 8 % 2 * (steps == 1),
+            (1, 5)[k // 8 % 2 == 0],
+            k // 16 % 2 == 0,
+        )
+        name = f"{frame}-{'-'.join(method)}-{dim}d-{steps}-{'reduced' if reduction else 'exact'}"
+        marks = () if fast else pytest.mark.slow
+        rows.append(pytest.param(frame, method, dim, steps, reduction, id=name, marks=marks))
+    return rows
+
+
+@pytest.mark.parametrize(("frame", "method", "dim", "steps", "reduction"), table())
+def test_flat_boundaries(frame, method, dim, steps, reduction):
+    settings = {"steps": steps, "reduction": reduction}
+    if frame == "rotational":
+        mesh = sector(dim)
+        motion = motions(mesh, "BLOCK" if dim == 2 else "blade")
+        check(sector_case(mesh, method, motion, **settings), mesh)
+    else:
+        mesh = box(dim)
+        check(box_case(mesh, method, motions(mesh, "BLOCK"), **settings), mesh)
+
+
+def annulus():
+    mesh = builders.annulus(24, 5, 2)
+    roles = {"wall": "moving", "far0": "sliding", "far1": "sliding"}
+    return mesh, roles, (Rotate("wall", 20.0), Translate("wall", (0.05, 0.02)))
+
+
+def sphere():
+    mesh = builders.sphere_in_box(4, 2)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"x_p": "moving"}
+    motion = (Translate("x_p", (0.1, 0.05, 0.02)), Rotate("x_p", 5.0, axis=(1.0, 0, 0)))
+    return mesh, roles, motion
+
+
+def bent_passage():
+    mesh = builders.passage((3, 4, 4), 60.0)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"blade": "moving"}
+    return mesh, roles, motions(mesh, "blade")
+
+
+def on_axis():
+    mesh = builders.wedge(6)
+    roles = {"BLOCK": "moving", "outer": "sliding", "per1": "periodic", "per2": "periodic"}
+    return mesh, roles, motions(mesh, "BLOCK")
+
+
+def plate():
+    mesh = builders.plate(8)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"below": "moving", "above": "moving"}
+    return mesh, roles, (Translate("", (0.03, 0.04)), Rotate(("below", "above"), 8.0))
+
+
+SHAPES = {f.__name__: f for f in (annulus, sphere, bent_passage, on_axis, plate)}
+
+
+@pytest.mark.parametrize("reduction", [None, REDUCED], ids=["exact", "reduced"])
+@pytest.mark.parametrize("steps", [1, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_curved_boundaries_nodes_on_the_axis_and_coinciding_ones(shape, sliding, steps, reduction):
+    mesh, roles, motion = SHAPES[shape]()
+    case = Case(roles=roles, motions=motion, sliding=sliding, steps=steps, reduction=reduction)
+    if shape == "on_axis":
+        case = case.change(periodic="moving", periodic_type="rotational")
+    check(case, mesh)
+
+
+@pytest.mark.parametrize("shape", ["annulus", "sphere", "bent_passage"])
+def test_curved_boundaries_in_several_steps(shape):
+    mesh, roles, motion = SHAPES[shape]()
+    check(Case(roles=roles, motions=motion, sliding="ds", steps=3), mesh)
+
+
+@pytest.mark.parametrize("sliding", ["ps", pytest.param("ds", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("name", MESHES)
+def test_halo_layers(tmp_path, name, steps, sliding):
+    mesh, _, roles = both(name, tmp_path)
+    case = case_of(mesh, roles, 0.05, sliding=sliding, periodic="moving", steps=steps)
+    check(case.change(reduction=REDUCED), mesh)
+
+
+@pytest.mark.parametrize("reduction", [None, REDUCED], ids=["exact", "reduced"])
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("kernel", ["thin-plate", "multiquadric", "wendland-c0", "ctps-c1"])
+def test_kernels(kernel, sliding, reduction):
+    mesh = builders.square(6)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
+    case = Case(roles=roles, motions=motions(mesh, "BLOCK"), sliding=sliding, kernel=kernel)
+    check(case.change(reduction=reduction, steps=2), mesh)
+
+
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("criterion", ["size", "tol"])
+@pytest.mark.parametrize("steps", [1, 3])
+def test_levels(steps, criterion, sliding):
+    mesh = builders.square(6)
+    roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
+    case = Case(roles=roles, motions=motions(mesh, "BLOCK"), sliding=sliding, steps=steps)
+    levels = Reduction(tolerance=1e-4, multilevel=True, criterion=criterion, level_size=8)
+    check(case.change(reduction=levels), mesh)
+
+
+@pytest.mark.parametrize("weight", [1.0, 3.0])
+@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("method", [("ps", "moving"), ("none", "periodic")])
+@pytest.mark.parametrize("frame", ["translational", "rotational"])
+def test_inverse_distance_weighting(frame, method, steps, weight):
+    settings = {"steps": steps, "idw_fixed_weight": weight}
+    mesh = box(3) if frame == "translational" else sector(2)
+    make = box_case if frame == "translational" else sector_case
+    case = make(mesh, method, motions(mesh, "BLOCK"), **settings)
+    check(case.change(method="idw", idw_power=2.5 if weight > 1 else None), mesh)
+
+
+def test_dropped_nodes_of_a_boundary_layer():
+    """Cells of 1e-6 at a wall that moves with the nodes above it: the pivot guard drops some."""
+    mesh = builders.layered(8, 1e-6)
+    roles = {"y_m": "moving", "x_m": "sliding", "x_p": "sliding", "y_p": "fixed"}
+    case = Case(roles=roles, motions=(Translate("y_m", (0.0, 0.05)),), sliding="ps")
+    deformer = sv.Deformer(mesh, case.change(reduction=REDUCED))
+    up = np.tile([0.0, 1.0], (len(deformer.nodes), 1))
+    design = 1.2 * deformer.displacement
+    forward = deformer.jvp(design, up)
+    weights = np.random.default_rng(0).standard_normal(forward.shape)
+    there, back = (weights * forward).sum(), (deformer.vjp(design, weights) * up).sum()
+    assert there == pytest.approx(back, rel=1e-11)
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="needs meshes that are not in the repository")
+@pytest.mark.parametrize("reduction", [None, Reduction(relative=1e-6)], ids=["exact", "reduced"])
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+def test_a_step_along_the_gradient_changes_a_real_objective_as_predicted(
+    tmp_path, sliding, reduction
+):
+    """The heat exchanger among SU2's cases, with the sensitivities of its adjoint solution."""
+    for name in ("burner_hx.su2", "solution_adj_custom.csv"):
+        (tmp_path / name).write_bytes(lzma.decompress((SHARED / f"{name}.xz").read_bytes()))
+    mesh = sv.read(tmp_path / "burner_hx.su2")
+    with (tmp_path / "solution_adj_custom.csv").open() as lines:
+        heading = next(lines).replace('"', "").strip().split(",")
+        numbers = np.loadtxt(lines, delimiter=",")
+    columns = [heading.index(f"Sensitivity_{axis}") for axis in "xy"]
+    sensitivity = numbers[np.argsort(numbers[:, 0])][:, columns]
+    sides = ("symmetry_xm", "symmetry_xp", "outlet")
+    roles = {"wall_hx": "moving"} | dict.fromkeys(sides, "sliding")
+    x = mesh.points[mesh.marker("wall_hx").nodes][:, 0]
+    place = np.pi * (x - x.min()) / np.ptp(x)
+    # The shape of the pipe's wall: waves that vanish at its ends.
+    modes = np.stack([np.outer(np.sin(k * place), [0.0, 1.0]) for k in range(1, 6)])
+    largest = 1e-3 * np.ptp(x)
+    case = Case(roles=roles, sliding=sliding, reduction=reduction, steps=2)
+    deformer = sv.Deformer(mesh, case, displacements=largest * modes)
+    start = np.zeros(modes.shape[1:])
+    gradient = np.einsum("kmd,md->k", modes, deformer.vjp(start, sensitivity))
+    step = np.einsum("k,kmd->md", gradient, modes)
+    step *= largest / np.abs(step).max()
+    change = (sensitivity * (deformer.deform(step) - mesh.points)).sum()
+    predicted = (deformer.vjp(start, sensitivity) * step).sum()
+    assert predicted > 0.0
+    assert change == pytest.approx(predicted, rel=0.02)
+    halfway = (deformer.vjp(step / 2, sensitivity) * step).sum()
+    assert change == pytest.approx(halfway, rel=1e-4)
