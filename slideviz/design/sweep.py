@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import closing
 from dataclasses import replace
@@ -22,6 +22,9 @@ from slideviz.mesh.model import Mesh
 LOST = 3
 """How often a design may lose its worker, before it is a row that says so."""
 
+_EVERY = 0.2
+"""Seconds between two questions whether to go on."""
+
 
 def sweep(
     case: Case,
@@ -34,6 +37,7 @@ def sweep(
     meshes: bool = False,
     resume: bool = False,
     force: bool = False,
+    going_on: Callable[[], object] = lambda: None,
 ) -> Iterator[Row]:
     """Return an iterator over the results of designs, each as it comes.
 
@@ -64,6 +68,8 @@ def sweep(
         Whether designs that have a result in ``folder`` are left out. Their rows come first.
     force : bool
         Whether results that are in ``folder`` may be lost.
+    going_on : callable
+        Called several times a second while it waits for workers; what it raises ends the sweep.
 
     Yields
     ------
@@ -119,7 +125,7 @@ def sweep(
     if executor is None:
         count = min(workers or usable_cores(), len(waiting))
         executor = Processes(max(count, 1), tasks.packed)
-    return _rows(_Loop(executor, tasks, waiting), earlier, results)
+    return _rows(_Loop(executor, tasks, waiting, going_on), earlier, results)
 
 
 def _rows(loop: _Loop, earlier: list[Row], results: Results | None) -> Iterator[Row]:
@@ -187,8 +193,15 @@ class _Loop:
         Workers that have the mesh, and that said that they need it.
     """
 
-    def __init__(self, executor: Executor, tasks: _Tasks, waiting: deque[Design]) -> None:
+    def __init__(
+        self,
+        executor: Executor,
+        tasks: _Tasks,
+        waiting: deque[Design],
+        going_on: Callable[[], object],
+    ) -> None:
         self._executor, self._tasks, self._waiting = executor, tasks, waiting
+        self._going_on = going_on
         self._flying: dict[Future[Answer], tuple[Design, bool]] = {}
         self._tries: dict[int, int] = {}
         self.holding: set[str] = set()
@@ -201,7 +214,8 @@ class _Loop:
         try:
             while self._waiting or self._flying:
                 self._submit()
-                done, _ = wait(self._flying, return_when=FIRST_COMPLETED)
+                self._going_on()
+                done, _ = wait(self._flying, _EVERY, return_when=FIRST_COMPLETED)
                 for future in done:
                     row = self._row(future, self._flying.pop(future)[0])
                     if row is not None:

@@ -152,6 +152,12 @@ _RUN = Menu("run", "&Run", entries=(
     Command("cancel", "&Cancel", "Stop what runs; the steps that are done are kept.",
             lambda window: window.cancel(), image="cancel", enabled=lambda now: now.busy,
             button="Stop within a second (Esc); the steps that are done stay.", button_key="Esc"),
+    None,
+    Command("designs", "&Designs…",
+            "Run a table of designs, each with other numbers of the motions or other settings, "
+            "and see their quality.",
+            lambda window: window.docks_.lead_to("designs"), ("F6",), enabled=opened,
+            tip_now=why_not(opened, "There is no mesh yet: open one first.")),
 ))
 
 _COLOURS = Menu("colours", "&Colours", "From which value to which the colours range.", (

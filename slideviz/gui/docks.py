@@ -12,6 +12,7 @@ from qtpy.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget, Q
 from slideviz.gui.dock_tabs import DockTabs
 from slideviz.gui.panels.boundaries import BoundariesPanel
 from slideviz.gui.panels.curves import CurvesPanel
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.panels.display import DisplayPanel
 from slideviz.gui.panels.histogram import HistogramPanel
 from slideviz.gui.panels.log import LogPanel
@@ -72,6 +73,7 @@ DOCKS: tuple[DockRow, ...] = (
     DockRow("runs", "Runs", RIGHT, lambda w: RunsPanel(w.store)),
     DockRow("sections", "Sections", RIGHT, sections_panel, "runs"),
     DockRow("display", "Display", RIGHT, lambda w: DisplayPanel(w.store), "runs"),
+    DockRow("designs", "Designs", BOTTOM, DesignsPanel, shown=False),
     DockRow("log", "Log", BOTTOM, lambda _: LogPanel(), shown=False),
 )
 """Every dock; the panels get the window and take from it what they need."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from qtpy.QtCore import QObject, Signal
 
+from slideviz.case.model import Case
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
@@ -83,14 +84,25 @@ class Running(QObject):
 
     def start_run(self) -> None:
         """Deform the mesh with the settings there are."""
+        if not self.runner.busy and not changes.run_requirements(self.store.session):
+            self._start_run(self.store.session.case)
+
+    def show_design(self, case: Case, name: str) -> None:
+        """Show the run of a design; it is deformed first, unless that was done already."""
         session = self.store.session
-        if self.runner.busy or changes.run_requirements(session):
-            return
+        for run in session.runs:
+            if run.name == name and run.case == case and run.end == "done":
+                self.store.change(changes.show_run, run.number)
+                return
+        if not self.runner.busy:
+            self._start_run(case, name)
+
+    def _start_run(self, case: Case, name: str = "") -> None:
         self.banner.hide()
-        self.store.change(changes.start_run)
+        self.store.change(changes.start_run, case, name)
+        session = self.store.session
         if session.view.colour_by == "role":
             self.store.change(changes.set_view, colour_by="size-skew")
-        case = session.case
         steps = case.steps or "automatic"
         log.info("run: sliding %s, periodic %s, %s steps", case.sliding, case.periodic, steps)
         self._deforms = True

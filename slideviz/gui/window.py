@@ -14,6 +14,7 @@ from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
 
+from slideviz.case.model import Case
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import Look
 from slideviz.gui.actions import Actions
@@ -24,6 +25,7 @@ from slideviz.gui.docks import Docks
 from slideviz.gui.files import Files
 from slideviz.gui.intersection_check import IntersectionCheck
 from slideviz.gui.panels.boundaries import BoundariesPanel
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.panels.log import LogPanel
 from slideviz.gui.panels.method import MethodPanel
 from slideviz.gui.panels.motions import MotionPanel
@@ -264,6 +266,10 @@ class MainWindow(Services):
         """Deform the mesh with the settings there are."""
         self.running.start_run()
 
+    def show_design(self, case: Case, name: str) -> None:
+        """Show the run of a design; it is deformed first, unless that was done already."""
+        self.running.show_design(case, name)
+
     def cancel(self) -> None:
         """Cancel the running job."""
         self.running.cancel()
@@ -332,6 +338,7 @@ class MainWindow(Services):
             # First the work, then the view: a job may still hand over a step.
             self.player.stop()
             self.exports.end()
+            self.docks_.panel(DesignsPanel).end()
             self.warmup.close()
             self.intersection_check.close()
             self.left_behind = not self.running.close()

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
+from slideviz.case.model import Case
 from slideviz.session.changes_view import set_view, show_frame
 from slideviz.session.state import Frame, Run, Session
 from slideviz.session.undoable import undoable
@@ -16,14 +17,14 @@ MOST_REMOVED = 2
 """Removed runs that are kept for undo: each may hold hundreds of megabytes."""
 
 
-def start_run(session: Session) -> Session:
-    """Return the session with a new run of the present settings, which is shown.
+def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
+    """Return the session with a new run of a case, or else of the settings, which is shown.
 
     Runs that were cancelled or failed before their first step go.
     """
     kept = tuple(run for run in session.runs if run.frames)
     number = 1 + max((session.newest, *(run.number for run in session.runs)))
-    runs = (*kept, Run(number, session.case))
+    runs = (*kept, Run(number, case or session.case, name=name))
     session = replace(session, runs=runs, shown=number, newest=number)
     return show_frame(session, 0)
 

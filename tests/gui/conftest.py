@@ -19,6 +19,7 @@ else:
 
 DIALOGS = (
     "ask_open",
+    "ask_table",
     "ask_save",
     "ask_numbered",
     "ask_folder",

@@ -78,6 +78,8 @@ PREVIEW_MS = 120
 """The preview of a picture or film waits for the end of what is typed."""
 TABLE_MS = 150
 """A table of motions is checked so long after the last key: a long one takes a while."""
+ROWS_MS = 250
+"""Results of designs are shown so long after the first of them came, all together."""
 INTERSECTION_MS = 200
 """Boundaries are checked for intersections so long after the last change: it takes a job."""
 AUTOSAVE_MS = 5000

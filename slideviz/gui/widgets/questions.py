@@ -40,6 +40,13 @@ def ask_open(parent: QWidget, folder: Path) -> Path | None:
     return Path(name) if name else None
 
 
+def ask_table(parent: QWidget, folder: Path) -> Path | None:
+    """Return the table of designs to open, or None."""
+    filters = "Tables (*.csv *.txt *.tsv);;All files (*)"
+    name, _ = QFileDialog.getOpenFileName(parent, "Open a table of designs", str(folder), filters)
+    return Path(name) if name else None
+
+
 def ask_save(parent: QWidget, title: str, default: Path, filters: str) -> Path | None:
     """Return the file to write, with an ending, or None. It asks before one is replaced."""
     return _save_name(parent, title, default, filters, QFileDialog.Option(0))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QMainWindow, QWidget
 
+from slideviz.case.model import Case
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
 from slideviz.session.store import Store
@@ -62,6 +63,10 @@ class Services(QMainWindow):
         *values: object,
     ) -> None:
         """Start a job beside the window; ``finish`` takes what it returns."""
+        raise NotImplementedError
+
+    def show_design(self, case: Case, name: str) -> None:
+        """Show the run of a design; it is deformed first, unless that was done already."""
         raise NotImplementedError
 
 

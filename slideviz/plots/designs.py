@@ -1,0 +1,180 @@
+"""Plots of designs: their quality, and other results, against the numbers that vary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slideviz.case.words import is_number
+from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.design.sweep_row import Row
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.plots.style import PRINT, Style, add_legend, dress
+from slideviz.session.design_table import DesignTable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+RESULTS = {
+    "quality": "quality [-]",
+    "inverted": "inverted cells [-]",
+    "max_error": "largest error [mesh units]",
+    "control_nodes": "control nodes [-]",
+    "seconds": "time of a design [s]",
+}
+"""What can be drawn, and the words of its axis."""
+_MOST_LINES = 12
+"""Curves that are told apart by colours; of more, points are drawn."""
+_MOST_WORDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class DesignCurve:
+    """A result against one column of a table of designs, the others being the same.
+
+    Attributes
+    ----------
+    label : str
+        What the designs have in the other columns.
+    design : (k,) int64
+        Numbers of the designs.
+    places : (k,) float64
+        Ascending: values of the column, or where its words stand.
+    values, mean : (k,) float64
+        The result, and of the quality its mean.
+    inverted : (k,) bool
+        Whether there are inverted cells.
+    words : tuple of str
+        What stands at 0, 1, 2 ..., where the column has no numbers.
+    others : str
+        The names of the other columns.
+    """
+
+    label: str
+    design: IntArray
+    places: FloatArray
+    values: FloatArray
+    mean: FloatArray
+    inverted: np.ndarray
+    words: tuple[str, ...] = ()
+    others: str = ""
+
+
+def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurve]:
+    """Return a result against a column: a curve for each choice of the values in the others.
+
+    Values that are no numbers stand in the order in which they come in the table.
+    """
+    at = table.columns.index(column)
+    words = list(dict.fromkeys(row[at] for row in table.rows))
+    numeric = all(is_number(word) for word in words)
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for number, row in sorted(table.results.items()):
+        if not row.problem:
+            values = table.rows[number - 1]
+            groups.setdefault(values[:at] + values[at + 1 :], []).append(row)
+    others = [name for name in table.columns if name != column]
+    found = []
+    for rest, rows in groups.items():
+        texts = [table.rows[row.design - 1][at] for row in rows]
+        places = _numbers(float(text) if numeric else words.index(text) for text in texts)
+        order = np.argsort(places, kind="stable")
+        name = "min" if what == "quality" else what
+        found.append(
+            DesignCurve(
+                ", ".join(rest),
+                np.array([row.design for row in rows])[order],
+                places[order],
+                _numbers(getattr(row, name) for row in rows)[order],
+                _numbers(row.mean for row in rows)[order],
+                np.array([row.inverted > 0 for row in rows])[order],
+                () if numeric else tuple(words),
+                ",\n".join(others),
+            )
+        )
+    return found
+
+
+def against_designs(
+    axes: Axes,
+    curves: Sequence[DesignCurve],
+    column: str,
+    what: str = "quality",
+    shown: int | None = None,
+    style: Style = PRINT,
+) -> None:
+    """Draw a result of designs against a column: points, joined where only the column varies.
+
+    Of the quality both the minimum (filled) and the mean (hollow) are drawn. Designs with inverted
+    cells are crosses. The design ``shown`` has a ring.
+    """
+    dress(axes, style, column, RESULTS[what])
+    several = len(curves) <= _MOST_LINES
+    for index, curve in enumerate(curves):
+        _draw_curve(axes, curve, style, index if several else None, mean=what == "quality")
+        if shown is not None and shown in curve.design:
+            k = int(np.flatnonzero(curve.design == shown)[0])
+            ring: dict[str, Any] = {"markersize": 11, "markeredgewidth": 2.2, "zorder": 5}
+            ring |= {"markerfacecolor": "none", "markeredgecolor": SELECTED_COLOUR}
+            axes.plot(curve.places[k], curve.values[k], "o", gid="shown", clip_on=False, **ring)
+    if what == "quality":
+        for word, face in (("minimum", style.look.text), ("mean", style.look.background)):
+            dot: dict[str, Any] = {"markerfacecolor": face, "color": style.look.text}
+            axes.plot([], [], "o", markersize=5, label=word, **dot)
+    words = curves[0].words if curves else ()
+    if words:
+        every = -(-len(words) // _MOST_WORDS)
+        axes.set_xticks(range(0, len(words), every), words[::every])
+    if several:
+        title = curves[0].others if curves and len(curves) > 1 else ""
+        beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+        add_legend(axes, style, title=title, title_fontsize=style.size, **beside)
+        legend = axes.get_legend()
+        if legend is not None:
+            legend.get_title().set_color(style.look.text)
+
+
+def _draw_curve(
+    axes: Axes, curve: DesignCurve, style: Style, series: int | None, *, mean: bool
+) -> None:
+    """Draw a curve in the look of a series; without one its points alone, as all others."""
+    look = style.series(series or 0)
+    joined = series is not None and len(curve.places) > 1
+    line: dict[str, Any] = {
+        "color": look.colour,
+        "linestyle": look.dash if joined else "",
+        "linewidth": style.width,
+        "marker": look.marker,
+        "markersize": 4.5,
+    }
+    sound = np.where(curve.inverted, np.nan, curve.values)
+    label = curve.label if series is not None and curve.label else None
+    axes.plot(curve.places, sound, label=label, gid=f"curve:{curve.label}", **line)
+    if mean:
+        hollow = line | {"markerfacecolor": style.look.background}
+        axes.plot(curve.places, curve.mean, gid=f"mean:{curve.label}", **hollow)
+    if curve.inverted.any():
+        places, values = curve.places[curve.inverted], curve.values[curve.inverted]
+        cross: dict[str, Any] = {"color": style.alarm, "markersize": 6, "linestyle": ""}
+        axes.plot(places, values, marker="x", clip_on=False, gid="inverted", **cross)
+
+
+def nearest_design(axes: Axes, curves: Sequence[DesignCurve], x: float, y: float) -> int | None:
+    """Return the design whose point is nearest to a place in pixels of the figure, from below."""
+    best: tuple[float, int] | None = None
+    for curve in curves:
+        for values in (curve.values, curve.mean):
+            spots = axes.transData.transform(np.stack([curve.places, values], axis=1))
+            away = np.hypot(*(spots - (x, y)).T)
+            if len(away) and np.isfinite(away).any():
+                k = int(np.nanargmin(away))
+                if best is None or away[k] < best[0]:
+                    best = float(away[k]), int(curve.design[k])
+    return None if best is None else best[1]
+
+
+def _numbers(values: Iterable[float]) -> FloatArray:
+    return np.array(list(values), np.float64)

@@ -1,0 +1,170 @@
+"""The table of designs as the window has it: texts in columns, and the results that came."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from io import StringIO
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from slideviz.case.key import FILES, MOTION, VIEW
+from slideviz.case.keys import KEYS
+from slideviz.case.model import Case
+from slideviz.case.words import is_number
+from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
+from slideviz.design.sweep_designs import read_designs
+from slideviz.design.sweep_row import NUMBERS, Row
+from slideviz.errors import CaseError
+from slideviz.mesh.io.atomic import atomic_write
+
+MOST = 100_000
+"""Designs that a table in the window has room for."""
+_RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class DesignTable:
+    """A table of designs and their results.
+
+    Attributes
+    ----------
+    columns : tuple of str
+    rows : tuple of tuple of str
+        The values of each design, a text for each column.
+    results : mapping of int to Row
+        By the number of the design, from 1.
+    """
+
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    results: Mapping[int, Row] = field(default_factory=lambda: MappingProxyType({}))
+
+    def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
+        """Return the table in which each design there is has each of these values.
+
+        Raises
+        ------
+        CaseError
+            There would be too many designs.
+        """
+        at = [k for k, name in enumerate(self.columns) if name != column]
+        rest = list(dict.fromkeys(tuple(row[k] for k in at) for row in self.rows)) or [()]
+        given = list(values)
+        if len(rest) * len(given) > MOST:
+            raise CaseError(f"{len(rest) * len(given):,} designs are too many; {MOST:,} are not")
+        rows = tuple((*row, value) for row in rest for value in given)
+        return DesignTable((*(self.columns[k] for k in at), column), rows)
+
+    def with_cell(self, row: int, column: int, text: str) -> DesignTable:
+        """Return the table with another value; the result of that design goes."""
+        cells = list(self.rows[row])
+        cells[column] = text.strip()
+        rows = (*self.rows[:row], tuple(cells), *self.rows[row + 1 :])
+        kept = {number: one for number, one in self.results.items() if number != row + 1}
+        return replace(self, rows=rows, results=MappingProxyType(kept))
+
+    def without(self, rows: Iterable[int]) -> DesignTable:
+        """Return the table without some rows; results move with their designs."""
+        gone = set(rows)
+        left = [at for at in range(len(self.rows)) if at not in gone]
+        results = {
+            new: replace(self.results[old + 1], design=new)
+            for new, old in enumerate(left, start=1)
+            if old + 1 in self.results
+        }
+        kept = tuple(self.rows[at] for at in left)
+        return DesignTable(self.columns if kept else (), kept, MappingProxyType(results))
+
+    def with_results(self, rows: Iterable[Row]) -> DesignTable:
+        """Return the table with more results."""
+        more = {row.design: row for row in rows}
+        return replace(self, results=MappingProxyType({**self.results, **more}))
+
+    def without_results(self) -> DesignTable:
+        """Return the table as it was before it ran."""
+        return replace(self, results=MappingProxyType({}))
+
+    def designs(self) -> list[dict[str, str]]:
+        """Return the designs, as `slideviz.sweep` takes them."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
+
+def read_table(case: Case, path: Path) -> DesignTable:
+    """Return the table of a CSV file, checked against a case.
+
+    Raises
+    ------
+    CaseError
+        It cannot be read, or has mistakes.
+    """
+    found = read_designs(case, path)
+    if len(found.rows) > MOST:
+        raise CaseError(f"{path}: has {len(found.rows):,} designs; use `slideviz sweep` for them")
+    columns = tuple(found.columns)
+    rows = tuple(tuple(_shown(design.values[name]) for name in columns) for design in found.rows)
+    return DesignTable(columns, rows)
+
+
+def write_results(path: Path, table: DesignTable) -> None:
+    """Write designs and results as CSV, a row for each design.
+
+    Raises
+    ------
+    CaseError
+        The file cannot be written.
+    """
+    out = StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["design", *table.columns, *NUMBERS, "problem"])
+    for number, values in enumerate(table.rows, start=1):
+        row = table.results.get(number)
+        done = row is not None and not row.problem
+        numbers = [getattr(row, name) if done else "" for name in NUMBERS]
+        writer.writerow([number, *values, *numbers, row.problem if row is not None else ""])
+    with atomic_write(path, CaseError) as file:
+        file.write(out.getvalue().encode())
+
+
+def column_choices(case: Case) -> dict[str, str]:
+    """Return the columns that there can be, with what the case has there: numbers, then keys."""
+    keys = {
+        name: name
+        for name, key in KEYS.items()
+        if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
+    }
+    found = columns_of(case, [*numbers_of(case), *keys])
+    return {name: _shown(value) for name, value in own_values(case, found).items()}
+
+
+def values_of(text: str) -> list[str]:
+    """Return the values that a text lists: ``-8 to 0 in 9``, or ``1, 2, 5``.
+
+    Raises
+    ------
+    CaseError
+        It lists none, or the range is none.
+    """
+    match = _RANGE.match(text.strip())
+    if match is None:
+        found = [word.strip() for word in text.split(",")]
+        if not all(found):
+            raise CaseError("Give values, as 1, 2, 5, or a range, as -8 to 0 in 9")
+        return list(dict.fromkeys(found))
+    first, last, count = match.groups()
+    if not (is_number(first) and is_number(last)) or not 2 <= int(count) <= MOST:
+        raise CaseError("A range has two numbers and how many values it has, as -8 to 0 in 9")
+    # Not 0.30000000000000004.
+    return [format(v, ".12g") for v in np.linspace(float(first), float(last), int(count))]
+
+
+def _shown(value: str | float) -> str:
+    """Return a value as people write it, with all its digits."""
+    if isinstance(value, str):
+        return value
+    short = format(value, ".12g")
+    return short if float(short) == value else repr(value)

@@ -1,0 +1,35 @@
+"""The job that runs a table of designs, beside the window and in processes of their own."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+from slideviz.case.model import Case
+from slideviz.design.sweep import sweep
+from slideviz.mesh.model import Mesh
+from slideviz.session.design_table import DesignTable
+from slideviz.session.jobs import Doing, Report, Stopped, require_going
+
+
+def run_designs(
+    case: Case, mesh: Mesh, table: DesignTable, report: Report, stopped: Stopped
+) -> None:
+    """Run the designs that have no result yet; report each `Row`, and the progress as `Doing`.
+
+    Raises
+    ------
+    SlidevizError
+        The table has mistakes, or no process can be started.
+    """
+    total = len(table.rows)
+    left = [at for at in range(1, total + 1) if at not in table.results]
+    wanted = [design for at, design in enumerate(table.designs(), start=1) if at in set(left)]
+    report(Doing(f"Starting with {len(left)} designs"))
+    begin = time.monotonic()
+    rows = sweep(case, wanted, mesh=mesh, going_on=lambda: require_going(stopped))
+    for done, row in enumerate(rows, start=1):
+        report(replace(row, design=left[row.design - 1]))
+        rest = (time.monotonic() - begin) / done * (len(left) - done)
+        words = f"{total - len(left) + done} of {total} designs, about {rest:.0f} s left"
+        report(Doing(words, done / len(left)))

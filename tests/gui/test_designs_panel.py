@@ -1,0 +1,160 @@
+"""The panel of designs: filled, run beside the window, drawn, and shown at a click."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
+
+import slideviz as sv
+from slideviz.design import sweep as sweeping
+from slideviz.gui.panels.designs import DesignsPanel
+from slideviz.gui.widgets import plot_canvas
+from slideviz.samples.table import write_sample
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def in_a_thread(monkeypatch):
+    """A thread of this process in place of others, which take seconds to start."""
+    made = staticmethod(lambda _cls, *_: ThreadPoolExecutor(1))
+    monkeypatch.setattr(sweeping, "Processes", type("Thread", (), {"__new__": made}))
+
+
+@pytest.fixture
+def passage(window, driver, tmp_path, monkeypatch):
+    monkeypatch.setattr(plot_canvas, "REST_MS", 0)
+    write_sample("passage", tmp_path, 12)
+    driver.open(tmp_path / "passage.cfg")
+    window.actions_.by_name["designs"].trigger()
+    return window.docks_.panel(DesignsPanel)
+
+
+def fill(panel, column, values):
+    panel.column.setCurrentIndex(panel.column.findData(column))
+    panel.values.setText(values)
+    QTest.mouseClick(panel.add, LEFT)
+
+
+def run(panel, qtbot):
+    QTest.mouseClick(panel.run, LEFT)
+    assert panel.runner.busy
+    qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
+
+
+def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, driver):
+    panel = passage
+    assert window.docks["designs"].isVisible()
+    fill(panel, "airfoil.rotate.angle_deg", "-6 to 0 in 3")
+    fill(panel, "STEPS", "2")
+    assert panel.model.rowCount() == 3
+    assert panel.run.text() == "Run 3 designs"
+    run(panel, qtbot)
+    assert panel.said.text().startswith("3 designs done")
+    assert set(panel.table.results) == {1, 2, 3}
+    columns = [panel.model.headerData(k, Qt.Orientation.Horizontal) for k in range(4)]
+    assert columns == ["airfoil.rotate\nangle_deg", "STEPS", "min", "mean"]
+    row = panel.table.results[3]
+    assert panel.model.index(2, 2).data() == format(row.min, ".4f")
+    # A click on the point of the second design in the plot.
+    qtbot.waitUntil(lambda: not panel.canvas.busy and bool(panel.canvas.figure.axes))
+    axes, canvas = panel.canvas.figure.axes[0], panel.canvas
+    second = panel.table.results[2]
+    x, y = axes.transData.transform((-3.0, second.min))
+    wide, high = canvas._scale
+    at = QPoint(round(x / wide), round(canvas.height() - y / high))
+    QTest.mouseClick(canvas, LEFT, Qt.KeyboardModifier.NoModifier, at)
+    driver.settle()
+    assert panel.shown == 2
+    shown = window.store.session.run_shown
+    assert shown.name == "design 2"
+    assert shown.last.quality.min == second.min
+    motions = (sv.Rotate("airfoil", -3.0), *window.store.session.case.motions[1:])
+    *_, last = sv.deform(
+        window.store.session.case.change(motions=motions, steps=2), window.store.session.mesh
+    )
+    assert np.array_equal(shown.last.mesh.points, last.mesh.points)
+    # A click on a row; and once more on the first, whose run is there already.
+    for number in (3, 2):
+        where = panel.view.visualRect(panel.model.index(number - 1, 0)).center()
+        QTest.mouseClick(panel.view.viewport(), LEFT, Qt.KeyboardModifier.NoModifier, where)
+        driver.settle()
+        assert window.store.session.run_shown.name == f"design {number}"
+    assert len(window.store.session.runs) == 2
+
+
+def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
+    panel = passage
+    fill(panel, "SLIDING_MODE", "ps, none")
+    run(panel, qtbot)
+    assert "1 failed: PERIODIC_MODE= moving needs" in panel.said.text()
+    assert [panel.model.index(k, 1).data() for k in (0, 1)][1] == "failed"
+    panel.show_design(2)
+    assert panel.said.text().startswith("Design 2: PERIODIC_MODE= moving needs")
+    assert panel.shown is None
+
+
+def test_mistakes_are_told_and_change_nothing(passage):
+    panel = passage
+    fill(panel, "STEPS", "1, many")
+    assert "whole number" in panel.said.text()
+    fill(panel, "airfoil.translate.y", "0 to 1 in")
+    assert panel.model.rowCount() == 0
+    fill(panel, "STEPS", "1, 2")
+    panel.model.setData(panel.model.index(0, 0), "x")
+    assert panel.table.rows == (("1",), ("2",))
+    panel.model.setData(panel.model.index(0, 0), "3")
+    assert panel.table.rows == (("3",), ("2",))
+
+
+def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
+    panel = passage
+    file = tmp_path / "designs.csv"
+    file.write_text("airfoil.translate.y\n0.05\n0.1\n")
+    answers("ask_table", file)
+    QTest.mouseClick(panel.load, LEFT)
+    assert panel.table.rows == (("0.05",), ("0.1",))
+    panel.view.selectRow(0)
+    QTest.mouseClick(panel.remove, LEFT)
+    assert panel.table.rows == (("0.1",),)
+    answers("ask_save", tmp_path / "out.csv")
+    QTest.mouseClick(panel.save, LEFT)
+    assert "0.1" in (tmp_path / "out.csv").read_text()
+    file.write_text("nothing\n1\n")
+    answers("ask_table", file)
+    QTest.mouseClick(panel.load, LEFT)
+    assert "no such number of a motion" in panel.said.text()
+
+
+def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread):
+    from slideviz.session import changes
+
+    panel = passage
+    fill(panel, "STEPS", "1, 2")
+    run(panel, qtbot)
+    before = dict(panel.table.results)
+    window.store.change(changes.set_case, sliding="ds")
+    assert "settings have changed" in panel.said.text()
+    run(panel, qtbot)
+    assert panel.table.results[1].seconds != before[1].seconds
+    assert panel.case.sliding == "ds"
+
+
+def test_another_mesh_has_other_designs(window, passage, driver, passage_file):
+    fill(passage, "STEPS", "1, 2")
+    driver.open(passage_file)
+    assert passage.model.rowCount() == 0
+    assert passage.column.findData("airfoil.rotate.angle_deg") < 0
+
+
+def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
+    panel = passage
+    fill(panel, "airfoil.rotate.angle_deg", "-6 to 0 in 500")
+    QTest.mouseClick(panel.run, LEFT)
+    qtbot.waitUntil(lambda: len(panel.table.results) > 1, timeout=60_000)
+    QTest.mouseClick(panel.stop, LEFT)
+    qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
+    assert panel.said.text() == "Stopped; the results stay."
+    assert 1 < len(panel.table.results) < 500

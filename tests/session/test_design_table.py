@@ -1,0 +1,114 @@
+"""The table of designs of the window: ranges, combinations, edits, files."""
+
+import csv
+
+import pytest
+
+import slideviz as sv
+from slideviz.design.sweep_row import Row
+from slideviz.errors import CaseError
+from slideviz.samples.table import sample
+from slideviz.session import design_table
+from slideviz.session.design_table import (
+    DesignTable,
+    column_choices,
+    read_table,
+    values_of,
+    write_results,
+)
+from slideviz.session.jobs import Doing
+from slideviz.session.jobs_designs import run_designs
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("-8 to 0 in 5", ["-8", "-6", "-4", "-2", "0"]),
+        ("0 to 0.3 in 4", ["0", "0.1", "0.2", "0.3"]),
+        (" 1e-3 TO 3e-3 in 3 ", ["0.001", "0.002", "0.003"]),
+        ("1, 2,5, 2", ["1", "2", "5"]),
+        ("ps, ds", ["ps", "ds"]),
+        ("7", ["7"]),
+    ],
+)
+def test_values(text, values):
+    assert values_of(text) == values
+
+
+@pytest.mark.parametrize("text", ["", "1,,2", "1 to 2 in 1", "a to b in 3", "1 to 2 in 9999999"])
+def test_no_values(text):
+    with pytest.raises(CaseError, match="as -8 to 0 in 9"):
+        values_of(text)
+
+
+def test_numbers_are_combined(monkeypatch):
+    table = DesignTable().crossed("a", ["1", "2"]).crossed("b", ["x", "y"])
+    assert table.columns == ("a", "b")
+    assert table.rows == (("1", "x"), ("1", "y"), ("2", "x"), ("2", "y"))
+    # The same number again: its new values, in place of the old ones.
+    again = table.crossed("a", ["7"])
+    assert (again.columns, again.rows) == (("b", "a"), (("x", "7"), ("y", "7")))
+    monkeypatch.setattr(design_table, "MOST", 7)
+    with pytest.raises(CaseError, match="8 designs are too many"):
+        table.crossed("c", ["1", "2"])
+
+
+def test_results_stay_with_their_designs():
+    table = DesignTable().crossed("a", ["1", "2", "3"])
+    table = table.with_results(Row(n, min=n / 10) for n in (1, 2, 3))
+    assert set(table.with_cell(1, 0, " 9 ").results) == {1, 3}
+    assert table.with_cell(1, 0, " 9 ").rows[1] == ("9",)
+    left = table.without([0])
+    assert left.rows == (("2",), ("3",))
+    assert {n: row.min for n, row in left.results.items()} == {1: 0.2, 2: 0.3}
+    assert all(row.design == n for n, row in left.results.items())
+    assert table.without([0, 1, 2]) == DesignTable()
+    assert table.without_results().results == {}
+
+
+@pytest.fixture(scope="module")
+def passage():
+    return sample("passage", 12)
+
+
+def test_choices_have_what_the_case_has(passage):
+    found = column_choices(passage.case)
+    assert found["airfoil.rotate.angle_deg"] == "-8"
+    assert found["airfoil.translate.y"] == "0.12"
+    assert found["STEPS"] == "5"
+    assert not {"MOTION", "MESH_FILENAME", "DEFORMATION_FILENAME"} & set(found)
+
+
+def test_files(passage, tmp_path):
+    file = tmp_path / "designs.csv"
+    file.write_text("airfoil.translate.y,STEPS\n0.1234567890123456,2\n-1e-9,\n")
+    table = read_table(passage.case, file)
+    assert table.rows == (("0.1234567890123456", "2"), ("-1e-09", ""))
+    table = table.with_results([Row(2, min=0.25, mean=0.5, steps=5)])
+    write_results(tmp_path / "out.csv", table)
+    with (tmp_path / "out.csv").open(newline="") as found:
+        first, second = csv.DictReader(found)
+    assert (first["min"], first["STEPS"]) == ("", "2")
+    assert (second["design"], second["min"], second["mean"]) == ("2", "0.25", "0.5")
+
+
+def test_only_what_has_no_result_is_run(passage):
+    table = DesignTable().crossed("STEPS", ["1", "2", "3"]).with_results([Row(2, min=0.5)])
+    told = []
+    run_designs(passage.case, passage.mesh, table, told.append, lambda: False)
+    rows = [one for one in told if isinstance(one, Row)]
+    assert sorted((row.design, row.steps) for row in rows) == [(1, 1), (3, 3)]
+    news = [one for one in told if isinstance(one, Doing)]
+    assert news[-1].fraction == 1.0
+    assert "3 of 3 designs" in news[-1].text
+
+
+def test_it_can_be_stopped(passage):
+    with pytest.raises(sv.SlidevizError, match="stopped"):
+        run_designs(
+            passage.case,
+            passage.mesh,
+            DesignTable().crossed("STEPS", ["1"]),
+            lambda _: None,
+            lambda: True,
+        )
