@@ -148,7 +148,12 @@ def mesh_words(mesh: Mesh) -> tuple[str, str]:
     halo = "" if mesh.halo is None else f"  (halo: {int(mesh.halo.cells.sum()):,})"
     about = "" if mesh.halo is None else f"With {mesh.halo.describe()}.\n"
     size, ends = box_words(mesh)
-    count = f"{len(mesh.cells):,} cells{halo}   {len(mesh.points):,} points"
+    part = mesh.part
+    cells, points = (part.n_cells, part.n_points) if part else (len(mesh.cells), len(mesh.points))
+    count = f"{cells:,} cells{halo}   {points:,} points"
+    if part is not None:
+        count += "   boundary and sections only"
+        about += f"In memory: {len(mesh.cells):,} cells at the boundary; the rest is in its file.\n"
     return f"{mesh.dim}D   {count}   {size}", about + ends
 
 

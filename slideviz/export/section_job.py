@@ -69,6 +69,10 @@ def save_section(
     """
     if session.frame is None:
         raise CaseError("no mesh is open, so there is no section to draw")
+    if session.in_file:
+        raise CaseError(
+            f"{session.frame.mesh.name} stays in its file; `slideviz section` draws its sections"
+        )
     require_picture_name(path)
     report(Doing(f"Cutting for {path.name}"))
     views = shown_views(session)

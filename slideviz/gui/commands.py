@@ -25,6 +25,7 @@ from slideviz.gui.widgets.command import (
     stepped,
     stepped_and_idle,
     valued,
+    whole,
     why_not,
 )
 from slideviz.gui.widgets.icons import STROKES
@@ -100,15 +101,17 @@ _EXPORT = Menu("export", "&Export", "Take away pictures, films, tables and meshe
             lambda window: window.exports.copy_picture(), ("Ctrl+Shift+C",), enabled=opened),
     Command("export_film", "&Film of the steps…", "Make a film of the steps.",
             lambda window: window.exports.make_film(),
-            enabled=stepped, tip_now=why_not(stepped, _NO_STEPS)),
+            enabled=whole(stepped), tip_now=why_not(whole(stepped), _NO_STEPS)),
     Command("export_quality", "&Quality as CSV…",
             "Save the quality of every cell of the step that is shown as a CSV table.",
             lambda window: window.exports.quality(),
-            enabled=idle, tip_now=why_not(idle, "There is no mesh yet: open one first.")),
+            enabled=whole(idle),
+            tip_now=why_not(whole(idle), "There is no mesh yet: open one first.")),
     Command("export_steps", "&Meshes of all steps…",
             "Save the mesh of every step: each in a file of its own, or all in one .vtkhdf file.",
             lambda window: window.exports.steps(),
-            enabled=stepped_and_idle, tip_now=why_not(stepped_and_idle, _NO_STEPS)),
+            enabled=whole(stepped_and_idle),
+            tip_now=why_not(whole(stepped_and_idle), _NO_STEPS)),
 ), tooltips=True)
 
 _FILE = Menu("file", "&File", entries=(
@@ -121,7 +124,8 @@ _FILE = Menu("file", "&File", entries=(
     ), fill=_fill_samples),
     None,
     Command("save_mesh", "&Save mesh as…", "Save the mesh of the step that is shown.",
-            lambda window: window.files.save_mesh(), (KEY.Save,), "save", idle),
+            lambda window: window.files.save_mesh(), (KEY.Save,), "save", whole(idle),
+            tip_now=why_not(whole(idle), "There is no mesh yet: open one first.")),
     Command("save_case", "Save &case as…",
             "Save roles, motions, method and view as a case that gives the same result again.",
             lambda window: window.files.save_case(), ("Ctrl+Shift+S",), "case", opened),

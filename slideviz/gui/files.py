@@ -205,6 +205,20 @@ class Files(QObject):
             overwrite,
         )
 
+    def ask_output(self) -> Path | None:
+        """Ask where the deformed mesh goes of one that stays in its file, which no run changes."""
+        session = self.window.store.session
+        default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"
+        path = questions.ask_save(
+            self.window, "Deformed mesh", default, "SU2 binary meshes (*.su2b)"
+        )
+        if path is None or not _same(path, session.path):
+            return path
+        self.window.banner.tell_error(
+            SlidevizError(f"{path} is the mesh itself, which is read meanwhile; give another name")
+        )
+        return None
+
     def _mesh_saved(self, path: Path, last: bool) -> None:
         if last:
             self._saved_to = path

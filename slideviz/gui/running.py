@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from qtpy.QtCore import QObject, Signal
@@ -15,6 +16,7 @@ from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
 from slideviz.session import changes, jobs
 from slideviz.session.jobs import Doing
+from slideviz.session.jobs_large import compute_in_file
 from slideviz.session.run_messages import (
     help_for,
     in_window_words,
@@ -82,10 +84,10 @@ class Running(QObject):
         self.began.emit(text)
         self.said.emit(text)
 
-    def start_run(self) -> None:
-        """Deform the mesh with the settings there are."""
+    def start_run(self, output: Path | None = None) -> None:
+        """Deform the mesh with the settings there are; one in its file into another, ``output``."""
         if not self.runner.busy and not changes.run_requirements(self.store.session):
-            self._start_run(self.store.session.case)
+            self._start_run(self.store.session.case, output=output)
 
     def show_design(self, case: Case, name: str) -> None:
         """Show the run of a design; it is deformed first, unless that was done already."""
@@ -97,7 +99,7 @@ class Running(QObject):
         if not self.runner.busy:
             self._start_run(case, name)
 
-    def _start_run(self, case: Case, name: str = "") -> None:
+    def _start_run(self, case: Case, name: str = "", output: Path | None = None) -> None:
         self.banner.hide()
         self.store.change(changes.start_run, case, name)
         session = self.store.session
@@ -106,6 +108,11 @@ class Running(QObject):
         steps = case.steps or "automatic"
         log.info("run: sliding %s, periodic %s, %s steps", case.sliding, case.periodic, steps)
         self._deforms = True
+        if session.in_file:
+            assert output is not None
+            own = self._run_done, compute_in_file, case, session.first, output
+            self.start_job("Starting", *own)
+            return
         self.start_job("Starting", self._run_done, jobs.compute, case, session.mesh)
 
     def cancel(self) -> None:
@@ -168,6 +175,9 @@ class Running(QObject):
         if run.last is None:
             return
         quality = run.last.quality
+        file = run.last.file
+        if file is not None:
+            self.store.change(changes.saved_mesh)
         text = (
             f"{_steps_text(run.last)}min {quality.min:.4f}, mean {quality.mean:.4f}, "
             f"{quality.inverted} inverted"
@@ -177,6 +187,9 @@ class Running(QObject):
         bad = inverted_words(run)
         if bad:
             warnings.insert(0, f"{bad}. {help_for(run.case)}")
+        if file is not None:
+            warnings.insert(0, f"The deformed mesh is in {file}.")
+            log.info("the deformed mesh is in %s", file)
         if warnings:
             self.banner.tell("\n".join(warnings), calm=not bad)
         self.said.emit(f"Done: {text}")

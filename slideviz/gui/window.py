@@ -33,6 +33,7 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.recovery import SessionRecovery
 from slideviz.gui.responsiveness.warmup_thread import WarmupThread
 from slideviz.gui.running import Running
+from slideviz.gui.section_reader import SectionReader
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.player import Player
@@ -110,6 +111,9 @@ class MainWindow(Services):
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
         self.intersection_check = IntersectionCheck(self.store, self)
+        self.section_reader = SectionReader(self.store, self)
+        self.section_reader.found.connect(self.section_views.redraw)
+        self.section_reader.said.connect(self.say)
         self.warmup = WarmupThread(self)
         self.warmup.compiling.connect(self.preparing.setVisible)
         self._keep_session(kept)
@@ -247,7 +251,9 @@ class MainWindow(Services):
         remarks = () if session.mesh is None else session.mesh.remarks
         for remark in remarks:
             log.warning("%s", remark)
-        note = "".join(f". {text}" for text in remarks)
+        if session.in_file:
+            self.banner.tell("\n".join(remarks))
+        note = "" if session.in_file else "".join(f". {text}" for text in remarks)
         self.say(f"Opened {(session.case.source or session.path).name}{note}")
 
     # Jobs ------------------------------------------------------------------------------
@@ -264,7 +270,14 @@ class MainWindow(Services):
 
     def start_run(self) -> None:
         """Deform the mesh with the settings there are."""
-        self.running.start_run()
+        session = self.store.session
+        if not session.in_file or self.runner.busy or changes.run_requirements(session):
+            self.running.start_run()
+            return
+        # The deformed mesh is made in a file, as it would not be in memory.
+        output = self.files.ask_output()
+        if output is not None:
+            self.running.start_run(output)
 
     def show_design(self, case: Case, name: str) -> None:
         """Show the run of a design; it is deformed first, unless that was done already."""
@@ -341,6 +354,7 @@ class MainWindow(Services):
             self.docks_.panel(DesignsPanel).end()
             self.warmup.close()
             self.intersection_check.close()
+            self.section_reader.close()
             self.left_behind = not self.running.close()
             if self.autosave is not None:
                 self.autosave.close()

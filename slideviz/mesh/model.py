@@ -268,6 +268,10 @@ class Mesh:
         """Return the number that a node has for people: that in its file."""
         return node if self.part is None else int(self.part.points[node])
 
+    def cell_number(self, cell: int) -> int:
+        """Return the number that a cell has for people: that in its file."""
+        return cell if self.part is None else int(self.part.cells[cell])
+
     def with_points(self, points: ArrayLike) -> Mesh:
         """Return the same mesh at other points, (n, d)."""
         moved = np.asarray(points, np.float64)

@@ -15,6 +15,7 @@ from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
 from slideviz.session.state import Frame, Run, Session
+from slideviz.session.whole import FINE, PartQuality
 from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
 
 if TYPE_CHECKING:
@@ -132,8 +133,11 @@ def first_value(axes: Axes) -> float:
 
 
 def shown_measure(session: Session) -> Quantity:
-    """Return the quantity that the histogram counts: that of the colours, or size-skew."""
-    return quantity_of(session.view.colour_by)
+    """Return the quantity that the histogram counts: that of the colours, or size-skew.
+
+    Of a mesh in its file only size-skew is known of all cells.
+    """
+    return quantity_of("size-skew" if session.in_file else session.view.colour_by)
 
 
 def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
@@ -146,6 +150,7 @@ def _colours(session: Session, shown: Distribution) -> list[tuple[float, ...]]:
     return [tuple(rgba) for rgba in mpl.colormaps[session.view.colour_map](part)]
 
 
+_MIDDLES = (np.arange(FINE) + 0.5) / FINE
 BINS = 25
 """So many that a step of an outline is wide enough for its dashes in a panel of the window."""
 
@@ -158,6 +163,11 @@ def distribution(
 ) -> Distribution:
     """Return the counts of the cells of a frame in `BINS` equal intervals between limits."""
     edges = np.linspace(*limits, BINS + 1)
+    if isinstance(frame.quality, PartQuality):
+        tally = frame.quality.all
+        places = np.clip(np.searchsorted(edges, _MIDDLES, "right") - 1, 0, BINS - 1)
+        counts = np.bincount(places, tally.counts, BINS).astype(np.int64)
+        return Distribution(counts, edges, tally.inverted)
     return Distribution.of(_values(frame, what, undeformed), edges)
 
 
@@ -165,6 +175,9 @@ def spread(
     frame: Frame, what: ColourBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
+    if isinstance(frame.quality, PartQuality):
+        there = _MIDDLES[np.flatnonzero(frame.quality.all.counts)]
+        return (float(there[0]), float(there[-1])) if len(there) else None
     values = _values(frame, what, undeformed)
     right = values[np.isfinite(values)]
     return (float(right.min()), float(right.max())) if len(right) else None

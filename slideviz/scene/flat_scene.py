@@ -21,12 +21,14 @@ from slideviz.sections.polygons import Polygons
 from slideviz.sections.shape import Label
 from slideviz.sections.threshold import CellsInRange
 from slideviz.session.passages import keeps, moved
-from slideviz.session.section_cuts import Cuts
+from slideviz.session.section_cuts import Cuts, cut_frame, is_awaited
 from slideviz.session.state import Session
 from slideviz.terms import quantity_of
 
 FILL = 0.94
 """How much of the height or width a section takes."""
+
+READING = "its cells are being read from the file of the mesh"
 
 
 class FlatScene:
@@ -82,12 +84,13 @@ class FlatScene:
         self.stage.set_colours(session)
         by_value = session.view.colour_by != "role"
         cut, only = self.cuts.of(session.frame.mesh, section), self.stage.in_threshold(session)
-        key = (cut, only, section, session.frame if by_value else None)
+        frame = cut_frame(session.frame, section)
+        key = (cut, only, section, frame if by_value else None)
         if key != self._made_of:
             self._made_of = key
             self._place(cut, only, section, session)
         cells = self._shown.polygons.cells
-        self._shown.colour(self.stage.values_of(session, cells) if by_value else None)
+        self._shown.colour(self.stage.values_of(session, cells, frame) if by_value else None)
         self._style(section)
         self._draw_neighbours(section)
         self._draw_mark()
@@ -109,7 +112,8 @@ class FlatScene:
             flat = only.among(flat)
         if not section.whole and len(flat):
             # Nothing is in front of another, but folded cells overlap: they are drawn last.
-            folded = session.frame.quality.status[flat.cells] == INVERTED
+            status = cut_frame(session.frame, section).quality.status
+            folded = status[flat.cells] == INVERTED
             flat = flat.take(np.argsort(folded, kind="stable")) if folded.any() else flat
             flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
         self.polygons = flat
@@ -154,7 +158,8 @@ class FlatScene:
     def _draw_mark(self) -> None:
         """Draw the edges of the marked cell, if the section shows it."""
         assert self.polygons is not None
-        mine = np.flatnonzero(self.polygons.cells == self.session.view.marked)
+        marked = None if self.session.in_file else self.session.view.marked
+        mine = np.flatnonzero(self.polygons.cells == marked)
         self._mark.show(self.polygons.take(mine))
 
     # Facts --------------------------------------------------------------------------------
@@ -166,13 +171,20 @@ class FlatScene:
         While a range chooses cells, these are those of the cells that it leaves.
         """
         if self.polygons is None or self._all is None or not len(self._all):
-            return "it cuts no cell"
+            awaited = (
+                self.session.frame is not None
+                and self.section is not None
+                and is_awaited(self.session.frame.mesh, self.section)
+            )
+            return READING if awaited else "it cuts no cell"
         only = self.stage.in_threshold(self.session)
         cells, every = self.polygons.cell_ids, len(self._all.cell_ids)
         if only is not None and not len(cells):
             return f"none of {every:,} cells cut is shown: {only.words}"
         frame, mesh = self.session.frame, self.session.mesh
         assert frame is not None
+        assert self.section is not None
+        frame = cut_frame(frame, self.section)
         what = quantity_of(self.session.view.colour_by)
         paint = Paint(
             what,
@@ -184,7 +196,7 @@ class FlatScene:
 
     def pick_cell(self, x: float, y: float) -> int | None:
         """Return the cell at a pixel counted from the lower left, or None."""
-        if self.polygons is None or not len(self.polygons):
+        if self.polygons is None or not len(self.polygons) or self.session.in_file:
             return None
         shown = [self._shown.actor, *self._instances.drawn.values()]
         cells = self.polygons.cells

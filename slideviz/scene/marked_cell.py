@@ -48,19 +48,20 @@ class MarkLayer(Layer):
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""
         cell, frame = new.view.marked, new.frame
-        if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
+        if cell is None or frame is None or not frame.has(cell):
             for name in self._drawn:
                 self.stage.remove(name)
             self.clear()
             return
+        own, at = frame.place_of(cell)
         if cell != self.cell:
-            self._add(frame.mesh, cell)
+            self._add(own.mesh, at)
         if cell != self.cell or old is None or old.frame is not new.frame:
-            self._place(frame.mesh, cell)
+            self._place(own.mesh, at)
         self.cell = cell
         if FACES in self._drawn:
             shape = self._shapes[FACES]
-            value = self.stage.values_of(new, np.array([cell]))[0]
+            value = self.stage.value_of(new, cell)
             shape.cell_data[VALUES] = np.full(shape.n_cells, value)
             self._drawn[FACES].mapper.scalar_visibility = True
 

@@ -263,6 +263,9 @@ class Scene:
                 rank = np.where(only.mask, rank, np.nan)
             at = pick.on_plane(self.plotter, x, y)
             return cell_at(session.frame.mesh, *at, rank)
+        if self.sections.from_file:
+            # Their cells have no place among those in memory, and boundaries are glass.
+            return None
         # Boundaries in front of a section are glass.
         cut = pick.front_cell(self.plotter, x, y, self.sections.pickable())
         return pick.front_cell(self.plotter, x, y, self._pickable()) if cut is None else cut
@@ -282,9 +285,11 @@ class Scene:
 
     def fly_to(self, cell: int) -> None:
         """Aim at a cell of the frame that is shown, from the present side and near."""
-        mesh = self.session.frame.mesh if self.session.frame is not None else None
-        if mesh is None or not 0 <= cell < len(mesh.cells):
+        frame = self.session.frame
+        if frame is None or not frame.has(cell):
             return
-        middle, size = surroundings(mesh, cell)
+        own, at = frame.place_of(cell)
+        middle, size = surroundings(own.mesh, at)
+        mesh = frame.mesh
         depth = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
         self.camera.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)

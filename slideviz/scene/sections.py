@@ -18,8 +18,8 @@ from slideviz.sections.line import Box, box_around, trace
 from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, moved
-from slideviz.session.section_cuts import Cuts, can_cut
-from slideviz.session.state import Session
+from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
+from slideviz.session.state import Frame, Session
 
 NAME, BAND, RIM = "section:", "band:", "rim:"
 """What names of actors begin with: of what a section shows, and of what is below it in 2D."""
@@ -36,6 +36,8 @@ class SectionDrawn:
 
     shown: PolygonActor
     made_of: tuple[object, ...] = ()
+    frame: Frame | None = None
+    of: Mesh | None = None
 
     @property
     def polygons(self) -> Polygons:
@@ -82,6 +84,13 @@ class SectionLayer(Layer):
             for name, one in self.drawn.items()
             if name.startswith(NAME) and name.count(":") == 1 and len(one.polygons)
         ]
+
+    @property
+    def from_file(self) -> bool:
+        """Tell whether cells of sections are none of those of the mesh in memory."""
+        return any(
+            one.frame is not None and one.frame.base is not None for one in self.drawn.values()
+        )
 
     def actors(self) -> list[Any]:
         """Return the actors of all sections, of neighbouring passages too."""
@@ -145,7 +154,7 @@ class SectionLayer(Layer):
             for kind, wanted in _kinds(section, session).items():
                 found[f"{kind}{index}"] = wanted, 0, None
                 for number, matrix in neighbours.items():
-                    if not keeps(section, matrix):
+                    if not keeps(section, matrix) and not session.in_file:
                         found[f"{kind}{index}:{number}"] = wanted, number, matrix
         return found
 
@@ -162,18 +171,21 @@ class SectionLayer(Layer):
         assert frame is not None
         # The view's way to find the period may change with the case, and so the matrix.
         only = self.stage.in_threshold(session)
-        key = (frame.mesh, section, number, None if matrix is None else matrix.tobytes(), only)
+        cut = cut_frame(frame, section)
+        key = (cut, section, number, None if matrix is None else matrix.tobytes(), only)
         one = self.drawn.get(name)
+        if one is not None and one.of is frame.mesh and is_awaited(frame.mesh, section):
+            return  # until its cells are read, what was there stays
         if one is None:
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
             polygons = self.cuts.of(frame.mesh, section, matrix, only)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
-            one.made_of, again = key, True
+            one.made_of, one.frame, one.of, again = key, cut, frame.mesh, True
         if not by_value:
             one.shown.colour(None)
         elif again:
-            one.shown.colour(self.stage.values_of(session, one.polygons.cells))
+            one.shown.colour(self.stage.values_of(session, one.polygons.cells, cut))
         self._style(kind, one.shown, section, session)
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:

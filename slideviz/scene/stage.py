@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
 from slideviz.sections.threshold import CellsInRange
-from slideviz.session.state import Session
+from slideviz.session.state import Frame, Session
 
 
 class Layer:
@@ -120,13 +122,23 @@ class Stage:
             self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
 
-    def values_of(self, session: Session, cells: IntArray) -> FloatArray:
-        """Return the values of some cells (k,) only, (k,): what nobody sees is not computed."""
-        frame, what = session.frame, session.view.colour_by
+    def values_of(self, session: Session, cells: IntArray, of: Frame | None = None) -> FloatArray:
+        """Return the values of some cells (k,) only, (k,): what nobody sees is not computed.
+
+        ``of`` is the frame that has them, if it is not the one that is shown.
+        """
+        frame, what = of or session.frame, session.view.colour_by
         assert frame is not None
         if self._values is not None and self._values[0] == (frame, what):
             return self._values[1][cells]
         return frame.shown_values(what, session.mesh, cells)
+
+    def value_of(self, session: Session, cell: int) -> float:
+        """Return the value of one cell, also of a worst one that is not among those drawn."""
+        assert session.frame is not None
+        frame, at = session.frame.place_of(cell)
+        what = session.view.colour_by
+        return float(frame.shown_values(what, session.mesh, np.array([at]))[0])
 
     def in_threshold(self, session: Session) -> CellsInRange | None:
         """Return the cells within the threshold of the view, None where there is no threshold."""

@@ -174,6 +174,14 @@ class Cutter:
         )
 
 
+def sides_of(cells: Cells, level: FloatArray) -> np.ndarray:
+    """Tell which cells have a negative node and one that is not, (m,); ``level`` (n,) of nodes."""
+    found, negative = np.zeros(len(cells), bool), level < 0
+    for ids, nodes in cells.by_type.values():
+        found[ids] = _patterns(nodes, negative) > 0
+    return found
+
+
 def _patterns(nodes: IntArray, negative: np.ndarray) -> np.ndarray:
     """Return which nodes of each cell (m, k) are negative, a bit each (m,); 0 where all are."""
     found = np.empty(len(nodes), np.uint8)

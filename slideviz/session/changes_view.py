@@ -53,6 +53,8 @@ def set_view(session: Session, **values: Any) -> Session:
     if "sections" in values:
         chosen = followed(old.chosen, old.sections, values["sections"])
         values.setdefault("chosen", chosen)
+    if session.in_file:
+        values.pop("threshold", None)  # it would choose among all cells
     drawn = {name: values.pop(name) for name in SHOWN if name in values}
     return replace(session, view=replace(old.with_drawn(drawn), **values))
 

@@ -17,7 +17,7 @@ from slideviz.errors import SlidevizError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.quality import INVERTED, corner_jacobians
+from slideviz.mesh.quality import INVERTED, corner_jacobians, quality
 from slideviz.mesh.surfaces import padded
 from slideviz.session.state import Frame
 from slideviz.terms import CELL_STATES, CellState, ColourBy
@@ -74,6 +74,8 @@ class WorstCells:
         Their element types.
     measure : str
         What ``values`` are.
+    numbers : (k,) int64 or None
+        The numbers of the cells in the file, where those in memory are others.
     """
 
     cells: IntArray
@@ -83,6 +85,12 @@ class WorstCells:
     steps: IntArray
     kinds: tuple[str, ...]
     measure: ColourBy
+    numbers: IntArray | None = None
+
+    @property
+    def known_as(self) -> IntArray:
+        """Return the numbers that the cells have for people, (k,)."""
+        return self.cells if self.numbers is None else self.numbers
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -100,6 +108,8 @@ def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = W
     with the number of cells of all frames together. Ties are in the order of the numbers.
     """
     frame, what = frames[at], measure(what)
+    if frame.extra is not None:
+        return _listed(frame, frame.extra, at, count)
     values = frame.values(what)
     count = min(count, frame.quality.cells)
     limit = np.partition(values[frame.quality.counted], count - 1)[count - 1]
@@ -117,6 +127,29 @@ def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = W
         history.argmin(axis=0),
         tuple(ELEMENTS[int(vtk)].name for vtk in types),
         what,
+    )
+
+
+def _listed(frame: Frame, extra: Frame, at: int, count: int) -> WorstCells:
+    """Return the worst cells of a mesh of which only the boundary is in memory, by size-skew."""
+    assert extra.mesh.part is not None
+    assert extra.base is not None
+    assert frame.mesh.part is not None
+    cells = np.arange(min(count, len(extra.mesh.cells)))
+    numbers, own = extra.mesh.part.cells[cells], frame.mesh.part.cells
+    at_own = np.minimum(np.searchsorted(own, numbers), len(own) - 1)
+    drawn = own[at_own] == numbers  # those at the boundary are drawn as parts of it
+    before = quality(extra.base, metric=extra.quality.metric).values[cells]
+    values = extra.quality.values[cells]
+    return WorstCells(
+        np.where(drawn, at_own, len(frame.mesh.cells) + cells),
+        values,
+        extra.quality.status[cells] == INVERTED,
+        middles(extra.mesh, cells),
+        np.where(before <= values, 0, at),
+        tuple(ELEMENTS[int(vtk)].name for vtk in extra.mesh.cells.types[cells]),
+        "size-skew",
+        numbers,
     )
 
 
@@ -145,18 +178,19 @@ def cell_info(frame: Frame, cell: int) -> CellInfo:
     MeshError
         There is no such cell.
     """
-    mesh, quality = frame.mesh, frame.quality
-    sign = int(quality.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
+    frame, cell = frame.place_of(cell)
+    mesh, found = frame.mesh, frame.quality
+    sign = int(found.signs[cell]) if 0 <= cell < len(mesh.cells) else 1
     jacobians = corner_jacobians(mesh, cell, sign)
-    status = quality.status[cell]
+    status = found.status[cell]
     return CellInfo(
-        cell,
+        mesh.cell_number(cell),
         ELEMENTS[int(mesh.cells.types[cell])].name
-        + (" of the halo" if quality.halo is not None and quality.halo[cell] else ""),
+        + (" of the halo" if found.halo is not None and found.halo[cell] else ""),
         CELL_STATES[status],
-        float(quality.values[cell]),
-        float(quality.size[cell]),
-        float(quality.skew[cell]),
+        float(found.values[cell]),
+        float(found.size[cell]),
+        float(found.skew[cell]),
         jacobians,
         mesh.points[nodes_of(mesh, cell)].mean(axis=0),
     )
@@ -196,7 +230,7 @@ def table_rows(worst: WorstCells, header: bool = True) -> list[list[str]]:
     names = "xyz"[: worst.positions.shape[1]]
     measured = worst.measure.replace("-", "_")
     rows = [["cell", "type", measured, "inverted", *names, "worst_at_step"]] if header else []
-    for at, cell in enumerate(worst.cells):
+    for at, cell in enumerate(worst.known_as):
         numbers = (worst.values[at], *worst.positions[at])
         texts = [repr(float(number)) for number in numbers]
         state = "yes" if worst.inverted[at] else "no"

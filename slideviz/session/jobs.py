@@ -22,6 +22,7 @@ from slideviz.mesh.surfaces import Surface, find_surfaces
 from slideviz.session.changes import open_mesh
 from slideviz.session.formats import holds_quality
 from slideviz.session.keep import Camera, kept_camera
+from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.state import Frame, Session
 
@@ -88,6 +89,8 @@ def open_file(path: Path, zone: int | None, report: Report, stopped: Stopped) ->
         report(Doing(f"Reading {mesh_path.name}", fraction))
 
     kind = case.mesh_format if case is not None else None
+    if kind != "su2" and is_large(mesh_path, zone):
+        return prepare(read_boundary(mesh_path, zone, reading), mesh_path, case, report, stopped)
     mesh = read(mesh_path, zone=zone, progress=reading, file_format=kind)
     return prepare(mesh, mesh_path, case, report, stopped)
 
@@ -108,7 +111,15 @@ def prepare(
     pairs = find_pairs(mesh, going_on=going_on) if mesh.markers else ()
     report(Doing("Measuring the cells"))
     metric = case.quality_metric if case is not None else "knupp"
-    first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
+
+    def measuring(fraction: float) -> None:
+        going_on()
+        report(Doing("Measuring the cells", fraction))
+
+    if mesh.part is None:
+        first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
+    else:
+        first = first_frame(mesh, metric, measuring)
     going_on()
     _look_ahead(first)
     session = open_mesh(first, path, pairs, case)

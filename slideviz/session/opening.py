@@ -30,6 +30,8 @@ def open_mesh(
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
     view = kept_view(chosen, ViewState(), mesh.marker_names)
     flat = flat_one(view.sections)
+    if mesh.part is not None:
+        view = replace(view, threshold=None)  # it would choose among all cells
     view = replace(view, chosen=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})

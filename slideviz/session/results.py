@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -24,11 +25,39 @@ LABEL = 20
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The mesh after a step, with its quality; the first frame is the undeformed mesh."""
+    """The mesh after a step, with its quality; the first frame is the undeformed mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Of one that is larger than memory, its boundary (see `slideviz.mesh.skin`).
+    quality : Quality
+    step : Step or None
+    extra : Frame or None
+        The worst cells of a mesh of which only the boundary is in memory, worst first. Where one
+        cell is meant, they are counted on after those of the boundary (see `place_of`).
+    base : Mesh or None
+        The undeformed mesh of this frame, where it is not that of the session.
+    file : Path or None
+        Where the whole mesh is, if only the boundary is in memory.
+    """
 
     mesh: Mesh
     quality: Quality
     step: Step | None = None
+    extra: Frame | None = None
+    base: Mesh | None = None
+    file: Path | None = None
+
+    def has(self, cell: int | None) -> bool:
+        """Tell whether there is a cell of that number in memory."""
+        more = 0 if self.extra is None else len(self.extra.mesh.cells)
+        return cell is not None and 0 <= cell < len(self.mesh.cells) + more
+
+    def place_of(self, cell: int) -> tuple[Frame, int]:
+        """Return the frame that has a cell, this one or `extra`, and its number there."""
+        own = len(self.mesh.cells)
+        return (self, cell) if self.extra is None or cell < own else (self.extra, cell - own)
 
     def values(
         self, what: ColourBy, undeformed: Mesh | None = None, cells: IntArray | None = None
@@ -39,7 +68,7 @@ class Frame:
         where they are in ``undeformed``, in the mesh's length unit.
         """
         if what == "displacement":
-            return cell_displacement(self.mesh, undeformed or self.mesh, cells)
+            return cell_displacement(self.mesh, self.base or undeformed or self.mesh, cells)
         names = {"size": self.quality.size, "skew": self.quality.skew}
         every = names.get(what, self.quality.values)
         return every if cells is None else every[cells]

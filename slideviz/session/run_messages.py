@@ -130,6 +130,9 @@ def run_requirements(session: Session) -> tuple[Requirement, ...]:
     if case.periodic == "moving" and case.sliding == "none":
         text = "Moving periodic vertices need sliding: choose pseudo or direct."
         found.append(Requirement(text, "method"))
+    if session.in_file and case.method == "elastic":
+        text = "Linear elasticity needs all of a mesh in memory, and this one stays in its file."
+        found.append(Requirement(f"{text} Choose another method.", "method"))
     if not found:
         found = [Requirement(text, "boundaries") for text in _problems(session)]
     if not found and session.intersection:

@@ -113,6 +113,12 @@ __all__ = [
 ]
 
 
+IN_FILE = (
+    "Not for this mesh, which stays in its file: in memory are only its boundary, its worst cells "
+    "and those of sections."
+)
+"""Why something cannot be done with a large mesh."""
+
 Place = Literal["open", "boundaries", "motion", "method"]
 """Where something is put right before a run: a panel, or the choice of a file."""
 
@@ -174,6 +180,11 @@ class Session:
     invalid: tuple[tuple[Place, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0
+
+    @property
+    def in_file(self) -> bool:
+        """Tell whether only the boundary of the mesh is in memory, and its cells in their file."""
+        return self.mesh is not None and self.mesh.part is not None
 
     def inputs(self) -> dict[Path, str]:
         """Return the files that the session was read from, and their roles in words."""

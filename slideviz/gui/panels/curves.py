@@ -28,7 +28,7 @@ from slideviz.plots.spanwise import Profile, spanwise
 from slideviz.plots.style import Style, add_legend
 from slideviz.plots.ticks import rounded_out
 from slideviz.session import changes
-from slideviz.session.state import Session
+from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 
 KINDS = {
@@ -126,6 +126,8 @@ class CurvesPanel(Panel):
         """Return why there is no such plot, or an empty text."""
         if session.mesh is None:
             return "Open a mesh first: here are the curves of its runs."
+        if kind == "span" and session.in_file:
+            return IN_FILE
         if kind == "steps" and not curves.step_runs(session):
             return "Run the case to see minimum and mean quality of each step."
         if kind == "greedy" and curves.greedy_run(session) is None:

@@ -24,7 +24,7 @@ from slideviz.scene.passages import Period
 from slideviz.session import changes
 from slideviz.session.colors import usual_range
 from slideviz.session.passages import passages_around
-from slideviz.session.state import Session
+from slideviz.session.state import IN_FILE, Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY, COLOUR_MAPS, POINTS_SHOWN, SHOWN, Shown, labels
 
@@ -39,6 +39,8 @@ NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbour
 
 MOST_COPIES = 9
 """Neighbours on each side that can be chosen where a row has no end."""
+
+ONLY = "Draw only the cells whose value is within these two numbers."
 
 
 class Copies(NumberBox):
@@ -154,8 +156,7 @@ class DisplayPanel(Panel):
         self.form.addRow("Range", in_row(*parts, wide=[self.range], spacing=3))
 
     def _make_threshold(self) -> None:
-        tip = "Draw only the cells whose value is within these two numbers."
-        self.only = check_box("Only cells", tip, self._only, "only")
+        self.only = check_box("Only cells", ONLY, self._only, "only")
         self.threshold = Span("threshold", lambda values: self._set(threshold=values))
         self.form.addRow(self.only, self.threshold)
 
@@ -228,6 +229,9 @@ class DisplayPanel(Panel):
         on = view.threshold is not None
         self.threshold.set_tip(low_high if on else "Switch on “Only cells” to choose a range.")
         self.only.setChecked(view.threshold is not None)
+        if session.in_file:
+            self.only.setEnabled(False)
+        self.only.setToolTip(wrapped(IN_FILE if session.in_file else ONLY))
         self.threshold.setEnabled(view.threshold is not None)
         self.threshold.show_values(view.threshold or _worse_half(session))
         self.points.show_value(view.points)

@@ -28,11 +28,13 @@ from slideviz.plots.session_histogram import (
 )
 from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import IN_FILE, Frame, Session
 from slideviz.session.store import Store
 
 END_PX = 6
 """A press so near to an end of the range moves that end."""
+
+BRUSH = "Drag over values to show only the cells that have them; click to end it."
 
 Range = tuple[float, float]
 
@@ -57,7 +59,8 @@ class BrushCanvas(PlotCanvas):
         self._held: float | None = None
         self._moved = False
         self.setCursor(Qt.CursorShape.CrossCursor)
-        self.setToolTip("Drag over values to show only the cells that have them; click to end it.")
+        self.setToolTip(BRUSH)
+        self.locked = False
 
     def value_at(self, x_px: float) -> float:
         """Return the value under a position of the mouse, within the axis."""
@@ -74,7 +77,7 @@ class BrushCanvas(PlotCanvas):
             self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes:
+        if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes or self.locked:
             return
         x = event.position().x()
         self._held, self._moved = self.value_at(x), False
@@ -187,6 +190,8 @@ class HistogramPanel(Panel):
             self.range_text.hide()
             self.area.say("Open a mesh first: here is how many of its cells have which quality.")
             return
+        self.canvas.locked = session.in_file
+        self.canvas.setToolTip(IN_FILE if session.in_file else BRUSH)
         self.area.plot()
         if is_seen(self):
             self._sync_words(session)
@@ -199,16 +204,19 @@ class HistogramPanel(Panel):
         self._described = session.frame
         what = shown_measure(session)
         counted = session.frame.quality.counted
+        found = session.frame.quality
         plain = session.frame.values(what, session.mesh)[counted]
-        bad = session.frame.quality.inverted
+        bad = found.inverted
         low = "highest" if what == "displacement" else "min"
+        mean = found.mean if what == "size-skew" else plain.mean()
         # Of a node: the values of cells are means of theirs.
         far = what == "displacement"
-        ends = session.frame.furthest(session.mesh) if far else plain.min()
+        least = found.min if what == "size-skew" else plain.min()
+        ends = session.frame.furthest(session.mesh) if far else least
         form = ".4g" if what == "displacement" else ".4f"
         red = f" style='color:{alarm()}'" if bad else ""
         self.numbers.setText(
-            f"{low} <b>{ends:{form}}</b>&nbsp; mean <b>{plain.mean():{form}}</b>&nbsp; "
+            f"{low} <b>{ends:{form}}</b>&nbsp; mean <b>{mean:{form}}</b>&nbsp; "
             f"<span{red}>inverted <b>{bad:,}</b></span>"
         )
         threshold = session.view.threshold

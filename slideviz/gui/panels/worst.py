@@ -152,7 +152,7 @@ class WorstPanel(Panel):
                 self.table.setCurrentIndex(QModelIndex())
         self._marked = cell
         frame = session.frame
-        cell = cell if frame and cell is not None and 0 <= cell < len(frame.mesh.cells) else None
+        cell = cell if frame is not None and frame.has(cell) else None
         self.info.setVisible(cell is not None)
         if cell is not None:
             self.info.setText(info_text(session, cell))
@@ -219,7 +219,7 @@ def info_text(session: Session, cell: int, every: bool = False) -> str:
     around = axis_of(session)
     parts = f"size {info.size:.4f}&nbsp; skew {info.skew:.4f}"
     lines = [
-        f"<b>Cell {cell}</b>, {info.kind}{state}",
+        f"<b>Cell {info.cell}</b>, {info.kind}{state}",
         f"size-skew <b>{info.size_skew:.4f}</b>&nbsp; {parts}",
         _place_text(info.position, around),
     ]

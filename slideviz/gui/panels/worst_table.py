@@ -132,7 +132,7 @@ class WorstModel(QAbstractTableModel):
         if column == QUALITY:
             return "inverted" if worst.inverted[at] else f"{worst.values[at]:.{self._digits}f}"
         if column in (CELL, SINCE):
-            return str((worst.cells if column == CELL else worst.steps)[at])
+            return str((worst.known_as if column == CELL else worst.steps)[at])
         axis = column - len(COLUMNS)
         if axis == len(self.names):
             return SHORT.get(worst.kinds[at], worst.kinds[at])
@@ -153,7 +153,7 @@ class WorstModel(QAbstractTableModel):
             return
         worst = self.worst
         keys = {
-            CELL: worst.cells,
+            CELL: worst.known_as,
             QUALITY: np.arange(len(worst)),
             SINCE: worst.steps,
             **dict(enumerate(self.places.T, len(COLUMNS))),

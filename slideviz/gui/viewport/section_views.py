@@ -107,6 +107,12 @@ class SectionViews(QSplitter):
         if not idle or old.mesh is not new.mesh or old.view.sections != new.view.sections:
             self._sync()
 
+    def redraw(self) -> None:
+        """Draw sections again, of which cells were read from the mesh's file."""
+        session = self.store.session
+        self.viewing.sync(session, session)
+        self._sync()
+
     def _sync(self) -> None:
         session = self.store.session
         self._sync_handles(session)

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QMenu
 
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import wrapped
-from slideviz.session.state import Session
+from slideviz.session.state import IN_FILE, Session
 
 if TYPE_CHECKING:
     from slideviz.gui.widgets.services import Services
@@ -196,7 +196,20 @@ def stepped_and_idle(now: Now) -> bool:
     return stepped(now) and idle(now)
 
 
+def whole(able: Callable[[Now], bool]) -> Callable[[Now], bool]:
+    """Return a condition that holds only where all cells are in memory, too."""
+    return lambda now: able(now) and not now.session.in_file
+
+
 def why_not(able: Callable[[Now], bool], why: str) -> Callable[[Now], str]:
     """Return a function that returns why a command cannot be done, or an empty text."""
     wait = "Wait for the end of what runs, or cancel it."
-    return lambda now: "" if able(now) else wait if opened(now) and now.busy else why
+
+    def words(now: Now) -> str:
+        if able(now):
+            return ""
+        if now.session.in_file:
+            return IN_FILE
+        return wait if opened(now) and now.busy else why
+
+    return words

@@ -1,0 +1,39 @@
+"""The run of a mesh that stays in its file, as a job beside the window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.case.model import Case
+from slideviz.deformation.solver import Progress
+from slideviz.deformation.streaming import stream
+from slideviz.session.jobs import PHASES, Doing, Report, Stopped, overall, require_going
+from slideviz.session.large import frame_of
+from slideviz.session.results import Frame
+from slideviz.session.whole import tally_of
+
+
+def compute_in_file(
+    case: Case, first: Frame, output: Path, report: Report, stopped: Stopped
+) -> None:
+    """Deform a mesh that is in its file; report the progress, and the last step as a `Frame`.
+
+    Raises
+    ------
+    Cancelled
+        It was stopped; there is no file then, or the one that was there before.
+    """
+    phases = {**PHASES, "read": "reading the boundary", "write": "copying the file"}
+
+    def tell(now: Progress) -> None:
+        require_going(stopped)
+        report(Doing(f"From file to file: {phases.get(now.phase, now.phase)}", overall(now)))
+
+    skin = first.mesh
+    assert skin.source is not None
+    done = stream(case.change(mesh_file=skin.source), output, tell=tell)
+    step = done.steps[-1]
+    now = skin.with_points(step.mesh.points)
+    frame = frame_of(now, skin, output, tally_of(done.quality), case.quality_metric)
+    report(replace(frame, step=replace(step, mesh=now)))

@@ -1,0 +1,196 @@
+"""Sections of a mesh that is in its file: the cells that a section cuts, read without the rest.
+
+The cells of a file are taken in small groups, each with a ball around it that is found once. Of
+another section only those groups are read whose balls it meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from slideviz.deformation.measuring import PointFiles
+from slideviz.mesh.io.su2b_elements import element_blocks, elements_between, taken
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.sections.cut import sides_of
+from slideviz.sections.model import ON_SECTION, Section
+from slideviz.session.results import Frame
+from slideviz.session.whole import measured_part, open_points
+from slideviz.terms import Metric
+
+GROUP = 4096
+"""Cells of a group."""
+MOST = 1 << 18
+"""Cells that are read at a time."""
+KEPT = 8
+"""Sections of one frame that are remembered."""
+Tick = Callable[[float], object]
+
+
+@dataclass(frozen=True, eq=False)
+class Groups:
+    """Balls around groups of `GROUP` cells, in the order of the file.
+
+    Attributes
+    ----------
+    centres : (g, 3) float64
+    radii : (g,) float64
+    scale : float
+        The length of the mesh.
+    """
+
+    centres: FloatArray
+    radii: FloatArray
+    scale: float
+
+    @classmethod
+    def of(cls, files: PointFiles, tick: Tick) -> Groups:
+        """Return the balls of a mesh after its deformation; all of the file is read once."""
+        lows, highs = [], []
+        place = files.place
+        for block in element_blocks(files.before, place, place.cells, place.dim, MOST):
+            mesh = files.cells_of(block)[1]
+            at, starts = mesh.points[mesh.cells.connectivity], mesh.cells.offsets[:-1:GROUP]
+            lows.append(np.minimum.reduceat(at, starts))
+            highs.append(np.maximum.reduceat(at, starts))
+            tick((block.first + len(block.types)) / place.cells.count)
+        low, high = np.concatenate(lows), np.concatenate(highs)
+        scale = float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+        return cls((low + high) / 2.0, np.linalg.norm(high - low, axis=1) / 2.0, scale)
+
+    def met_by(self, section: Section) -> IntArray:
+        """Return the groups (k,) that a section may meet."""
+        # Distances change by no more than the way between two places.
+        reach = self.radii * (1.0 + 1e-9) + ON_SECTION * self.scale
+        return np.flatnonzero(np.abs(section.distance(self.centres)) <= reach)
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a frame of a large mesh is: its file, zone, and that of the deformed points."""
+
+    path: Path
+    zone: int | None
+    moved: Path
+
+    @classmethod
+    def of(cls, frame: Frame) -> Place:
+        """Return the place of a frame."""
+        assert frame.mesh.source is not None
+        return cls(frame.mesh.source, frame.mesh.zone, frame.file or frame.mesh.source)
+
+
+_GROUPS: WeakKeyDictionary[Mesh, Groups] = WeakKeyDictionary()
+_SLABS: WeakKeyDictionary[Mesh, dict[Section, Frame]] = WeakKeyDictionary()
+
+
+def plain(section: Section) -> Section:
+    """Return a section without what does not change which cells it cuts."""
+    return replace(section, name="", shown=True, flat=False, whole=False)
+
+
+def slab_of(mesh: Mesh, section: Section) -> Frame | None:
+    """Return the cells that a section cuts, if they were read, of a mesh that is in its file."""
+    return _SLABS.get(mesh, {}).get(plain(section))
+
+
+def keep_slab(mesh: Mesh, section: Section, slab: Frame) -> None:
+    """Keep the cells that a section cuts, for all that show it."""
+    kept = _SLABS.setdefault(mesh, {})
+    while len(kept) >= KEPT:
+        kept.pop(next(iter(kept)))
+    kept[plain(section)] = slab
+
+
+def read_slab(
+    frame: Frame, section: Section, report: Tick, going_on: Callable[[], object]
+) -> Frame:
+    """Return the cells that a section cuts as a frame of their own, with their quality.
+
+    Raises
+    ------
+    MeshError
+        A file is not as it was.
+    OSError
+        It cannot be read.
+    """
+    place, metric = Place.of(frame), frame.quality.metric
+    with ExitStack() as stack:
+        files = open_points(stack, place.path, place.zone, place.moved)
+        groups = _GROUPS.get(frame.mesh)
+        if groups is None:
+
+            def tick(part: float) -> None:
+                going_on()
+                report(0.8 * part)
+
+            groups = _GROUPS[frame.mesh] = Groups.of(files, tick)
+        found = _cut_cells(files, groups, section, going_on, 1.0)
+        if found is None:
+            # A side of cells that lies in the section, with nothing on its negative side.
+            found = _cut_cells(files, groups, section, going_on, -1.0)
+        if found is None:
+            return _nothing(files, metric)
+        return measured_part(*found, files, metric)
+
+
+def _cut_cells(
+    files: PointFiles,
+    groups: Groups,
+    section: Section,
+    going_on: Callable[[], object],
+    sign: float,
+) -> tuple[Mesh, Mesh, IntArray, IntArray] | None:
+    """Return the cells with nodes on both sides, before and after, their nodes and numbers."""
+    types, flat, ids, points = [], [], [], []
+    near = ON_SECTION * groups.scale
+    for first, count in _runs(groups.met_by(section), files.place.cells.count):
+        going_on()
+        place = files.place
+        block = elements_between(files.before, place, place.cells, place.dim, first, count)
+        base, now = files.cells_of(block)
+        level = sign * section.distance(now.points)
+        level[np.abs(level) <= near] = 0.0
+        chosen = np.flatnonzero(sides_of(now.cells, level))
+        local = taken(now.cells, chosen)
+        types.append(local.types)
+        flat.append(taken(Cells.from_types(block.types, block.nodes), chosen).connectivity)
+        ids.append(block.ids[chosen])
+        both = np.stack([base.points, now.points])[:, local.connectivity]
+        points.append(both)
+    if not sum(map(len, ids)):
+        return None
+    nodes, at, local_of = np.unique(np.concatenate(flat), return_index=True, return_inverse=True)
+    before, after = np.concatenate(points, axis=1)[:, at]
+    number = np.concatenate(ids)
+    order = np.argsort(number, kind="stable")
+    cells = taken(Cells.from_types(np.concatenate(types), local_of), order)
+    base = Mesh(before, cells, name=files.before.name)
+    return base, base.with_points(after), nodes, number[order]
+
+
+def _runs(groups: IntArray, cells: int) -> Iterator[tuple[int, int]]:
+    """Yield the first cell and the number of cells of groups that follow each other."""
+    most = MOST // GROUP
+    breaks = np.flatnonzero(np.diff(groups) != 1) + 1
+    for run in np.split(groups, breaks):
+        for k in range(0, len(run), most):
+            part = run[k : k + most]
+            first = int(part[0]) * GROUP
+            yield first, min(first + len(part) * GROUP, cells) - first
+
+
+def _nothing(files: PointFiles, metric: Metric) -> Frame:
+    """Return a frame without cells."""
+    from slideviz.mesh.quality import Quality
+
+    none, dim = np.empty(0), files.place.dim
+    mesh = Mesh(np.empty((0, dim)), Cells.from_types([], []), name=files.before.name)
+    codes = np.empty(0, np.uint8)
+    found = Quality(none, none, none, codes, np.empty(0, np.int8), metric)
+    return Frame(mesh, found, base=mesh)

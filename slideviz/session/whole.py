@@ -1,0 +1,223 @@
+"""Numbers of all cells of a mesh of which only the boundary is in memory, and its worst cells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.deformation.measuring import PointFiles
+from slideviz.mesh.io.su2b import chosen_zone
+from slideviz.mesh.io.su2b_elements import SIZES, Block, element_at, element_blocks
+from slideviz.mesh.io.su2b_layout import Source, find_zones
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
+from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
+from slideviz.session.results import Frame
+from slideviz.terms import Metric
+
+FINE = 10_000
+"""Intervals of 0 to 1 in which cells are counted; a histogram puts some of them together."""
+LISTED = 100
+"""Worst cells that are kept."""
+Tick = Callable[[float], object]
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Numbers of all cells of a mesh.
+
+    Attributes
+    ----------
+    cells, inverted, unproven : int
+    min, mean : float
+        Of the size-skew quality.
+    counts : (FINE,) int64
+        Cells that are not inverted, by their value, in equal intervals of 0 to 1.
+    worst : (k,) int64
+        The numbers in the file of the cells of lowest value, worst first.
+    """
+
+    cells: int
+    min: float
+    mean: float
+    inverted: int
+    unproven: int
+    counts: IntArray
+    worst: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class PartQuality(Quality):
+    """Quality of the cells in memory, whose numbers are those of all cells of the mesh.
+
+    Attributes
+    ----------
+    tally : Tally
+    """
+
+    tally: Tally | None = None
+
+    @classmethod
+    def of(cls, found: Quality, tally: Tally) -> PartQuality:
+        """Return the quality of cells in memory with the numbers of all."""
+        own = (found.values, found.size, found.skew, found.status, found.signs, found.metric)
+        return cls(*own, None, tally)
+
+    @property
+    def all(self) -> Tally:
+        """Return the numbers of all cells."""
+        assert self.tally is not None
+        return self.tally
+
+    @cached_property
+    def cells(self) -> int:
+        """Return the number of cells of the whole mesh."""
+        return self.all.cells
+
+    @cached_property
+    def min(self) -> float:
+        """Return the lowest value of all cells."""
+        return self.all.min
+
+    @cached_property
+    def mean(self) -> float:
+        """Return the arithmetic mean of the values of all cells."""
+        return self.all.mean
+
+    def _with(self, status: int) -> int:
+        bad, open_ = self.all.inverted, self.all.unproven
+        return {INVERTED: bad, UNPROVEN: open_}.get(status, self.all.cells - bad - open_)
+
+    def histogram(self, bins: int = 20) -> tuple[IntArray, FloatArray]:
+        """Return the counts (bins,) of all cells and the edges (bins + 1,) of equal bins."""
+        middles = (np.arange(FINE) + 0.5) / FINE
+        counts, edges = np.histogram(middles, bins, (0.0, 1.0), weights=self.all.counts)
+        counts[0] += self.all.inverted
+        return counts.astype(np.int64), edges
+
+
+class Tallying:
+    """Counts cells that come block by block, in any order."""
+
+    def __init__(self) -> None:
+        self._counts = np.zeros(FINE, np.int64)
+        self._cells = self._inverted = self._unproven = 0
+        self._sums: list[float] = []
+        self._worst = np.empty(0, np.int64), np.empty(0)
+
+    def add(self, ids: IntArray, values: FloatArray, status: NDArray[np.uint8]) -> None:
+        """Count cells: their numbers, size-skew quality and status, (k,) each."""
+        right = values[status != INVERTED]
+        places = np.minimum((right * FINE).astype(np.int64), FINE - 1)
+        self._counts += np.bincount(places, minlength=FINE)
+        self._cells += len(ids)
+        self._inverted += len(ids) - len(right)
+        self._unproven += int(np.count_nonzero(status == UNPROVEN))
+        self._sums.append(float(values.sum()))
+        if len(values) > LISTED:
+            limit = np.partition(values, LISTED - 1)[LISTED - 1]
+            near = np.flatnonzero(values <= limit)
+            ids, values = ids[near], values[near]
+        old_ids, old = self._worst
+        ids, values = np.concatenate([old_ids, ids]), np.concatenate([old, values])
+        order = np.lexsort((ids, values))[:LISTED]
+        self._worst = ids[order], values[order]
+
+    def tally(self) -> Tally:
+        """Return the numbers of all cells that were added."""
+        ids, values = self._worst
+        return Tally(
+            self._cells,
+            float(values[0]),
+            math.fsum(self._sums) / self._cells,
+            self._inverted,
+            self._unproven,
+            self._counts,
+            ids,
+        )
+
+
+def tally_of(found: Quality) -> Tally:
+    """Return the numbers of cells that are all measured, but may be larger than memory."""
+    made, step = Tallying(), 1 << 20
+    for first in range(0, len(found.values), step):
+        part = slice(first, first + step)
+        values, status = np.array(found.values[part]), np.array(found.status[part])
+        made.add(np.arange(first, first + len(values)), values, status)
+    return made.tally()
+
+
+def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tally:
+    """Return the numbers of all cells of an undeformed mesh, read block by block.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake.
+    OSError
+        It cannot be read.
+    """
+    made = Tallying()
+    with ExitStack() as stack:
+        files = open_points(stack, path, zone, path)
+        place = files.place
+        for block in element_blocks(files.before, place, place.cells, place.dim):
+            found = quality(files.cells_of(block)[0], metric=metric)
+            made.add(block.ids, found.values, found.status)
+            tick((block.first + len(block.types)) / place.cells.count)
+    return made.tally()
+
+
+def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> PointFiles:
+    """Return the points of a mesh in its file and in that of the deformed one, both opened."""
+    before, after = (Source(one, stack.enter_context(one.open("rb"))) for one in (path, moved))
+    return PointFiles(before, after, chosen_zone(path, find_zones(before), zone))
+
+
+def worst_frame(path: Path, zone: int | None, moved: Path, ids: IntArray, metric: Metric) -> Frame:
+    """Return some cells (k,) of a mesh in files as a frame of their own, in that order."""
+    with ExitStack() as stack:
+        files = open_points(stack, path, zone, moved)
+        rows = _elements(files, ids)
+        types = np.array([vtk for vtk, _ in rows], np.uint8)
+        nodes = np.concatenate([nodes for _, nodes in rows])
+        used = np.unique(nodes)
+        base, now = files.cells_of(Block(0, types, nodes, ids))
+        low = int(used[0])
+        # A block of cells close to each other has the nodes between theirs, too.
+        numbers = np.arange(low, low + len(base.points)) if len(base.points) > len(used) else used
+    return measured_part(base, now, numbers, ids, files, metric)
+
+
+def measured_part(
+    base: Mesh, now: Mesh, nodes: IntArray, ids: IntArray, files: PointFiles, metric: Metric
+) -> Frame:
+    """Return some cells of a mesh, before and after, as a frame with their quality."""
+    place = files.place
+    part = Part(
+        frozen_array(nodes, np.int64), frozen_array(ids, np.int64), place.n_points, len(ids)
+    )
+    mesh = Mesh(now.points, now.cells, name=base.name, part=part)
+    return Frame(mesh, quality(now, base, metric), base=base)
+
+
+def _elements(files: PointFiles, ids: IntArray) -> list[tuple[int, IntArray]]:
+    """Return type and nodes of cells (k,), by their numbers in the mesh."""
+    source, place = files.before, files.place
+    found = [element_at(source, place, place.cells, int(cell)) for cell in ids]
+    if all(at == cell for (_, _, at), cell in zip(found, ids, strict=True)):
+        return [(vtk, nodes) for vtk, nodes, _ in found]
+    # Elements stand in another order than their indices.
+    kept: dict[int, tuple[int, IntArray]] = {}
+    for block in element_blocks(source, place, place.cells, place.dim):
+        ends = np.concatenate([[0], np.cumsum(SIZES[block.types])])
+        for k in np.flatnonzero(np.isin(block.ids, ids)).tolist():
+            nodes = block.nodes[ends[k] : ends[k + 1]].copy()
+            kept[int(block.ids[k])] = int(block.types[k]), nodes
+    return [kept[int(cell)] for cell in ids]

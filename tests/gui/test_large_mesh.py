@@ -1,0 +1,190 @@
+"""A large mesh in the window: its boundary, sections and worst cells, run from file to file."""
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.deformation.solver import deform
+from slideviz.mesh.quality import quality
+from slideviz.samples.table import write_sample
+from slideviz.scene.actors import VALUES
+from slideviz.sections.cut import Cutter
+from slideviz.sections.model import Section
+from slideviz.session import changes, large
+from slideviz.session.state import IN_FILE
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("large")
+    write_sample("stator", made, 6000, file_format="su2b")
+    return made
+
+
+@pytest.fixture
+def stator(driver, folder, monkeypatch):
+    monkeypatch.setattr(large, "LARGE_CELLS", 1000)
+    driver.open(folder / "stator.cfg")
+    return driver
+
+
+def waited(stator):
+    reader = stator.window.section_reader
+    stator.qtbot.waitUntil(lambda: not reader.busy, timeout=20_000)
+    stator.qtbot.wait(5)
+
+
+def add(stator, section):
+    stator.window.store.change(changes.add_section, section)
+    waited(stator)
+    return stator.window.scene.sections.drawn["section:0"]
+
+
+def test_only_the_boundary_is_in_memory_and_said_so(stator, folder):
+    session, whole = stator.session, sv.read(folder / "mesh.su2b")
+    assert session.in_file
+    assert len(session.mesh.cells) < len(whole.cells)
+    assert f"{len(whole.cells):,} cells" in stator.window.mesh_text.text()
+    assert "boundary and sections only" in stator.window.mesh_text.text()
+    assert "stay in the file" in stator.window.banner.text.text()
+    assert not stator.window.banner.isHidden()
+    found = quality(whole)
+    assert session.frame.quality.min == found.min
+    assert session.frame.quality.cells == len(whole.cells)
+    for marker in whole.markers:
+        assert len(session.mesh.marker(marker.name).cells) == len(marker.cells)
+
+
+def test_a_small_mesh_and_other_formats_are_opened_whole(driver, folder, tmp_path, monkeypatch):
+    driver.open(folder / "stator.cfg")
+    assert not driver.session.in_file
+    monkeypatch.setattr(large, "LARGE_CELLS", 100)
+    write_sample("hexahedron", tmp_path, 8)
+    driver.open(tmp_path / "hexahedron.cfg")
+    assert not driver.session.in_file
+
+
+def test_little_memory_makes_a_mesh_large(folder, monkeypatch):
+    assert not large.is_large(folder / "mesh.su2b", None)
+    monkeypatch.setattr(large, "free_memory", lambda: 1e6)
+    assert large.is_large(folder / "mesh.su2b", None)
+
+
+def test_a_section_has_the_cells_and_colours_of_the_whole_mesh(stator, folder):
+    whole = sv.read(folder / "mesh.su2b")
+    section = Section("cylinder", (0.0, 0.0, 0.0), (0, 0, 1), 0.27)
+    stator.window.store.change(changes.set_view, colour_by="skew")
+    one = add(stator, section)
+    there = Cutter.of(whole).cut(whole.points, section)
+    np.testing.assert_array_equal(one.frame.mesh.part.cells[one.polygons.cells], there.cells)
+    np.testing.assert_allclose(
+        one.shown.shape.cell_data[VALUES], quality(whole).skew[there.cells], rtol=1e-12
+    )
+
+
+def test_a_dragged_section_keeps_its_picture_until_the_next_is_read(stator):
+    one = add(stator, Section("plane", (0.27, 0.0, 0.05), (0, 0, 1)))
+    before = one.polygons
+    assert len(before)
+    for z in (0.051, 0.052, 0.06):
+        other = Section("plane", (0.27, 0.0, z), (0, 0, 1))
+        stator.window.store.change(changes.replace_section, 0, other)
+        assert one.polygons is before
+    waited(stator)
+    after = stator.window.scene.sections.drawn["section:0"].polygons
+    assert np.allclose(after.points[:, 2], 0.06)
+
+
+def test_worst_cells_are_listed_and_marked(stator, folder):
+    found = quality(sv.read(folder / "mesh.su2b"))
+    window = stator.window
+    window.docks_.lead_to("worst")
+    panel = window.docks_.panels["worst"]
+    stator.qtbot.waitUntil(lambda: panel.model.worst is not None)
+    worst = found.worst(3)
+    shown = [int(panel.model.index(row, 0).data()) for row in range(3)]
+    assert shown == worst.tolist()
+    for row in range(3):
+        panel._go(row)
+        assert stator.session.view.marked == panel.model.cell(row)
+        assert f"Cell {worst[row]}" in panel.info.text()
+        assert any(name.startswith("mark") for name in window.scene.plotter.renderer.actors)
+
+
+def test_what_needs_all_cells_is_disabled_with_the_reason(stator):
+    actions = {one.objectName(): one for one in stator.window.findChildren(type_of_action())}
+    for name in ("save_mesh", "export_quality"):
+        assert not actions[name].isEnabled()
+        assert "stays in its file" in actions[name].toolTip().replace("\n", " ")
+    display = stator.window.docks_.panels["display"]
+    assert not display.only.isEnabled()
+    assert "stays in its file" in display.only.toolTip().replace("\n", " ")
+    stator.window.store.change(changes.set_view, threshold=(0.0, 0.5))
+    assert stator.session.view.threshold is None
+
+
+def type_of_action():
+    from qtpy.QtGui import QAction
+
+    return QAction
+
+
+def test_a_run_goes_from_file_to_file(stator, folder, tmp_path, answers):
+    window, output = stator.window, tmp_path / "out.su2b"
+    asked = answers("ask_save", output)
+    add(stator, Section("plane", (0.27, 0.0, 0.05), (0, 0, 1)))
+    window.store.change(changes.set_case, steps=1)
+    case = stator.session.case
+    window.start_run()
+    stator.settle()
+    waited(stator)
+    assert len(asked) == 1
+    whole = sv.read(folder / "mesh.su2b")
+    (step,) = deform(case, whole)
+    np.testing.assert_array_equal(sv.read(output).points, step.mesh.points)
+    found, frame = quality(step.mesh, whole), stator.session.frame
+    assert (frame.quality.min, frame.quality.inverted) == (found.min, found.inverted)
+    part = stator.session.mesh.part
+    np.testing.assert_array_equal(frame.mesh.points, step.mesh.points[part.points])
+    cut = Cutter.of(whole).cut(step.mesh.points, stator.session.view.sections[0])
+    one = window.scene.sections.drawn["section:0"]
+    np.testing.assert_array_equal(one.frame.mesh.part.cells[one.polygons.cells], cut.cells)
+    assert window.banner.text.text() == f"The deformed mesh is in {output}."
+    assert not window.banner.isHidden()
+    assert not stator.session.unsaved_mesh  # it is in its file
+
+
+def test_nothing_is_run_where_no_file_is_named(stator, answers):
+    answers("ask_save", None)
+    stator.window.start_run()
+    assert not stator.window.runner.busy
+    assert not stator.session.runs
+
+
+def test_the_mesh_itself_is_not_written_over(stator, folder, answers):
+    before = (folder / "mesh.su2b").read_bytes()
+    answers("ask_save", folder / "mesh.su2b")
+    stator.window.start_run()
+    assert not stator.window.runner.busy
+    assert "is the mesh itself" in stator.window.banner.text.text()
+    assert (folder / "mesh.su2b").read_bytes() == before
+
+
+def test_a_run_that_is_cancelled_leaves_no_file(stator, tmp_path, answers):
+    output = tmp_path / "out.su2b"
+    answers("ask_save", output)
+    stator.window.start_run()
+    stator.window.cancel()
+    stator.settle()
+    assert not output.exists()
+    assert stator.session.frame is stator.session.first
+
+
+def test_elasticity_says_that_it_needs_all_cells(stator):
+    stator.window.store.change(changes.set_case, method="elastic")
+    wanted = changes.run_requirements(stator.session)
+    assert any("needs all of a mesh in memory" in one.text for one in wanted)
+
+
+def test_the_reason_is_a_sentence():
+    assert IN_FILE.endswith(".")
