@@ -9,6 +9,7 @@ from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.actors import VALUES, Drawn, see_through
 from slideviz.scene.mesh import BoundaryLayer
+from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 
@@ -21,6 +22,8 @@ class CoarseLayer(Layer):
     stage : Stage
     boundaries : BoundaryLayer
         Draws them with all facets, and says how they look.
+    sections : SectionLayer
+        Draws sections, which have no edges meanwhile.
 
     Attributes
     ----------
@@ -29,8 +32,9 @@ class CoarseLayer(Layer):
     on : bool
     """
 
-    def __init__(self, stage: Stage, boundaries: BoundaryLayer) -> None:
+    def __init__(self, stage: Stage, boundaries: BoundaryLayer, sections: SectionLayer) -> None:
         self.stage = stage
+        self._sections = sections
         self.surfaces: Mapping[str, Surface] = {}
         self._boundaries = boundaries
         self.clear()
@@ -41,6 +45,7 @@ class CoarseLayer(Layer):
         self.drawn: dict[str, Drawn] = {}
         self._made_of: tuple[object, ...] = ()
         self._session = Session()
+        self._edged: list[Any] = []
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session, in place of what the boundaries have just drawn."""
@@ -59,6 +64,9 @@ class CoarseLayer(Layer):
         for name, one in self.drawn.items():
             self._boundaries.drawn[name].actor.visibility = one.actor.visibility
             one.actor.visibility = False
+        for prop in self._edged:
+            prop.show_edges = True
+        self._edged = []
         return True
 
     def _draw(self) -> None:
@@ -80,6 +88,10 @@ class CoarseLayer(Layer):
             see_through(one.actor, whole.prop.opacity)
             one.actor.mapper.scalar_visibility = whole.mapper.scalar_visibility
             one.actor.visibility, whole.visibility = whole.visibility, False
+        props = [one.actor.prop for one in self._sections.drawn.values()]
+        self._edged = [prop for prop in props if prop.show_edges or prop in self._edged]
+        for prop in self._edged:
+            prop.show_edges = False
 
     def _add(self, surface: Surface) -> Drawn:
         assert self._session.mesh is not None

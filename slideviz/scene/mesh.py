@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from slideviz.color_scheme import SELECTED_COLOUR
+from slideviz.mesh.enclosing import enclosing_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
@@ -22,8 +23,6 @@ GLASS = 0.15
 """Opacity of boundaries around moving ones."""
 SEE_THROUGH = 0.25
 """Opacity of boundaries around a marked cell that is not beside one of them."""
-_BESIDE = 1e-6
-"""Part of a mesh's length that an enclosed boundary is at least away from its outside."""
 
 
 def recoloured(old: Session | None, new: Session) -> bool:
@@ -135,8 +134,8 @@ class BoundaryLayer(Layer):
         self._lift = self.stage.lift(session.mesh)
         for surface in surfaces:
             self.drawn[surface.name] = self._add(surface, session.mesh.points)
-        self._closed = is_closed(surfaces)
-        self._enclosed = enclosed(surfaces, session.mesh.points)
+        found = enclosing_of(session.mesh, surfaces)
+        self._closed, self._enclosed = found.closed, found.inner
 
     def clear(self) -> None:
         """Forget the mesh."""
@@ -249,42 +248,3 @@ def seen_from_outside(session: Session) -> bool:
     glass = view.hidden or "perspective" in view.drawn or looks_inside(session)
     # The outside of a folded cell is inside.
     return not glass and session.frame is not None and session.frame.quality.inverted == 0
-
-
-def enclosed(surfaces: Sequence[Surface], points: FloatArray) -> frozenset[str]:
-    """Return the names of boundaries of a 3D mesh inside all others, as a wing in air.
-
-    Parameters
-    ----------
-    surfaces : sequence of Surface
-    points : (n, d) float64
-        Of the mesh.
-    """
-    boxes = {
-        one.name: (points[one.nodes].min(axis=0), points[one.nodes].max(axis=0))
-        for one in surfaces
-        if not one.flat
-    }
-    if not boxes:
-        return frozenset()
-    low = np.min([box[0] for box in boxes.values()], axis=0)
-    high = np.max([box[1] for box in boxes.values()], axis=0)
-    beside = _BESIDE * float((high - low).max())
-    return frozenset(
-        name
-        for name, box in boxes.items()
-        if (box[0] > low + beside).all() and (box[1] < high - beside).all()
-    )
-
-
-def is_closed(surfaces: Sequence[Surface]) -> bool:
-    """Tell whether surfaces together enclose a volume: every edge has two faces."""
-    faces = [one.nodes[one.facets] for one in surfaces if one.facets.shape[1] == 4]
-    if len(faces) != len(surfaces) or not faces:
-        return False
-    every = np.concatenate(faces)
-    start, end = every.ravel(), np.roll(every, -1, axis=1).ravel()
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    keys = np.sort((low * (every.max() + 1) + high)[low != high])
-    pairs = len(keys) % 2 == 0 and bool(np.all(keys[::2] == keys[1::2]))
-    return pairs and bool(np.all(keys[1:-1:2] != keys[2::2]))

@@ -57,7 +57,7 @@ class Scene:
         self._chosen = ThresholdLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
         self.sections = SectionLayer(self.stage)
-        self._coarse = CoarseLayer(self.stage, self._boundaries)
+        self._coarse = CoarseLayer(self.stage, self._boundaries, self.sections)
         self.layers: tuple[Layer, ...] = (
             self._cells,
             self._boundaries,
@@ -291,5 +291,6 @@ class Scene:
         own, at = frame.place_of(cell)
         middle, size = surroundings(own.mesh, at)
         mesh = frame.mesh
-        depth = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+        low, high = mesh.bounds
+        depth = float(np.linalg.norm(high - low))
         self.camera.aim(middle, NEAR / 2.0 * max(size, 1e-9 * depth), 2.0 * depth)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slideviz.case.model import Case
-from slideviz.errors import Cancelled, CaseError
+from slideviz.errors import Cancelled, CaseError, SlidevizError
 from slideviz.mesh.coarse import coarse_surfaces
+from slideviz.mesh.enclosing import enclosing_of
 from slideviz.mesh.io.private import private_folder
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.periodic import find_pairs
@@ -24,6 +25,7 @@ from slideviz.session.formats import holds_quality
 from slideviz.session.keep import Camera, kept_camera
 from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
+from slideviz.session.passages import find_period
 from slideviz.session.state import Frame, Session
 
 Report = Callable[[object], None]
@@ -123,6 +125,9 @@ def prepare(
     going_on()
     _look_ahead(first)
     session = open_mesh(first, path, pairs, case)
+    enclosing_of(mesh, surfaces)
+    with suppress(SlidevizError):  # said beside the Run button
+        find_period(mesh, session.case, pairs)
     ghosts = Ghosts(mesh)
     ghosts.moved(session.case)
     coarse = coarse_surfaces(surfaces, mesh.points)

@@ -81,7 +81,8 @@ def _distance(mesh: Mesh, marker: Marker, point: FloatArray) -> float:
         return float("inf")
     shifts = mesh.points[nodes] - point
     squares = np.einsum("nd,nd->n", shifts, shifts)
-    near = nodes[np.argsort(squares)[:NEAR]]
+    some = min(NEAR, len(nodes))
+    near = nodes[np.argpartition(squares, some - 1)[:some]]
     at = np.flatnonzero(np.isin(cells.connectivity, near))
     elements = np.unique(np.searchsorted(cells.offsets, at, side="right") - 1)
     best = float(np.sqrt(squares.min()))

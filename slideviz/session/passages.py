@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +24,9 @@ WHOLE_NUMBER = 1e-3
 
 _SAME = 1e-9
 
+_PERIODS: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Pair]] = WeakKeyDictionary()
+"""Periods that cases have asked for, kept as long as the mesh lives."""
+
 
 def find_period(
     mesh: Mesh, case: Case | None = None, pairs: Sequence[Pair] | None = None
@@ -40,7 +44,11 @@ def find_period(
     """
     names = case.markers_with("periodic") if case is not None else ()
     if case is not None and names:
-        return pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
+        key = names, case.periodic_type, case.axis, case.origin
+        known = _PERIODS.setdefault(mesh, {})
+        if key not in known:
+            known[key] = pair_up(mesh, *key)[0]
+        return known[key]
 
     def rank(pair: Pair) -> tuple[int, bool]:
         guesses = [guess_by_name(name) for name in (pair.first, pair.second)]

@@ -155,6 +155,11 @@ class Store:
             self._remember(old, new, words, (function, which, *sorted(named)))
         self.put(new)
 
+    @property
+    def held(self) -> bool:
+        """Tell whether the mouse drags something that changes the session."""
+        return self._held
+
     def hold(self, held: bool) -> None:
         """Note that the mouse begins to drag something, or ends it.
 

@@ -9,6 +9,7 @@ from slideviz.gui.viewport import coarse_moving
 from slideviz.mesh import coarse
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
+from slideviz.sections.model import Section
 from slideviz.session import changes
 
 
@@ -107,3 +108,20 @@ def test_a_movement_of_the_mouse_is_drawn_once(stator, qtbot):
     assert len(drawn) == 1
     view.renderer.RemoveObserver(tag)
     QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=QPoint(180, 150))
+
+
+def test_a_section_that_is_dragged_goes_with_fewer_facets(stator, qtbot):
+    window, scene = stator.window, stator.window.scene
+    place = tuple(stator.session.mesh.points.mean(axis=0).tolist())
+    window.store.change(changes.add_section, Section("plane", place, (0, 0, 1)))
+    assert not scene.coarse
+    section = scene.sections.drawn["section:0"].actor.prop
+    assert section.show_edges
+    window.store.hold(True)
+    other = Section("plane", (*place[:2], place[2] + 0.001), (0, 0, 1))
+    window.store.change(changes.replace_section, 0, other)
+    assert scene.coarse
+    assert not section.show_edges
+    window.store.hold(False)
+    qtbot.waitUntil(lambda: not scene.coarse)
+    assert section.show_edges

@@ -5,9 +5,10 @@ import pytest
 import pyvista as pv
 
 from slideviz.color_scheme import COLOUR_MAP, DARK, INVERTED_COLOUR, LIGHT
+from slideviz.mesh.enclosing import enclosed, is_closed
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import facet_connectivity, find_surfaces
-from slideviz.scene.mesh import GLASS, enclosed, is_closed
+from slideviz.scene.mesh import GLASS
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.session import changes

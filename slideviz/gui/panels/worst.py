@@ -12,6 +12,7 @@ from qtpy.QtCore import QModelIndex, Qt, QTimer
 from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import QLabel, QStackedWidget
 
+from slideviz.color_scheme import Look
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
 from slideviz.gui.responsiveness.settings import REST_MS
 from slideviz.gui.responsiveness.timers import later
@@ -53,6 +54,7 @@ class WorstPanel(Panel):
         self._seen: tuple[object, ...] = ()
         self._last = 0.0
         self._marked: int | None = None
+        self._told: tuple[object, ...] = ()
         self.model = WorstModel()
         # Its signals hold this panel: with a parent they end with it.
         self.model.setParent(self)
@@ -97,6 +99,11 @@ class WorstPanel(Panel):
         return table
 
     # State to widgets ------------------------------------------------------------------
+
+    def take_theme(self, _look: Look) -> None:
+        """Tell of the marked cell in the colours of another theme."""
+        self._told = ()
+        self._sync_mark(self.store.session)
 
     def sync(self, session: Session) -> None:
         """Show the session; while steps are played, the list is filled when there is time."""
@@ -155,8 +162,12 @@ class WorstPanel(Panel):
         cell = cell if frame is not None and frame.has(cell) else None
         self.info.setVisible(cell is not None)
         if cell is not None:
-            self.info.setText(info_text(session, cell))
-            self.info.setToolTip(info_text(session, cell, every=True))
+            key = session.frame, cell, axis_of(session)
+            if key != self._told:
+                # The nearest boundary of a large mesh takes a while.
+                self._told = key
+                self.info.setText(info_text(session, cell))
+                self.info.setToolTip(info_text(session, cell, every=True))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

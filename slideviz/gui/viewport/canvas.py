@@ -42,7 +42,8 @@ class ViewSignals(QObject):
     resized(), unveiled()
         The view has another size; all that is new in the scene is drawn.
     moving(), released()
-        The mouse, or its wheel, moves the camera; the button that did so is up again.
+        The mouse, or its wheel, moves the camera or something else in the scene; the button that
+        did so is up again.
     """
 
     clicked = Signal(QPoint, Qt.KeyboardModifier)

@@ -1,4 +1,4 @@
-"""A coarser picture while the mouse moves the camera, where all facets would take too long."""
+"""A coarser picture while the mouse moves something, where all facets would take too long."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from slideviz.scene.scene import Scene
 
 
 class CoarseWhileMoving(QObject):
-    """Switches a scene to coarse boundaries while its camera is moved, and back when it rests.
+    """Switches a scene to coarse boundaries while something is moved, and back when it rests.
+
+    That is the camera, or whatever else the mouse drags: a section, for example.
 
     Parameters
     ----------

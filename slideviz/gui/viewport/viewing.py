@@ -216,6 +216,9 @@ class Viewing(QWidget):
                 scene.set_motion_ghosts(moved)
         if old.mesh is not new.mesh:
             return
+        if self.store.held:  # the mouse drags a section, for example
+            for view, _ in self.pairs():
+                view.signals.moving.emit()
         try:
             self.scene.update(new)
         finally:
