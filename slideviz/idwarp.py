@@ -132,7 +132,8 @@ class USMesh:
         mesh, nodes = self.deformer.mesh, np.asarray(self.deformer.nodes)
         given = self._shaped(pts)
         boundary = np.unique(np.concatenate([nodes, *(m.nodes for m in mesh.markers)]))
-        far, found = cKDTree(mesh.points[boundary]).query(given)
+        distance, found = cKDTree(mesh.points[boundary]).query(given)
+        far = np.asarray(distance)
         if not far.max(initial=0.0) <= COINCIDES * mesh.extent:
             worst = int(far.argmax())
             raise CaseError(
@@ -302,7 +303,7 @@ class USMesh:
         given = np.asarray(values, np.float64).ravel()
         if not solver:
             return given
-        return np.bincount(self._indices, given, self._points.size)
+        return np.bincount(self._indices, given, self._points.size).astype(np.float64)
 
 
 def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:

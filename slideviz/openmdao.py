@@ -36,7 +36,7 @@ VOLUME = "aero_vol_coords"
 MINIMUM, MEAN = "minimum_quality", "mean_quality"
 
 
-class MeshDeformation(om.ExplicitComponent):
+class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
     """All points of a mesh from those of its moving surface.
 
     ``x_aero`` (m d) is the *current* surface, not its displacement: the coordinates of the moving
@@ -141,7 +141,7 @@ class MeshDeformation(om.ExplicitComponent):
         return kept[2]
 
 
-class MeshSurface(om.IndepVarComp):
+class MeshSurface(om.IndepVarComp):  # type: ignore[misc]
     """The moving surface of the undeformed mesh, ``x_aero0_mesh`` (m d)."""
 
     def initialize(self) -> None:
