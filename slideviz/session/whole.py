@@ -67,7 +67,7 @@ class PartQuality(Quality):
     def of(cls, found: Quality, tally: Tally) -> PartQuality:
         """Return the quality of cells in memory with the numbers of all."""
         own = (found.values, found.size, found.skew, found.status, found.signs, found.metric)
-        return cls(*own, None, tally)
+        return cls(*own, tally=tally)
 
     @property
     def all(self) -> Tally:
