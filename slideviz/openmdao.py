@@ -48,7 +48,7 @@ class MeshDeformation(om.ExplicitComponent):  # type: ignore[misc]
     choices. Those are made for the undeformed mesh, or what the deformer was refreshed at; give the
     option another deformer of the same mesh, ``deformer.refresh(displacement)``, to renew them.
 
-    Variables are not distributed: under MPI each process deforms the whole mesh.
+    It is made for one process: variables are not distributed.
 
     Options: ``deformer``, a `slideviz.Deformer`; ``quality``; ``p``, the exponent of the smooth
     minimum. What the deformer refuses is an `openmdao.api.AnalysisError`, after which an optimiser

@@ -20,7 +20,7 @@ from openmdao.utils.assert_utils import assert_check_partials, assert_check_tota
 
 from slideviz.openmdao import MeshDeformation, MeshDeformationBuilder  # noqa: E402
 
-HOLE = ((2, 4), (2, 4), (2, 4))
+HOLE = ((1, 3), (1, 3), (1, 3))
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def no_files_of_openmdao(tmp_path, monkeypatch):
 
 
 def deformer_of(dim=2, **values):
-    mesh = grid((6,) * dim, hole=HOLE[:dim])
+    mesh = grid((4,) * dim, hole=HOLE[:dim])
     roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
     motions = (sv.Translate("BLOCK", (0.03, -0.02, 0.02)[:dim]),)
     return sv.Deformer(mesh, Case(roles=roles, motions=motions, sliding="ps", **values))
@@ -81,7 +81,7 @@ def test_before_it_runs_it_has_the_undeformed_mesh():
     np.testing.assert_array_equal(problem.get_val("aero_vol_coords"), start.ravel())
 
 
-@pytest.mark.parametrize("steps", [1, 3])
+@pytest.mark.parametrize("steps", [1, 2])
 def test_two_scenarios_in_one_model_have_exact_partials_forward_and_reverse(steps):
     deformer = deformer_of(steps=steps)
     model = om.Group()
