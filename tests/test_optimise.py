@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 import slideviz as sv
 from slideviz.case.model import Case
+from slideviz.ffd.box import plane_corners, regular_box
 
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "plot_8_optimise.py"
 LEAST = 0.5
@@ -139,6 +140,14 @@ def test_the_example_widens_the_throat_with_a_tenth_of_the_meshes(monkeypatch):
     assert exact.fun == pytest.approx(differences.fun, abs=1e-4)
     assert exact.nfev * 8 < differences.nfev
     assert ran["width"] == pytest.approx(-exact.fun, abs=1e-4)
+    # Its box is that of the package, in both planes alike.
+    corners = np.array([ran["low"], ran["high"]])[[[0, 0], [1, 0], [1, 1], [0, 1]], [0, 1]]
+    box = regular_box("BLADE", plane_corners(corners), (3, 1, 1), None)
+    nodes, blade = ran["deformer"].nodes, ran["blade"]
+    uvw = np.column_stack([ran["u"], ran["v"], np.full(len(nodes), 0.5)])
+    np.testing.assert_allclose(box.at(uvw)[:, :2], blade, atol=1e-14)
+    matrix = box.embed(nodes, uvw).matrix().toarray().reshape(len(nodes), 8, 2).sum(axis=2)
+    np.testing.assert_allclose(np.transpose(ran["box"]), matrix, atol=1e-14)
     # The derivatives that it has of its own.
     h, design = 1e-5, best + np.linspace(-0.01, 0.01, 9)
     for function, slope in (
