@@ -46,6 +46,8 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     config = read_config(arguments.case)
     config = replace(config, case=changed(config.case, arguments.set))
     note_case(arguments, config.case)
+    if config.variables[0].kind == "SURFACE_FILE":
+        arguments.inputs.setdefault(config.files["DV_FILENAME"], "the surface file")
     if not arguments.quiet and config.ignored:
         count = len(config.ignored)
         words = f"{count} other key{'s' * (count > 1)} of SU2 in {arguments.case} not needed here"

@@ -11,6 +11,7 @@ from slideviz import __version__
 from slideviz.cli.compare_command import add_compare
 from slideviz.cli.convert_command import add_convert
 from slideviz.cli.def_command import add_def
+from slideviz.cli.dot_command import add_dot
 from slideviz.cli.film_command import add_film
 from slideviz.cli.info_command import add_info
 from slideviz.cli.keys_command import add_keys
@@ -32,6 +33,7 @@ COMMANDS: dict[str, Callable[[argparse._SubParsersAction], None]] = {
     "sweep": add_sweep,
     "convert": add_convert,
     "def": add_def,
+    "dot": add_dot,
     "sample": add_sample,
     "keys": add_keys,
     "shots": add_shots,

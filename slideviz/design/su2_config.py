@@ -15,7 +15,7 @@ from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, shown
 from slideviz.design.su2_variables import KINDS, Variable, read_variables
 from slideviz.errors import CaseError
-from slideviz.terms import Role
+from slideviz.terms import ROLES, Role
 
 ROLE_KEYS: dict[str, Role] = {
     "MARKER_SYM": "sliding",
@@ -39,6 +39,7 @@ WORDS = {
     "DV_SENSITIVITY_FORMAT": "SU2_NATIVE",
     "OBJECTIVE_FUNCTION": "DRAG",
     "OPT_RELAX_FACTOR": "1.0",
+    "READ_BINARY_RESTART": "YES",
     "FFD_CONTINUITY": "",
     "FFD_SYMMETRY_PLANE": "NO",
     "FFD_COORD_SYSTEM": "CARTESIAN",
@@ -76,6 +77,8 @@ class Su2Config:
         The values of ``FILES`` and ``WORDS``.
     ignored : tuple of str
         The keys that concern other things.
+    named : dict of str to str
+        The key that names each boundary with a role.
     """
 
     case: Case
@@ -84,6 +87,7 @@ class Su2Config:
     files: dict[str, Path]
     words: dict[str, str]
     ignored: tuple[str, ...]
+    named: dict[str, str]
 
     @property
     def source(self) -> Path:
@@ -122,7 +126,7 @@ def read_config(path: Path) -> Su2Config:
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
         warnings=warnings,
     )
-    return Su2Config(case, markers, variables, files, words, ignored)
+    return Su2Config(case, markers, variables, files, words, ignored, reader.named)
 
 
 def _read_keys() -> set[str]:
@@ -139,6 +143,7 @@ class _Reader:
 
     def __init__(self, rows: dict[str, Entry], problems: list[Problem]) -> None:
         self.rows, self.problems = rows, problems
+        self.named: dict[str, str] = {}
 
     def word(self, key: str, default: str) -> str:
         """Return the value of a key, without quotes."""
@@ -166,7 +171,9 @@ class _Reader:
         case = Case(generate_quality=False)
         roles: dict[str, Role] = {}
         for key, role in ROLE_KEYS.items():
-            roles |= dict.fromkeys(self.names(key), role)
+            names = self.names(key)
+            roles |= dict.fromkeys(names, role)
+            self.named |= dict.fromkeys(names, key)
         for name, row in OURS.items():
             entry = self.rows.get(name)
             if entry is None or name in ROLE_KEYS:
@@ -176,6 +183,8 @@ class _Reader:
             except CaseError as problem:
                 self.note(entry, str(problem))
         moving = self.names("DV_MARKER") or self.names("MARKER_DEFORM_MESH")
+        self.named |= {name: ROLES[role].key for name, role in case.roles.items()}
+        self.named |= dict.fromkeys(moving, "DV_MARKER")
         roles |= {**case.roles, **dict.fromkeys(moving, "moving")}
         case = case.change(roles=roles, **self.formats())
         slides = "sliding" in roles.values() or "periodic" in roles.values()

@@ -7,10 +7,13 @@ moves all of an index does (SU2 8, ``CheckFFDIntersections``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from slideviz.case.words import list_of
-from slideviz.design.su2_config import CONTINUITIES, Su2Config
+from slideviz.design.su2_config import CONTINUITIES, SU2_CONTINUITY, Su2Config
+from slideviz.design.su2_variables import BOXED, Variable
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 
@@ -83,11 +86,62 @@ def _pierced(ends: FloatArray, triangle: FloatArray) -> bool:
     normal = np.cross(u, v)
     start, along = ends[:, 0] - triangle[0], ends[:, 1] - ends[:, 0]
     height, rise = start @ normal, along @ normal
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = -height / rise
-        at = start + part[:, None] * along
+    # Whether it gets to the plane of the triangle; one within the plane pierces nothing.
+    reaches = (np.abs(height) <= np.abs(rise)) & (height * rise <= 0.0) & (rise != 0.0)
+    at = start[reaches] - (height[reaches] / rise[reaches])[:, None] * along[reaches]
     area = float(normal @ normal)
     a = np.cross(at, v) @ normal / area
     b = np.cross(u, at) @ normal / area
-    inside = (part >= 0.0) & (part <= 1.0) & (a >= 0.0) & (b >= 0.0) & (a + b <= 1.0)
-    return bool(inside.any())
+    return bool(((a >= 0.0) & (b >= 0.0) & (a + b <= 1.0)).any())
+
+
+def idle_variables(
+    config: Su2Config, mesh: Mesh, boxes: dict[str, Box]
+) -> tuple[tuple[bool, ...], list[str]]:
+    """Return which variables do nothing since their control points are held, and warnings."""
+    asked = config.words["FFD_CONTINUITY"].upper()
+    continuity = asked or SU2_CONTINUITY
+    held = {name: held_planes(config, mesh, box, continuity) for name, box in boxes.items()}
+    idle = tuple(
+        variable.kind in BOXED
+        and any(
+            at in planes for at, planes in zip(_checked(variable), held[variable.box], strict=True)
+        )
+        for variable in config.variables
+    )
+    warnings = []
+    for name, planes in held.items():
+        mine = zip(config.variables, idle, strict=True)
+        stuck = [place for place, (v, is_idle) in enumerate(mine, 1) if v.box == name and is_idle]
+        if stuck and asked:
+            warnings.append(
+                f"FFD_CONTINUITY= {asked} holds {_words(planes)} of the box {name}: "
+                f"{_listed(stuck)} of DV_KIND will do nothing"
+            )
+        elif stuck:
+            warnings.append(
+                f"SU2 would hold {_words(planes)} of the box {name}, since the surface leaves it "
+                f"there, by its default FFD_CONTINUITY= {continuity}, so that {_listed(stuck)} of "
+                "DV_KIND did nothing; here they move. Write that key to hold them, or "
+                "FFD_CONTINUITY= USER_INPUT to hold what FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
+            )
+    return (idle if asked else (False,) * len(idle)), warnings
+
+
+def _checked(variable: Variable) -> tuple[int, int, int]:
+    """Return the index that SU2 looks for among the held planes."""
+    i, j, k = variable.index
+    return (i, j, 0) if variable.kind == "FFD_CONTROL_POINT_2D" else (i, j, k)
+
+
+def _words(held: Sequence[set[int]]) -> str:
+    return ", ".join(
+        f"{letter} = {', '.join(map(str, sorted(planes)))}"
+        for letter, planes in zip("ijk", held, strict=True)
+        if planes
+    )
+
+
+def _listed(places: list[int]) -> str:
+    more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+    return f"variable{'s' * (len(places) > 1)} {', '.join(map(str, places[:6]))}{more}"

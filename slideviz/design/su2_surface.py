@@ -5,21 +5,20 @@ As in SU2 each variable acts on the undeformed boundary, and what all of them do
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from slideviz.case.boxes import boxes_for, defined_boxes, embedding
-from slideviz.case.check import marker_problems, raise_all
+from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.model import Case, Prescribed
 from slideviz.case.words import nearest
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.steps import Step
-from slideviz.design.su2_config import SU2_CONTINUITY, Su2Config
-from slideviz.design.su2_planes import held_planes
+from slideviz.design.su2_config import Su2Config
+from slideviz.design.su2_planes import idle_variables
 from slideviz.design.su2_positions import read_positions
 from slideviz.design.su2_variables import BOXED, Variable
 from slideviz.errors import CaseError
@@ -159,7 +158,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
                 f"{config.source}: no node of {', '.join(config.markers)} is in the FFD box "
                 f"{name!r}; correct the box or DV_MARKER"
             )
-    idle, held = _idle(config, mesh, boxes)
+    idle, held = idle_variables(config, mesh, boxes)
     warnings += [*held, *_overlaps(inside)]
     return Surface(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
 
@@ -204,8 +203,15 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
 def _require_markers(config: Su2Config, mesh: Mesh) -> None:
     if not config.markers:
         raise CaseError(f"{config.source}: DV_MARKER names no boundary; nothing would move")
-    unknown = marker_problems(config.case, mesh)
-    raise_all(tuple(f"{config.source}: {text}" for text in unknown))
+    known = mesh.marker_names
+    has = f"it has {', '.join(known)}" if known else "it has none"
+    unknown = [
+        f"{config.source}: {key}: {mesh.name} has no marker {name!r}"
+        f"{nearest(name, known) or f'; {has}'}"
+        for name, key in config.named.items()
+        if name not in known
+    ]
+    raise_all(tuple(unknown))
 
 
 def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None:
@@ -235,58 +241,6 @@ def _embedded(
     one, first = np.unique(every, return_index=True)
     inside = box.embed(np.searchsorted(nodes, one), uvw[first])
     return (box if box.embedded else replace(box, embedded=listed)), inside
-
-
-def _idle(
-    config: Su2Config, mesh: Mesh, boxes: dict[str, Box]
-) -> tuple[tuple[bool, ...], list[str]]:
-    """Return which variables do nothing since their control points are held, and warnings."""
-    asked = config.words["FFD_CONTINUITY"].upper()
-    continuity = asked or SU2_CONTINUITY
-    held = {name: held_planes(config, mesh, box, continuity) for name, box in boxes.items()}
-    idle = tuple(
-        variable.kind in BOXED
-        and any(
-            at in planes for at, planes in zip(_checked(variable), held[variable.box], strict=True)
-        )
-        for variable in config.variables
-    )
-    warnings = []
-    for name, planes in held.items():
-        mine = zip(config.variables, idle, strict=True)
-        stuck = [place for place, (v, is_idle) in enumerate(mine, 1) if v.box == name and is_idle]
-        if stuck and asked:
-            warnings.append(
-                f"FFD_CONTINUITY= {asked} holds {_words(planes)} of the box {name}: "
-                f"{_listed(stuck)} of DV_KIND will do nothing"
-            )
-        elif stuck:
-            warnings.append(
-                f"SU2 would hold {_words(planes)} of the box {name}, since the surface leaves it "
-                f"there, by its default FFD_CONTINUITY= {continuity}, so that {_listed(stuck)} of "
-                "DV_KIND did nothing; here they move. Write that key to hold them, or "
-                "FFD_CONTINUITY= USER_INPUT to hold what FFD_FIX_I, FFD_FIX_J, FFD_FIX_K name"
-            )
-    return (idle if asked else (False,) * len(idle)), warnings
-
-
-def _checked(variable: Variable) -> tuple[int, int, int]:
-    """Return the index that SU2 looks for among the held planes."""
-    i, j, k = variable.index
-    return (i, j, 0) if variable.kind == "FFD_CONTROL_POINT_2D" else (i, j, k)
-
-
-def _words(held: Sequence[set[int]]) -> str:
-    return ", ".join(
-        f"{letter} = {', '.join(map(str, sorted(planes)))}"
-        for letter, planes in zip("ijk", held, strict=True)
-        if planes
-    )
-
-
-def _listed(places: list[int]) -> str:
-    more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-    return f"variable{'s' * (len(places) > 1)} {', '.join(map(str, places[:6]))}{more}"
 
 
 def _overlaps(inside: dict[str, Embedding]) -> list[str]:

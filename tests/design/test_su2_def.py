@@ -368,7 +368,10 @@ def test_mistakes_are_told_with_their_line(text, message, here):
             "DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (high)",
             "no node of high is in the FFD box",
         ),
-        ("DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (hihg)", "no marker 'hihg'; did you mean high?"),
+        (
+            "DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (hihg)",
+            "DV_MARKER: mesh.su2 has no marker",
+        ),
         ("DV_PARAM= (BOX, 1, 0, 0, 1)\nDV_MARKER= (NONE)", "DV_MARKER names no boundary; nothing"),
     ],
 )

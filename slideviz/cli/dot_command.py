@@ -1,0 +1,118 @@
+"""``slideviz dot``: gradients for the design variables of SU2, in place of SU2_DOT_AD."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from slideviz.cli.def_command import add_config, read_configuration
+from slideviz.cli.options import add_shared
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from slideviz.design.su2_config import Su2Config
+    from slideviz.design.su2_gradients import Gradients
+
+
+def add_dot(calls: argparse._SubParsersAction) -> None:
+    """Add the command ``dot`` to the parser."""
+    call = calls.add_parser("dot", help="gradients for SU2's design variables, like SU2_DOT_AD")
+    add_config(call)
+    add_shared(call, "json", help="report as JSON; - is the terminal")
+    call.set_defaults(command=run_dot)
+
+
+def run_dot(arguments: argparse.Namespace) -> int:
+    """Write the gradients for moving nodes and for design variables."""
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.progress import Bar
+    from slideviz.cli.report import save_json
+    from slideviz.design.su2_gradients import find_gradients
+    from slideviz.design.su2_sensitivities import sensitivity_file
+    from slideviz.design.su2_surface import make_surface
+    from slideviz.errors import CaseError
+
+    begin = time.perf_counter()
+    config, mesh = read_configuration(arguments)
+    kinds = {variable.kind for variable in config.variables}
+    if "FFD_SETTING" in kinds:
+        raise CaseError(f"{config.source}: FFD_SETTING moves nothing: there is no gradient for it")
+    arguments.inputs.setdefault(sensitivity_file(config), "the file of the sensitivities")
+    sensitivities = config.files["DV_SENS_FILENAME"]
+    gradient = None if "SURFACE_FILE" in kinds else config.files["GRAD_OBJFUNC_FILENAME"]
+    require_places(
+        arguments,
+        Output(sensitivities, "DV_SENS_FILENAME", False),
+        Output(gradient, "GRAD_OBJFUNC_FILENAME", False),
+        Output(arguments.json, "--json"),
+    )
+    surface = make_surface(config, mesh)
+    with Bar(not arguments.quiet) as bar:
+        found = find_gradients(surface, bar)
+    _write_surface(sensitivities, found)
+    if gradient is not None:
+        _write_gradient(gradient, config, found)
+    report = {
+        "case": str(config.source),
+        "mesh": str(config.case.mesh_file),
+        "sensitivities": found.source,
+        "at": "design" if found.at_design else "mesh",
+        "gradient": [] if gradient is None else found.variables.tolist(),
+        "variables": [
+            {"kind": variable.kind, "value": variable.value, "idle": idle}
+            for variable, idle in zip(config.variables, surface.idle, strict=True)
+        ],
+        "ignored": list(config.ignored),
+        "seconds": {"total": round(time.perf_counter() - begin, 6)},
+        "warnings": list(dict.fromkeys(found.warnings)),
+    }
+    text = save_json(arguments.json, report) if arguments.json else None
+    if text is not None:
+        print(text, end="")
+    elif not arguments.quiet:
+        _print(report, sensitivities, gradient)
+    for warning in report["warnings"]:
+        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    return DONE
+
+
+def _print(report: dict, sensitivities: Path, gradient: Path | None) -> None:
+    where = "this design" if report["at"] == "design" else "the points of the mesh as it is"
+    print(f"{report['case']}: sensitivities {report['sensitivities']}, at {where}")
+    for variable, value in zip(report["variables"], report["gradient"], strict=False):
+        print(f"  {variable['kind']:<22}{variable['value']:>14.6g}{value:>24.15g}")
+    print(f"gradient for each moving node: {sensitivities}")
+    if gradient is not None:
+        print(f"gradient for each design variable: {gradient}")
+    else:
+        print("SURFACE_FILE has no value to differentiate for: no gradient for design variables")
+
+
+def _write_surface(path: Path, found: Gradients) -> None:
+    """Write ``x, y, z, dJ/dx, dJ/dy, dJ/dz`` of each moving node, in 2D with zeros."""
+    import numpy as np
+
+    from slideviz.errors import CaseError
+    from slideviz.mesh.io.atomic import atomic_write
+
+    table = np.zeros((len(found.points), 6))
+    table[:, : found.points.shape[1]] = found.points
+    table[:, 3 : 3 + found.points.shape[1]] = found.surface
+    rows = [", ".join(map(repr, row)) for row in table.tolist()]
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(rows) + "\n").encode())
+
+
+def _write_gradient(path: Path, config: Su2Config, found: Gradients) -> None:
+    """Write a line that names the objective, and a number for each design variable."""
+    from slideviz.errors import CaseError
+    from slideviz.mesh.io.atomic import atomic_write
+
+    objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").split(",")[0].strip()
+    rows = [f"{objective} gradient", *(repr(value) for value in found.variables.tolist())]
+    with atomic_write(path, CaseError) as file:
+        file.write(("\n".join(rows) + "\n").encode())

@@ -1,0 +1,109 @@
+"""Gradients for design variables: sensitivities of all points, pulled back to the boundaries."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.deformation.steps import Progress
+from slideviz.design.deformer import Deformer
+from slideviz.design.su2_sensitivities import match, read_sensitivities
+from slideviz.design.su2_surface import Surface
+from slideviz.mesh.model import FloatArray
+
+DIRECTIONS = 16
+"""At a design of zeros, control nodes are chosen for so many directions together."""
+REACH = 1e-3
+"""How far these move the boundary, as a part of the mesh."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gradients:
+    """What an objective changes by at a design.
+
+    Attributes
+    ----------
+    surface : (m, d) float64
+        Per displacement of each moving node, with all inner points following.
+    variables : (v,) float64
+        Per value of each design variable.
+    points : (m, d) float64
+        Where the moving nodes are at the design.
+    at_design : bool
+        Whether the design is that of the configuration, and not the mesh as it is.
+    source : str
+        The file of the sensitivities.
+    warnings : tuple of str
+    """
+
+    surface: FloatArray
+    variables: FloatArray
+    points: FloatArray
+    at_design: bool
+    source: str
+    warnings: tuple[str, ...]
+
+
+def find_gradients(
+    surface: Surface, progress: Callable[[Progress], None] | None = None
+) -> Gradients:
+    """Return the gradients of the objective whose sensitivities the configuration names.
+
+    Raises
+    ------
+    SlidevizError
+        The sensitivities are not there or of another mesh, or the deformation is not possible.
+    """
+    config, mesh = surface.config, surface.mesh
+    found = read_sensitivities(config, mesh)
+    displacement = surface.displacement
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        deformer = _deformer(surface, displacement, progress)
+        matched = match(found, mesh, deformer.deform(displacement))
+        if not matched.at_design and displacement.any():
+            displacement = np.zeros_like(displacement)
+            deformer = _deformer(surface, displacement, progress)
+        pulled = deformer.vjp(displacement, matched.values)
+    slopes = (
+        surface.slope(place, undeformed=not matched.at_design)
+        for place in range(len(config.variables))
+    )
+    return Gradients(
+        surface=pulled,
+        variables=np.array([float((pulled * slope).sum()) for slope in slopes]),
+        points=mesh.points[surface.nodes] + displacement,
+        at_design=matched.at_design,
+        source=str(found.path),
+        warnings=(*deformer.warnings, *matched.warnings, *(str(each.message) for each in told)),
+    )
+
+
+def _deformer(
+    surface: Surface, displacement: FloatArray, progress: Callable[[Progress], None] | None
+) -> Deformer:
+    """Return the deformation, prepared at a design."""
+    reference = displacement[None]
+    if not displacement.any():
+        reference = np.concatenate([reference, _directions(surface)])
+    deformer = Deformer(surface.mesh, surface.case(), reference, progress)
+    assert np.array_equal(deformer.nodes, surface.nodes)
+    return deformer
+
+
+def _directions(surface: Surface) -> FloatArray:
+    """Return displacements (k, m, d) as large as ``REACH`` that together move as variables do."""
+    sums: list[FloatArray] = []
+    for place in range(len(surface.config.variables)):
+        slope = surface.slope(place, undeformed=True)
+        largest = float(np.abs(slope).max(initial=0.0))
+        unit = slope * (REACH * surface.mesh.extent / largest) if largest else slope
+        if len(sums) < DIRECTIONS:
+            sums.append(np.array(unit))
+        else:
+            sums[place % DIRECTIONS] += unit
+    moving = [each for each in sums if each.any()]
+    return np.array(moving).reshape(-1, len(surface.nodes), surface.mesh.dim)

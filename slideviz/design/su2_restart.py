@@ -1,0 +1,75 @@
+"""Restart files of SU2: a table of all points, as text or binary."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.case.lines import read_text
+from slideviz.errors import CaseError
+from slideviz.mesh.io.file_checks import require_ordinary
+from slideviz.mesh.model import FloatArray
+
+MAGIC = 535532
+"""The first number of SU2's binary restart files."""
+NAME_BYTES = 33
+
+
+def read_restart(path: Path) -> tuple[list[str], FloatArray]:
+    """Return the names of the columns of a restart, and its rows (n, c).
+
+    Raises
+    ------
+    CaseError
+        It is cut off, or has what is no number.
+    """
+    require_ordinary(path, CaseError)
+    with path.open("rb") as file:
+        binary = file.read(4) == np.int32(MAGIC).tobytes()
+    return _binary(path) if binary else _csv(path)
+
+
+def is_number(word: str) -> bool:
+    """Tell whether a word is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _csv(path: Path) -> tuple[list[str], FloatArray]:
+    """Return the names of the columns and the rows of a restart in text."""
+    text, _ = read_text(path, "displacement file")
+    head, _, body = text.partition("\n")
+    names = [name.strip().strip('"').strip() for name in head.split(",")]
+    lines = body.splitlines()
+    while lines and not is_number(lines[-1].partition(",")[0].strip()):
+        lines.pop()  # what SU2 notes at the end
+    try:
+        table = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
+    except ValueError as problem:
+        raise CaseError(f"{path}: has a row that is not all numbers: {problem}") from problem
+    if table.shape[1:] != (len(names),):
+        raise CaseError(f"{path}: has {len(names)} names of columns, but rows of another length")
+    return names, table
+
+
+def _binary(path: Path) -> tuple[list[str], FloatArray]:
+    """Return the names of the columns and the rows of a binary restart.
+
+    Five ``int32``: 535532, columns, points and two more; a name of 33 bytes for each column; the
+    numbers, point by point.
+    """
+    data = path.read_bytes()
+    _, width, count = np.frombuffer(data[:12], np.int32).tolist()
+    begin = 20 + NAME_BYTES * width
+    if width < 1 or count < 0 or len(data) < begin + 8 * width * count:
+        raise CaseError(f"{path}: is cut off: {width} columns of {count} points do not fit in it")
+    names = [
+        data[20 + NAME_BYTES * k : 20 + NAME_BYTES * (k + 1)].split(b"\0")[0].decode("latin-1")
+        for k in range(width)
+    ]
+    table = np.frombuffer(data, np.float64, width * count, begin).reshape(count, width)
+    return [name.strip().strip('"') for name in names], table

@@ -1,0 +1,259 @@
+"""Volume sensitivities that SU2's adjoint solver leaves: read, and matched to points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from slideviz.case.lines import read_text
+from slideviz.design.su2_config import Su2Config
+from slideviz.design.su2_restart import is_number, read_restart
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+
+SUFFIXES = {
+    "DRAG": "cd",
+    "LIFT": "cl",
+    "SIDEFORCE": "csf",
+    "EFFICIENCY": "eff",
+    "MOMENT_X": "cmx",
+    "MOMENT_Y": "cmy",
+    "MOMENT_Z": "cmz",
+    "FORCE_X": "cfx",
+    "FORCE_Y": "cfy",
+    "FORCE_Z": "cfz",
+    "INVERSE_DESIGN_PRESSURE": "invpress",
+    "INVERSE_DESIGN_HEAT": "invheat",
+    "INVERSE_DESIGN_HEATFLUX": "invheat",
+    "MAXIMUM_HEATFLUX": "maxheat",
+    "TOTAL_HEATFLUX": "totheat",
+    "AVG_TEMPERATURE": "avtp",
+    "EQUIVALENT_AREA": "ea",
+    "NEARFIELD_PRESSURE": "nfp",
+    "THRUST": "ct",
+    "TORQUE": "cq",
+    "FIGURE_OF_MERIT": "merit",
+    "BUFFET": "buffet",
+    "SURFACE_TOTAL_PRESSURE": "pt",
+    "SURFACE_STATIC_PRESSURE": "pe",
+    "SURFACE_STATIC_TEMPERATURE": "T",
+    "SURFACE_MASSFLOW": "mfr",
+    "SURFACE_MACH": "mach",
+    "SURFACE_UNIFORMITY": "uniform",
+    "SURFACE_SECONDARY": "second",
+    "SURFACE_MOM_DISTORTION": "distort",
+    "SURFACE_SECOND_OVER_UNIFORM": "sou",
+    "SURFACE_PRESSURE_DROP": "dp",
+    "CUSTOM_OBJFUNC": "custom",
+    "KINETIC_ENERGY_LOSS": "ke",
+    "TOTAL_PRESSURE_LOSS": "pl",
+    "ENTROPY_GENERATION": "entg",
+    "EULERIAN_WORK": "ew",
+    "FLOW_ANGLE_OUT": "fao",
+    "FLOW_ANGLE_IN": "fai",
+    "MASS_FLOW_OUT": "mfo",
+    "MASS_FLOW_IN": "mfi",
+    "TOTAL_EFFICIENCY": "teff",
+    "TOTAL_STATIC_EFFICIENCY": "tseff",
+    "REFERENCE_GEOMETRY": "refgeom",
+    "REFERENCE_NODE": "refnode",
+    "VOLUME_FRACTION": "volfrac",
+    "TOPOL_COMPLIANCE": "topcomp",
+    "STRESS_PENALTY": "stress",
+}
+"""What SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
+SAME = 1e-6
+"""By how much positions in a file may miss those of points, as a part of the largest coordinate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of an objective with respect to the points of a mesh.
+
+    Attributes
+    ----------
+    path : Path
+    values : (n, d) float64
+        In the order of the mesh's points, or of the file where ``ordered`` is false.
+    points : (n, d) float64 or None
+        Where the points were.
+    ordered : bool
+    """
+
+    path: Path
+    values: FloatArray
+    points: FloatArray | None
+    ordered: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Sensitivities in the order of a mesh's points.
+
+    Attributes
+    ----------
+    values : (n, d) float64
+    at_design : bool
+        Whether they are those at the points of the design, and not of the mesh as it is.
+    warnings : tuple of str
+    """
+
+    values: FloatArray
+    at_design: bool
+    warnings: tuple[str, ...] = ()
+
+
+def read_sensitivities(config: Su2Config, mesh: Mesh) -> Sensitivities:
+    """Return the sensitivities that a configuration names.
+
+    Raises
+    ------
+    CaseError
+        The file is not there, lacks columns or points, or has what is no number.
+    """
+    path = sensitivity_file(config)
+    if _is_unordered(config):
+        return _unordered(path, mesh)
+    names, table = read_restart(path)
+    return _ordered(path, names, table, mesh)
+
+
+def _is_unordered(config: Su2Config) -> bool:
+    return config.words["DV_SENSITIVITY_FORMAT"].upper() == "UNORDERED_ASCII"
+
+
+def sensitivity_file(config: Su2Config) -> Path:
+    """Return the file of the sensitivities.
+
+    An adjoint restart has the suffix of its objective in its name, and ends with ``.csv`` or
+    ``.dat``.
+
+    Raises
+    ------
+    CaseError
+        There is none.
+    """
+    if _is_unordered(config):
+        return config.files["DV_UNORDERED_SENS_FILENAME"]
+    given = config.files["SOLUTION_ADJ_FILENAME"]
+    objective = config.words["OBJECTIVE_FUNCTION"].strip("() ").upper()
+    stem = given.with_suffix("") if given.suffix in (".csv", ".dat") else given
+    suffix = "combo" if "," in objective else SUFFIXES.get(objective, "")
+    stems = [stem.with_name(f"{stem.name}_{suffix}")] if suffix else []
+    endings = [".csv", ".dat"]
+    if config.words["READ_BINARY_RESTART"].upper() == "YES":
+        endings.reverse()
+    tried = [one.with_name(one.name + end) for one in (*stems, stem) for end in endings]
+    for path in (*tried, given):
+        if path.is_file():
+            return path
+    raise CaseError(
+        f"{config.source}: there is no adjoint solution of OBJECTIVE_FUNCTION= {objective}: "
+        f"none of {', '.join(map(str, tried))}; SOLUTION_ADJ_FILENAME names it"
+    )
+
+
+def match(found: Sensitivities, mesh: Mesh, design: FloatArray) -> Matched:
+    """Return sensitivities in the order of the points, and where they were taken.
+
+    An adjoint solution belongs to the mesh that it was computed on: that of this design, (n, d), or
+    MESH_FILENAME itself where that is deformed already, as in SU2's own loop. Its points tell.
+
+    Raises
+    ------
+    CaseError
+        It belongs to neither.
+    """
+    if found.points is None:
+        said = f"{found.path} has no coordinates: taken as those of this design"
+        return Matched(found.values, True, (said,))
+    places = (design, mesh.points)
+    rows: list[np.ndarray]
+    if found.ordered:
+        gaps = [float(np.abs(found.points - at).max(initial=0.0)) for at in places]
+        rows = [np.arange(len(mesh.points))] * 2
+    else:
+        nearest = [cKDTree(at).query(found.points) for at in places]
+        gaps = [float(np.max(gap, initial=0.0)) for gap, _ in nearest]
+        rows = [np.asarray(index) for _, index in nearest]
+    best = int(np.argmin(gaps))
+    allowed = SAME * largest_coordinate(mesh.points)
+    if gaps[best] > allowed:
+        raise CaseError(
+            f"{found.path}: its points are neither those of {mesh.name} nor those of this design: "
+            f"off by {min(gaps):.3g}; run the adjoint solver on the mesh that `slideviz def` writes"
+        )
+    values = np.zeros(mesh.points.shape)
+    index, counts = np.unique(rows[best], return_counts=True)
+    if (counts > 1).any():
+        node = index[int(np.argmax(counts))]
+        raise CaseError(f"{found.path}: several rows are at the point {node}; one each is needed")
+    values[rows[best]] = found.values
+    missing = len(mesh.points) - len(index)
+    said = f"{found.path}: {missing} points of the mesh are not in it; taken as 0"
+    return Matched(values, best == 0, (said,) if missing else ())
+
+
+def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sensitivities:
+    """Return the sensitivities of a table of all points."""
+    letters = "xyz"[: mesh.dim]
+    column = {name.lower(): place for place, name in enumerate(names)}
+    wanted = [f"sensitivity_{letter}" for letter in letters]
+    lacking = [f"Sensitivity_{name[-1]}" for name in wanted if name not in column]
+    if lacking:
+        raise CaseError(
+            f"{path}: has no column {', '.join(lacking)}, but {', '.join(names[:8])} ...; write it "
+            "with SU2's discrete adjoint (OUTPUT_FILES= RESTART_ASCII)"
+        )
+    if len(table) != len(mesh.points):
+        raise CaseError(
+            f"{path}: has {len(table)} points, and {mesh.name} {len(mesh.points)}; it is of "
+            "another mesh"
+        )
+    order = np.arange(len(table))
+    if "pointid" in column:
+        number = table[:, column["pointid"]]
+        order = np.argsort(number, kind="stable")
+        if not np.array_equal(number[order], np.arange(len(table))):
+            raise CaseError(f"{path}: its PointID are not 0 to {len(table) - 1}, each once")
+    values = table[order][:, [column[name] for name in wanted]]
+    _require_finite(path, values)
+    there = all(letter in column for letter in letters)
+    points = table[order][:, [column[letter] for letter in letters]] if there else None
+    return Sensitivities(path, values, points)
+
+
+def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
+    """Return the sensitivities of a file whose rows are matched by position."""
+    rows = [row for row in _rows(path) if row]
+    dim = mesh.dim
+    width = len(rows[0]) if rows else 0
+    if width not in {6, 2 * dim} or any(len(row) != width for row in rows):
+        raise CaseError(f"{path}: needed are rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers")
+    table = np.array(rows)
+    values = table[:, width // 2 : width // 2 + dim]
+    _require_finite(path, table)
+    return Sensitivities(path, values, table[:, :dim], ordered=False)
+
+
+def _rows(path: Path) -> Iterator[list[float]]:
+    """Yield the numbers of each line; lines that begin with none are headings."""
+    text, _ = read_text(path, "displacement file")
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.replace(",", " ").split()
+        if not words or not is_number(words[0]):
+            continue
+        try:
+            yield [float(word) for word in words]
+        except ValueError:
+            raise CaseError(f"{path}:{number}: has something that is no number") from None
+
+
+def _require_finite(path: Path, values: FloatArray) -> None:
+    if not np.isfinite(values).all():
+        row = int(np.argmax(~np.isfinite(values).all(axis=1)))
+        raise CaseError(f"{path}: the sensitivity of point {row} is not finite; did SU2 diverge?")

@@ -1,0 +1,377 @@
+"""``slideviz dot``: gradients against central differences of ``slideviz def``, and SU2's files."""
+
+import json
+import lzma
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slideviz as sv
+from slideviz.cli import run
+from tests.builders import cube, square
+
+DESIGN = Path(__file__).parents[2] / ".." / "shared" / "meshes" / "design"
+CORNERS = [(-0.1, 0.3), (1.1, 0.3), (1.1, 0.8), (-0.1, 0.8)]
+BOX = "(BOX, " + ", ".join(f"{x}, {y}, 0" for x, y in CORNERS) + ", 0" * 12 + ")"
+HEAD = f"""
+MESH_FILENAME= mesh.su2
+MESH_OUT_FILENAME= out.su2
+SOLUTION_ADJ_FILENAME= adj.dat
+OBJECTIVE_FUNCTION= DRAG
+FFD_DEFINITION= {BOX}
+FFD_DEGREE= (4, 2, 0)
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def unpacked(name):
+    """A file of the design cases in the working folder; skips where they are not here."""
+    path = DESIGN / name
+    packed = path.with_name(f"{name}.xz")
+    if not path.is_file() and not packed.is_file():
+        pytest.skip("the design cases are not here")
+    data = path.read_bytes() if path.is_file() else lzma.decompress(packed.read_bytes())
+    Path(name).write_bytes(data)
+
+
+def write_csv(path, points, weights, *, order=None, quoted=True, extra=""):
+    letters = "xyz"[: points.shape[1]]
+    names = ["PointID", *letters, "Adj_Density", *(f"Sensitivity_{c}" for c in letters)]
+    head = ", ".join(f'"{name}"' if quoted else name for name in names)
+    order = range(len(points)) if order is None else order
+    rows = [
+        ", ".join(map(repr, [int(k), *points[k].tolist(), 7.5, *weights[k].tolist()]))
+        for k in order
+    ]
+    Path(path).write_text("\n".join([head, *rows]) + "\n" + extra)
+
+
+def written(config):
+    """The mesh that ``def`` writes for a configuration."""
+    Path("def.cfg").write_text(config)
+    assert run(["def", "def.cfg", "-q"]) in (0, 3)
+    return sv.read("out.su2").points
+
+
+def values_text(values):
+    return ", ".join(map(repr, values))
+
+
+def differences(config, values, weights, steps):
+    """Central differences of the sum of weights times points, by ``def``."""
+    found = []
+    for place, step in enumerate(steps):
+        ends = []
+        for sign in (1, -1):
+            moved = list(values)
+            moved[place] += sign * step
+            ends.append((weights * written(config.replace("VALUES", values_text(moved)))).sum())
+        found.append((ends[0] - ends[1]) / (2 * step))
+    return np.array(found)
+
+
+def gradient():
+    head, *rows = Path("of_grad.dat").read_text().splitlines()
+    assert head.endswith("gradient")
+    return np.array([float(row) for row in rows])
+
+
+RIGID = """\
+DV_KIND= TRANSLATION, ROTATION, SCALE
+DV_PARAM= (1, 0.5, 0); (0.4, 0.5, 0, 0.4, 0.5, 1); (1.0)
+DV_VALUE= VALUES
+"""
+BOXES = """\
+DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT, FFD_CONTROL_POINT_2D
+DV_PARAM= (BOX, 2, 1, 0, 1); (BOX, 1, 2, 0, 1, -1, 0); (BOX, -1, 0, 1, 0)
+DV_VALUE= VALUES
+"""
+RELAXED = """\
+DV_KIND= ROTATION, SCALE, FFD_CONTROL_POINT_2D
+OPT_RELAX_FACTOR= 0.5
+DV_PARAM= (0.4, 0.5, 0, 0.4, 0.5, 1); (1.0); (BOX, 2, 1, 0, 1)
+DV_VALUE= VALUES
+"""
+CASES = {
+    "rigid": (RIGID, [0.01, 3.0, 1.02]),
+    "boxes": (BOXES, [0.05, 0.02, -0.03]),
+    "relaxed": (RELAXED, [5.0, 2.02, 0.05]),
+}
+SETTINGS = {
+    "fixed": "",
+    "sliding": "MARKER_SYM= (x_m, x_p)\n",
+    "two steps": "MARKER_SYM= (y_m, y_p)\nSLIDING_MODE= ds\nSTEPS= 2\n",
+}
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("kinds", CASES)
+def test_gradient_is_that_of_central_differences(kinds, setting, here):
+    mesh = square(8)
+    sv.write("mesh.su2", mesh)
+    names = [name for name in mesh.marker_names if name.startswith(("x_", "y_"))]
+    assert len(names) == 4, mesh.marker_names
+    moving = [name for name in mesh.marker_names if name not in names]
+    variables, values = CASES[kinds]
+    config = HEAD + f"DV_MARKER= ({', '.join(moving)})\n" + variables + SETTINGS[setting]
+    weights = np.random.default_rng(1).normal(size=mesh.points.shape)
+    expected = differences(config, values, weights, [1e-5 * max(1, abs(v)) for v in values])
+    text = config.replace("VALUES", values_text(values))
+    write_csv("adj_cd.csv", written(text), weights)
+    Path("dot.cfg").write_text(text)
+    assert run(["dot", "dot.cfg", "-q", "--json", "dot.json"]) == 0
+    np.testing.assert_allclose(gradient(), expected, rtol=2e-6, atol=1e-8)
+    assert json.loads(Path("dot.json").read_text())["at"] == "design"
+
+
+def test_gradient_in_3d_with_splines(here):
+    mesh = cube(4)
+    sv.write("mesh.su2", mesh)
+    corners = ", ".join(f"{x}, {y}, {z}" for z in (0.1, 0.9) for x, y in CORNERS)
+    config = HEAD.replace(BOX, f"(BOX, {corners})").replace("(4, 2, 0)", "(4, 2, 2)") + (
+        "FFD_BLENDING= BSPLINE_UNIFORM\nFFD_BSPLINE_ORDER= 3, 2, 3\nDV_MARKER= (BLOCK)\n"
+        "MARKER_SYM= (z_m, z_p)\nDV_KIND= ROTATION, FFD_CONTROL_POINT, TRANSLATION\n"
+        "DV_PARAM= (0.4, 0.5, 0, 0.6, 0.8, 1); (BOX, 2, 1, 1, 0.3, 1, 0.2); (0, 0, 1)\n"
+        "DV_VALUE= VALUES\n"
+    )
+    values = [4.0, 0.02, 0.01]
+    weights = np.random.default_rng(2).normal(size=mesh.points.shape)
+    expected = differences(config, values, weights, [1e-5] * 3)
+    text = config.replace("VALUES", values_text(values))
+    write_csv("adj_cd.csv", written(text), weights)
+    Path("dot.cfg").write_text(text)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    np.testing.assert_allclose(gradient(), expected, rtol=2e-6, atol=1e-8)
+    table = np.loadtxt("surface_sensitivity.dat", delimiter=",")
+    nodes = mesh.marker("BLOCK").nodes
+    np.testing.assert_allclose(table[:, :3], sv.read("out.su2").points[nodes], atol=1e-12)
+    shift = table[:, 5].sum()  # of all nodes along z: the last variable
+    assert shift == pytest.approx(gradient()[2], rel=1e-12)
+
+
+def simple(values="0.05, 0.02", markers="BLOCK"):
+    return HEAD + (
+        f"DV_MARKER= ({markers})\nDV_KIND= FFD_CONTROL_POINT_2D, TRANSLATION\n"
+        f"DV_PARAM= (BOX, 2, 1, 0, 1); (1, 0, 0)\nDV_VALUE= {values}\n"
+    )
+
+
+@pytest.fixture
+def case(here):
+    """A design written to ``dot.cfg``, its points and sensitivities."""
+    sv.write("mesh.su2", square(8))
+    points = written(simple())
+    weights = np.random.default_rng(3).normal(size=points.shape)
+    Path("dot.cfg").write_text(simple())
+    return points, weights
+
+
+def test_every_form_of_the_file_gives_the_same(case):
+    points, weights = case
+
+    def found():
+        assert run(["dot", "dot.cfg", "-q"]) == 0
+        return gradient()
+
+    write_csv("adj_cd.csv", points, weights)
+    expected = found()
+    back = np.arange(len(points))[::-1]
+    write_csv("adj_cd.csv", points, weights, order=back, quoted=False, extra="AOA= 1.25\n")
+    np.testing.assert_array_equal(found(), expected)
+    Path("adj_cd.csv").rename("adj.csv")
+    np.testing.assert_array_equal(found(), expected)
+    Path("adj.csv").unlink()
+    names = ["x", "y", "Sensitivity_x", "Sensitivity_y"]
+    head = np.array([535532, 4, len(points), 0, 0], np.int32).tobytes()
+    head += b"".join(name.encode().ljust(33, b"\0") for name in names)
+    body = np.hstack([points, weights]).tobytes()
+    Path("adj_cd.dat").write_bytes(head + body + b"\0" * 100)
+    np.testing.assert_array_equal(found(), expected)
+    rows = [[*points[k], 0.0, *weights[k], 0.0] for k in back]
+    text = "\n".join(", ".join(map(repr, map(float, row))) for row in rows)
+    Path("sens.dat").write_text("x, y, z, dJdx, dJdy, dJdz\n" + text + "\n")
+    more = "DV_SENSITIVITY_FORMAT= UNORDERED_ASCII\nDV_UNORDERED_SENS_FILENAME= sens.dat\n"
+    Path("dot.cfg").write_text(simple() + more)
+    np.testing.assert_array_equal(found(), expected)
+
+
+def test_mesh_that_is_deformed_already_is_taken_as_it_is(case):
+    """As in SU2's loop: MESH_FILENAME is the deformed mesh, and so are the sensitivities."""
+    points, weights = case
+    Path("mesh.su2").write_bytes(Path("out.su2").read_bytes())
+    write_csv("adj_cd.csv", points, weights)
+    Path("dot.cfg").write_text(simple())
+    assert run(["dot", "dot.cfg", "-q", "--json", "a.json"]) == 0
+    assert json.loads(Path("a.json").read_text())["at"] == "mesh"
+    found = gradient()
+    expected = differences(simple("VALUES"), [0.0, 0.0], weights, [1e-6] * 2)
+    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-8)
+
+
+def test_sensitivities_without_coordinates_are_those_of_the_design(case, capsys):
+    points, weights = case
+    write_csv("adj_cd.csv", points, weights)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    expected = gradient()
+    table = [row.split(", ") for row in Path("adj_cd.csv").read_text().splitlines()]
+    Path("adj_cd.csv").write_text("\n".join(", ".join([r[0], *r[4:]]) for r in table) + "\n")
+    assert run(["dot", "dot.cfg"]) == 0
+    assert "adj_cd.csv has no coordinates: taken as those of this design" in capsys.readouterr().err
+    np.testing.assert_array_equal(gradient(), expected)
+
+
+def test_several_objectives_and_names_of_files(case):
+    points, weights = case
+    config = simple().replace("DRAG", "DRAG, LIFT") + (
+        "GRAD_OBJFUNC_FILENAME= g.dat\nDV_SENS_FILENAME= s.dat\n"
+    )
+    Path("dot.cfg").write_text(config)
+    write_csv("adj_combo.csv", points, weights)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert Path("g.dat").read_text().splitlines()[0] == "DRAG gradient"
+    assert len(Path("s.dat").read_text().splitlines()) == len(square(8).marker("BLOCK").nodes)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p, w: None, "there is no adjoint solution of OBJECTIVE_FUNCTION= DRAG: none of"),
+        (lambda p, w: write_csv("adj_cd.csv", p[:-1], w[:-1]), "has 79 points, and mesh.su2 80"),
+        (lambda p, w: write_csv("adj_cd.csv", p + 0.3, w), "its points are neither those of mesh"),
+        (lambda p, w: write_csv("adj_cd.csv", p, w * np.nan), "point 0 is not finite; did SU2"),
+        (
+            lambda p, w: write_csv("adj_cd.csv", p, w, order=[0, *range(len(p) - 1)]),
+            "its PointID are not 0 to 79, each once",
+        ),
+        (
+            lambda p, w: Path("adj_cd.csv").write_text('"PointID", "x", "y"\n0, 1, 2\n'),
+            "has no column Sensitivity_x, Sensitivity_y, but PointID, x, y",
+        ),
+        (
+            lambda p, w: Path("adj_cd.csv").write_text('"x", "Sensitivity_x"\n0, a\n1, 2\n'),
+            "has a row that is not all numbers",
+        ),
+        (
+            lambda p, w: Path("adj_cd.dat").write_bytes(
+                np.array([535532, 4, 9, 0, 0], np.int32).tobytes()
+            ),
+            "is cut off: 4 columns of 9 points do not fit in it",
+        ),
+    ],
+)
+def test_wrong_sensitivities_are_told(change, message, case, capsys):
+    change(*case)
+    assert run(["dot", "dot.cfg", "-q"]) == 1
+    assert message in capsys.readouterr().err
+    assert not Path("of_grad.dat").exists()
+
+
+def test_wrong_unordered_files_are_told(case, capsys):
+    more = "DV_SENSITIVITY_FORMAT= UNORDERED_ASCII\n"
+    Path("dot.cfg").write_text(simple() + more)
+    rows = [", ".join(map(repr, map(float, [*p, 0, *w, 0]))) for p, w in zip(*case, strict=True)]
+    for text, message in (
+        ("1, 2\n", "needed are rows x, y, z, dJ/dx, dJ/dy, dJ/dz of numbers"),
+        ("1, 2, 3, 4, 5, six\n", "unordered_sensitivity.dat:1: has something that is no number"),
+        ("\n".join([*rows, rows[0]]), "several rows are at the point 0; one each is needed"),
+    ):
+        Path("unordered_sensitivity.dat").write_text(text)
+        assert run(["dot", "dot.cfg", "-q"]) == 1
+        assert message in capsys.readouterr().err
+    Path("unordered_sensitivity.dat").write_text("\n".join(rows[:-2]))
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert "2 points of the mesh are not in it; taken as 0" in capsys.readouterr().err
+
+
+def test_held_variables_have_no_gradient(case, capsys):
+    points, weights = case
+    config = simple("0.0, 0.02").replace("0.3", "0.45", 1) + "FFD_CONTINUITY= NO_DERIVATIVE\n"
+    config = config.replace("-0.1", "0.45").replace("(BOX, 2, 1", "(BOX, 0, 1")
+    points = written(config)
+    write_csv("adj_cd.csv", points, weights)
+    Path("dot.cfg").write_text(config)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    found = gradient()
+    assert found[0] == 0.0
+    assert found[1] != 0.0
+    assert (
+        "holds i = 0, j = 0 of the box BOX: variable 1 of DV_KIND will do"
+        in capsys.readouterr().err
+    )
+
+
+def test_surface_file_has_a_surface_gradient_only(case, capsys):
+    points, weights = case
+    config = HEAD + "DV_MARKER= (BLOCK)\nDV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n"
+    nodes = square(8).marker("BLOCK").nodes
+    rows = [f"{k} {x!r} {y!r}" for k, (x, y) in zip(nodes, points[nodes].tolist(), strict=True)]
+    Path("p.dat").write_text("\n".join(rows))
+    Path("dot.cfg").write_text(config)
+    write_csv("adj_cd.csv", written(config), weights)
+    assert run(["dot", "dot.cfg"]) == 0
+    assert "SURFACE_FILE has no value to differentiate for" in capsys.readouterr().out
+    assert not Path("of_grad.dat").exists()
+    assert np.loadtxt("surface_sensitivity.dat", delimiter=",").shape == (len(nodes), 6)
+
+
+def test_ffd_setting_has_no_gradient(case, capsys):
+    Path("dot.cfg").write_text(HEAD + "DV_MARKER= (BLOCK)\nDV_KIND= FFD_SETTING\n")
+    assert run(["dot", "dot.cfg", "-q"]) == 1
+    assert "FFD_SETTING moves nothing: there is no gradient for it" in capsys.readouterr().err
+
+
+BURNER = """\
+MARKER_SYM= (symmetry_xm, symmetry_xp)
+DV_MARKER= (wall_hx)
+DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D
+DV_PARAM= (BOX, 3, 1, 0, 1); (BOX, 2, 0, 0, -1); (BOX, 4, -1, 1, 0)
+"""
+NACA = """\
+DV_MARKER= (airfoil_upper, airfoil_lower)
+FFD_CONTINUITY= USER_INPUT
+RBF_KERNEL= wendland-c0
+DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT_2D
+DV_PARAM= (UPPER, 2, 1, 0, 1); (LOWER, 1, 0, 0.5, -1)
+"""
+REAL = {
+    "burner": ("burner_hx.su2", BURNER, [0.0, 0.0, 0.0], 1e-7),
+    # Its smallest cells are 1e-5 of its size: of wendland-c2 differences keep five digits only.
+    "naca": ("naca0012_two_ffd_boxes.su2", NACA, [0.01, 0.02], 1e-4),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_gradients_on_real_meshes(name, here):
+    file, variables, values, step = REAL[name]
+    unpacked(file)
+    config = (
+        f"MESH_FILENAME= {file}\nMESH_OUT_FILENAME= out.su2\nOBJECTIVE_FUNCTION= CUSTOM_OBJFUNC\n"
+        f"SOLUTION_ADJ_FILENAME= solution_adj\n{variables}DV_VALUE= VALUES\n"
+    )
+    text = config.replace("VALUES", values_text(values))
+    if name == "burner":
+        unpacked("solution_adj_custom.csv")
+        names = Path("solution_adj_custom.csv").read_text().partition("\n")[0].split(",")
+        at = [names.index(f'"Sensitivity_{c}"') for c in "xy"]
+        weights = np.loadtxt("solution_adj_custom.csv", delimiter=",", skiprows=1)[:, at]
+    else:
+        points = written(text)
+        weights = np.exp(-np.square(points - np.array([0.4, 0.2])))  # smooth, as of a flow
+        write_csv("solution_adj_custom.csv", points, weights)
+    expected = differences(config, values, weights, [step] * len(values))
+    Path("dot.cfg").write_text(text)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    np.testing.assert_allclose(gradient(), expected, rtol=1e-6, atol=1e-8 * abs(expected).max())
+
+
+def test_no_input_is_written_over(case, capsys):
+    write_csv("adj_cd.csv", *case)
+    Path("dot.cfg").write_text(simple() + "GRAD_OBJFUNC_FILENAME= adj_cd.csv\n")
+    assert run(["dot", "dot.cfg", "-q"]) == 1
+    assert "adj_cd.csv is the file of the sensitivities" in capsys.readouterr().err
