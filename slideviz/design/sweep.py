@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, Ffd, FromFile
 from slideviz.design.sweep_designs import Design, Table, read_designs
 from slideviz.design.sweep_processes import Processes, usable_cores
 from slideviz.design.sweep_results import Results, sources_of
@@ -121,7 +121,7 @@ def sweep(
         earlier = results.start(resume=resume, force=force, meshes=meshes)
     done = {row.design for row in earlier}
     waiting = deque(row for row in asked.rows if row.number not in done)
-    tasks = _Tasks(mesh, len(asked.rows), Path(folder) if folder and meshes else None)
+    tasks = _Tasks(mesh, asked.rows, Path(folder) if folder and meshes else None)
     if executor is None:
         count = min(workers or usable_cores(), len(waiting))
         executor = Processes(max(count, 1), tasks.packed)
@@ -148,18 +148,18 @@ class _Tasks:
     Parameters
     ----------
     mesh : Mesh
-    count : int
-        Designs there are.
+    designs : sequence of Design
     folder : Path or None
         Where the workers write the meshes.
     """
 
-    def __init__(self, mesh: Mesh, count: int, folder: Path | None) -> None:
+    def __init__(self, mesh: Mesh, designs: Sequence[Design], folder: Path | None) -> None:
         self._folder = None if folder is None else Path(folder).absolute()
-        # What only writing needs, such as the text of the file, is much of a mesh.
+        boxes = any(isinstance(m, Ffd) for design in designs for m in design.case.motions)
+        # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
         lean = replace(mesh, document=None, binary=None, cgns=None)
-        self.packed: Packed = packed(lean if folder is None else mesh)
-        self._mesh, self._width = mesh, len(str(count))
+        self.packed: Packed = packed(mesh if boxes or folder is not None else lean)
+        self._mesh, self._width = mesh, len(str(len(designs)))
 
     def of(self, design: Design, with_mesh: bool) -> Task:
         """Return the task of a design."""

@@ -2,7 +2,8 @@
 
 A number of a motion is called ``BLADE.translate.y``: what is moved, how, and which number; or by
 the place of the motion in ``MOTION``, ``motion2.y``, which is needed where the same is moved the
-same way twice. A key is called as ``--set`` calls it, ``STEPS``.
+same way twice. That of a box names its control point, ``BLADE.ffd.BOX.1.0.0.y``. A key is called
+as ``--set`` calls it, ``STEPS``.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 from slideviz.case.cfg import set_key
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile, Motion, named
+from slideviz.case.model import Case, Ffd, FromFile, Motion, Prescribed, named
 from slideviz.case.words import nearest, number, shown
 from slideviz.errors import CaseError
 
@@ -199,15 +200,20 @@ def _plain(name: str) -> str:
 
 
 def _head(motion: Motion) -> str:
-    """Return what a motion moves and how: ``BLADE.translate``."""
-    return f"{'+'.join(named(motion.marker)) or '*'}.{type(motion).__name__.lower()}"
+    """Return what a motion moves and how: ``BLADE.translate``, ``BLADE.ffd.BOX.1.0.0``."""
+    head = f"{'+'.join(named(motion.marker)) or '*'}.{type(motion).__name__.lower()}"
+    if isinstance(motion, Ffd):
+        return ".".join([head, motion.box, *map(str, motion.index)])
+    return head
 
 
 def _parts(motion: Motion, at: int) -> Iterator[tuple[str, Place]]:
     """Yield the names and places of the numbers of a motion."""
-    if isinstance(motion, FromFile):
+    if isinstance(motion, FromFile | Prescribed):
         return
     for field in fields(motion):
+        if field.name == "index":  # which control point it is does not vary
+            continue
         value = getattr(motion, field.name)
         if _is_number(value):
             yield field.name, Place(at, field.name)

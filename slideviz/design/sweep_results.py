@@ -9,6 +9,7 @@ import csv
 import json
 import math
 import os
+import pickle
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import blake2b
 from io import StringIO
@@ -20,11 +21,12 @@ from slideviz import __version__
 from slideviz.case.check import effective
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
-from slideviz.case.model import Case, FromFile
+from slideviz.case.model import Case, Ffd, FromFile, Prescribed
 from slideviz.design.sweep_columns import Value
 from slideviz.design.sweep_designs import Designs
 from slideviz.design.sweep_row import NUMBERS, Row
 from slideviz.errors import CaseError
+from slideviz.ffd.section import boxes_of
 from slideviz.mesh.io.atomic import atomic_write, reason_of
 from slideviz.mesh.model import Mesh
 
@@ -201,7 +203,7 @@ class Results:
         said = "; ".join(
             f"{key}= {_short(before.get(key))} before, {_short(now.get(key))} now"
             if key in KEYS
-            else f"the {key} is another"
+            else f"the {key} changed"
             for key in changed
         )
         raise CaseError(f"{self.path}: was made of something else: {said}; {_REMEDY}")
@@ -212,12 +214,18 @@ _REMEDY = "choose another folder, or begin anew with --force (force=True)"
 
 def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
     """Return what the results of a case depend on: digests of its files, and its keys as text."""
-    plain = effective(case)
+    given = [motion for motion in case.motions if isinstance(motion, Prescribed)]
+    written = tuple(motion for motion in case.motions if not isinstance(motion, Prescribed))
+    plain = effective(case.change(motions=written))
     boundaries = [(marker.name.encode(), marker.cells.connectivity) for marker in mesh.markers]
     found = {
         "mesh": _digest(mesh.points, mesh.cells.types, mesh.cells.connectivity, *chain(*boundaries))
     }
-    for motion in case.motions:
+    if any(isinstance(motion, Ffd) for motion in written):
+        found["FFD_TAG section of the mesh"] = _digest(pickle.dumps(boxes_of(mesh)))
+    for at, one in enumerate(given, start=1):
+        found[f"displacement {at}"] = _digest(one.nodes, one.vectors)
+    for motion in written:
         if isinstance(motion, FromFile):
             try:
                 found[f"file {motion.path.name}"] = _digest(motion.path.read_bytes())

@@ -81,6 +81,28 @@ def test_a_design_that_fails_is_a_row_with_the_reason(passage, here):
     assert rows[1].problem == ""
 
 
+def mesh_with_box(folder, corners):
+    """A square of 8 by 8 cells, read from a file that has a box."""
+    from slideviz.ffd.box import plane_corners, regular_box
+    from slideviz.ffd.section import with_boxes
+
+    x, y = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9), indexing="ij")
+    number = np.arange(81).reshape(9, 9)
+    around = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    sides = {"low": number[:, 0], "high": number[:, -1]}
+    mesh = sv.Mesh(
+        np.stack([x.ravel(), y.ravel()], axis=1),
+        sv.Cells.from_blocks([(9, np.stack(around, axis=-1).reshape(-1, 4))]),
+        tuple(
+            sv.Marker(name, sv.Cells.from_blocks([(3, np.stack([side[:-1], side[1:]], axis=1))]))
+            for name, side in sides.items()
+        ),
+    )
+    box = regular_box("BOX", plane_corners(np.array(corners)[:, :2]), (3, 1, 1), None)
+    sv.write(folder / "boxed.su2", with_boxes(mesh, [box]))
+    return sv.read(folder / "boxed.su2")
+
+
 def test_columns_have_several_names(passage):
     case = passage.case
     for one, other in [
@@ -116,6 +138,39 @@ def test_numbers_of_every_motion():
     assert made.motions[3].distance == 3.0
     with pytest.raises(CaseError, match=r"several motions have it; say which, as motion1.x"):
         columns_of(case, ["a.translate.x"])
+
+
+def test_control_points_of_boxes_are_numbers_too(here, tmp_path):
+    corners = [(-0.1, -0.2, 0), (1.1, -0.2, 0), (1.1, 0.3, 0), (-0.1, 0.3, 0)]
+    square = mesh_with_box(tmp_path, corners)
+    moves = [sv.Ffd("low", "BOX", (k, -1, -1), (0.0, 0.0, 0.0)) for k in (1, 2)]
+    case = sv.Case(roles={"low": "moving"}, motions=tuple(moves))
+    names = ["low.ffd.BOX.1.-1.-1.dy", "low.ffd.box.2.-1.-1.Y"]
+    designs = [dict(zip(names, values, strict=True)) for values in ((0.1, 0.0), (0.05, -0.05))]
+    rows = swept(case, designs, here, mesh=square, folder=tmp_path / "out")
+    for row, (one, other) in zip(rows, ((0.1, 0.0), (0.05, -0.05)), strict=True):
+        moved = [replace(m, vector=(0.0, y, 0.0)) for m, y in zip(moves, (one, other), strict=True)]
+        *_, last = sv.deform(case.change(motions=tuple(moved)), square)
+        assert row.min == sv.quality(last.mesh, reference=square).min < 1.0
+    with pytest.raises(CaseError, match=r"low.ffd.BOX.1.-1.-1.x, low.ffd.BOX.1.-1.-1.y"):
+        columns_of(case, ["low.ffd.BOX.3.0.0.y"])
+    other = mesh_with_box(tmp_path, [*corners[:2], (1.1, 0.4, 0), (-0.1, 0.4, 0)])
+    with pytest.raises(CaseError, match="the FFD_TAG section of the mesh changed"):
+        swept(case, designs, here, mesh=other, folder=tmp_path / "out", resume=True)
+
+
+def test_displacements_of_a_program(passage, here, tmp_path):
+    nodes = passage.mesh.marker("airfoil").nodes
+    given = sv.Prescribed(nodes, np.full((len(nodes), 2), 0.01))
+    case = passage.case.change(motions=(given,))
+    asked = {"mesh": passage.mesh, "folder": tmp_path}
+    (row,) = swept(case, {"STEPS": [1]}, here, **asked)
+    assert row.problem == ""
+    assert numbers_of(case) == {}
+    assert swept(case, {"STEPS": [1]}, here, resume=True, **asked)[0].earlier
+    other = case.change(motions=(sv.Prescribed(nodes, 2 * given.vectors),))
+    with pytest.raises(CaseError, match="the displacement 1 changed"):
+        swept(other, {"STEPS": [1]}, here, resume=True, **asked)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +277,7 @@ def test_results_of_something_else_are_refused(passage, here, tmp_path):
     with pytest.raises(CaseError, match="has design 3, and the table of designs has 2"):
         sv.sweep(passage.case, fewer, here, **asked)
     moved = passage.mesh.with_points(passage.mesh.points + 1.0)
-    with pytest.raises(CaseError, match="the mesh is another"):
+    with pytest.raises(CaseError, match="the mesh changed"):
         sv.sweep(passage.case, DESIGNS, here, **(asked | {"mesh": moved}))
     table = tmp_path / "results.csv"
     table.write_text(table.read_text() + "1,2\n")
