@@ -80,17 +80,18 @@ class Ranks(Alone):
         SlidevizError
             They are not connected: no mpi4py, or one of another MPI than the launcher.
         """
-        how = "is needed for several processes; install it with `pip install 'slideviz[mpi]'`"
         try:
             from mpi4py import MPI
-        except ImportError as problem:
+        except ModuleNotFoundError as problem:
             raise SlidevizError(
-                f"mpi4py {how}, and MPI, or start one process (cannot be loaded: {problem})"
+                f"{launched} processes were started, for which mpi4py is needed; install it with "
+                "`pip install 'slideviz[mpi]'`, and MPI, or start one process"
             ) from problem
-        except RuntimeError as problem:
+        except (ImportError, RuntimeError) as problem:
             raise SlidevizError(
-                f"the MPI library cannot be loaded, which {how.partition(';')[0]}; install it "
-                f"(Debian: openmpi-bin): {problem}"
+                f"{launched} processes were started, but mpi4py finds no MPI library: "
+                f"{' '.join(str(problem).split())}; install one (Debian: openmpi-bin), or build "
+                "mpi4py for the one there is"
             ) from problem
         comm = MPI.COMM_WORLD.Dup()
         if comm.size != launched:

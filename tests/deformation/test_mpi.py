@@ -10,7 +10,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -264,7 +264,12 @@ def test_what_several_processes_cannot_share_is_told_once(square, monkeypatch, c
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     assert run(["run", "square.cfg", "--stream"]) == 1
     said = capfd.readouterr().err
-    assert "mpi4py is needed for several processes; install it with `pip install" in said
+    assert "4 processes were started, for which mpi4py is needed; install it with `pip" in said
+    monkeypatch.setitem(sys.modules, "mpi4py", ModuleType("mpi4py"))  # without its MPI
+    assert run(["run", "square.cfg", "--stream"]) == 1
+    said = capfd.readouterr().err
+    assert "4 processes were started, but mpi4py finds no MPI library: cannot import name" in said
+    assert said.count("\n") == 1
     assert not (square / "out.su2b").exists()
     # One process is none of several.
     monkeypatch.setenv(size, "1")
