@@ -12,6 +12,7 @@ from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2_sensitivities import match, read_sensitivities
 from slideviz.design.su2_surface import Surface
+from slideviz.errors import ToleranceWarning
 from slideviz.mesh.model import FloatArray
 
 DIRECTIONS = 16
@@ -60,13 +61,20 @@ def find_gradients(
     config, mesh = surface.config, surface.mesh
     found = read_sensitivities(config, mesh)
     displacement = surface.displacement
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        deformer = _deformer(surface, displacement, progress)
-        matched = match(found, mesh, deformer.deform(displacement))
-        if not matched.at_design and displacement.any():
-            displacement = np.zeros_like(displacement)
-            deformer = _deformer(surface, displacement, progress)
+    moves = bool(displacement.any())
+    kept: list[Deformer] = []
+
+    def design() -> FloatArray:
+        kept.append(_deformer(surface, displacement, progress))
+        return kept[0].deform(displacement)
+
+    with warnings.catch_warnings():
+        # The control nodes are those of this design: a run tells where they do not suffice.
+        warnings.simplefilter("ignore", ToleranceWarning)
+        matched = match(found, mesh, design if moves else None)
+        if moves and not matched.at_design:
+            displacement, kept = np.zeros_like(displacement), []
+        deformer = kept[0] if kept else _deformer(surface, displacement, progress)
         pulled = deformer.vjp(displacement, matched.values)
     slopes = (
         surface.slope(place, undeformed=not matched.at_design)
@@ -78,7 +86,7 @@ def find_gradients(
         points=mesh.points[surface.nodes] + displacement,
         at_design=matched.at_design,
         source=str(found.path),
-        warnings=(*deformer.warnings, *matched.warnings, *(str(each.message) for each in told)),
+        warnings=(*deformer.warnings, *matched.warnings),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,8 +66,9 @@ SUFFIXES = {
     "STRESS_PENALTY": "stress",
 }
 """What SU2 adds to the names of adjoint files, by objective; ``combo`` for several."""
-SAME = 1e-6
-"""By how much positions in a file may miss those of points, as a part of the largest coordinate."""
+EXACT, CLOSE, SAME = 1e-13, 1e-8, 1e-6
+"""By how much positions in a file miss those of points, as a part of the largest coordinate: where
+they are these points and no others, from where it is doubtful, and from where they are not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,11 +158,12 @@ def sensitivity_file(config: Su2Config) -> Path:
     )
 
 
-def match(found: Sensitivities, mesh: Mesh, design: FloatArray) -> Matched:
+def match(found: Sensitivities, mesh: Mesh, design: Callable[[], FloatArray] | None) -> Matched:
     """Return sensitivities in the order of the points, and where they were taken.
 
-    An adjoint solution belongs to the mesh that it was computed on: that of this design, (n, d), or
-    MESH_FILENAME itself where that is deformed already, as in SU2's own loop. Its points tell.
+    An adjoint solution belongs to the mesh that it was computed on: that of this design, whose
+    points (n, d) ``design`` returns (None where it moves nothing), or MESH_FILENAME itself where
+    that is deformed already, as in SU2's own loop. The points in the file tell.
 
     Raises
     ------
@@ -171,31 +173,44 @@ def match(found: Sensitivities, mesh: Mesh, design: FloatArray) -> Matched:
     if found.points is None:
         said = f"{found.path} has no coordinates: taken as those of this design"
         return Matched(found.values, True, (said,))
-    places = (design, mesh.points)
-    rows: list[np.ndarray]
-    if found.ordered:
-        gaps = [float(np.abs(found.points - at).max(initial=0.0)) for at in places]
-        rows = [np.arange(len(mesh.points))] * 2
-    else:
-        nearest = [cKDTree(at).query(found.points) for at in places]
-        gaps = [float(np.max(gap, initial=0.0)) for gap, _ in nearest]
-        rows = [np.asarray(index) for _, index in nearest]
-    best = int(np.argmin(gaps))
-    allowed = SAME * largest_coordinate(mesh.points)
-    if gaps[best] > allowed:
+    unit = largest_coordinate(mesh.points)
+    gap, rows = _nearest(found, mesh.points)
+    at_design = design is None
+    if design is not None and gap > EXACT * unit:
+        there, others = _nearest(found, design())
+        if there <= gap:
+            gap, rows, at_design = there, others, True
+    if gap > SAME * unit:
         raise CaseError(
             f"{found.path}: its points are neither those of {mesh.name} nor those of this design: "
-            f"off by {min(gaps):.3g}; run the adjoint solver on the mesh that `slideviz def` writes"
+            f"off by {gap:.3g}; run the adjoint solver on the mesh that `slideviz def` writes"
+        )
+    notes = []
+    if gap > CLOSE * unit:
+        where = "this design" if at_design else mesh.name
+        notes.append(
+            f"{found.path}: its points are off those of {where} by {gap:.2g}: is it older?"
         )
     values = np.zeros(mesh.points.shape)
-    index, counts = np.unique(rows[best], return_counts=True)
+    index, counts = np.unique(rows, return_counts=True)
     if (counts > 1).any():
         node = index[int(np.argmax(counts))]
         raise CaseError(f"{found.path}: several rows are at the point {node}; one each is needed")
-    values[rows[best]] = found.values
+    values[rows] = found.values
     missing = len(mesh.points) - len(index)
-    said = f"{found.path}: {missing} points of the mesh are not in it; taken as 0"
-    return Matched(values, best == 0, (said,) if missing else ())
+    if missing:
+        notes.append(f"{found.path}: {missing} points of the mesh are not in it; taken as 0")
+    return Matched(values, at_design, tuple(notes))
+
+
+def _nearest(found: Sensitivities, points: FloatArray) -> tuple[float, np.ndarray]:
+    """Return by how much points miss those of the file, and the point of each row."""
+    assert found.points is not None
+    if found.ordered:
+        gap = np.abs(found.points - points)
+        return float(gap.max(initial=0.0)), np.arange(len(points))
+    far, rows = cKDTree(points).query(found.points)
+    return float(np.max(far, initial=0.0)), np.asarray(rows)
 
 
 def _ordered(path: Path, names: list[str], table: FloatArray, mesh: Mesh) -> Sensitivities:

@@ -375,3 +375,12 @@ def test_no_input_is_written_over(case, capsys):
     Path("dot.cfg").write_text(simple() + "GRAD_OBJFUNC_FILENAME= adj_cd.csv\n")
     assert run(["dot", "dot.cfg", "-q"]) == 1
     assert "adj_cd.csv is the file of the sensitivities" in capsys.readouterr().err
+
+
+def test_sensitivities_of_a_slightly_other_design_are_warned_about(case, capsys):
+    points, weights = case
+    write_csv("adj_cd.csv", points + 1e-7, weights)
+    assert run(["dot", "dot.cfg", "-q"]) == 0
+    assert (
+        "its points are off those of this design by 1e-07: is it older?" in capsys.readouterr().err
+    )
