@@ -62,20 +62,27 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
 @njit(**OPTIONS)
 def _weights(alpha, spread, turn, powers, sums):  # type: ignore[no-untyped-def]
     """Replace Jacobians and spreads (k, ...) by the derivatives of ln f_ss by each of them."""
+    terms = np.empty(len(alpha))
     for c in range(len(turn)):
         total = whole = 0.0
         for k in range(len(alpha)):
             now = alpha[k, c] * turn[c]
             total += now
-            whole += spread[k, c] ** powers[0] / now ** powers[1]
+            terms[k] = _power(spread[k, c], powers[0]) / _power(now, powers[1])
+            whole += terms[k]
         size = 0.0
         if sums[c] < np.inf and total != sums[c]:
             size = (0.5 if total < sums[c] else -0.5) / total
         for k in range(len(alpha)):
-            now = alpha[k, c] * turn[c]
-            share = spread[k, c] ** powers[0] / now ** powers[1] / whole
-            alpha[k, c] = (powers[1] * share / now + size) * turn[c]
+            share = terms[k] / whole
+            alpha[k, c] = powers[1] * share / alpha[k, c] + size * turn[c]
             spread[k, c] = -powers[0] * share / spread[k, c]
+
+
+@njit(inline="always", **OPTIONS)
+def _power(base, exponent):  # type: ignore[no-untyped-def]
+    """Return a power; that of one takes no time."""
+    return base if exponent == 1.0 else base**exponent
 
 
 @njit(**OPTIONS)

@@ -91,6 +91,15 @@ def test_quality(benchmark, cube):
     benchmark.extra_info["cells_per_second"] = len(cube.cells) / benchmark.stats["min"]
 
 
+def test_quality_with_derivative(benchmark, cube):
+    moved = cube.with_points(cube.points + 1e-3 * np.sin(9 * cube.points[:, ::-1]))
+    found = benchmark.pedantic(
+        sv.quality, (moved, cube), {"derivative": True}, rounds=3, warmup_rounds=1
+    )
+    assert found.inverted == 0
+    benchmark.extra_info["cells_per_second"] = len(cube.cells) / benchmark.stats["min"]
+
+
 def test_reading(benchmark, cube, tmp_path):
     path = tmp_path / "cube.su2"
     sv.write(path, cube)
