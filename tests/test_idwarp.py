@@ -1,8 +1,10 @@
 """IDWarp's names: what ADflow and DAFoam call on a mesh, with dot products for the derivatives."""
 
+import h5py
 import numpy as np
 import pytest
 from builders import grid
+from cgns_files import passage_grid, save_passage
 
 import slideviz as sv
 from slideviz.case.model import Case
@@ -139,6 +141,38 @@ def test_the_grid_is_written(tmp_path):
         warp.writeGrid()
 
 
+def test_a_cgns_file_is_written_with_all_that_was_in_it(tmp_path):
+    path, out = tmp_path / "passage.cgns", tmp_path / "warped.cgns"
+    save_passage(path, passage_grid())
+    roles = {"BLADE": "moving", "lower": "periodic", "upper": "periodic", "HUB": "sliding"}
+    case = Case(roles=roles, periodic="fixed")
+    warp = USMesh({"gridFile": str(path), "case": case})
+    blade = warp.getSurfaceCoordinates()
+    warp.setSurfaceCoordinates(blade + [0.0, 0.02, 0.05] * np.sin(blade[:, :1]))
+    warp.warpMesh()
+    warp.writeGrid(str(out))
+    # The file has the nodes where its two blocks meet in each: so has the grid of IDWarp.
+    with h5py.File(out) as file:
+        blocks = [
+            zone["GridCoordinates"] for zone in file["Base"].values() if "GridC" in str(list(zone))
+        ]
+        grid_of_file = np.concatenate(
+            [np.stack([b[f"Coordinate{c}"][" data"][()].ravel() for c in "XYZ"], 1) for b in blocks]
+        )
+    assert len(grid_of_file) > len(sv.read(path).points)
+    np.testing.assert_array_equal(warp.getWarpGrid(), grid_of_file.ravel())
+    np.testing.assert_array_equal(warp.getSolverGrid(), grid_of_file.ravel())
+    rng = np.random.default_rng(0)
+    indices = rng.permutation(grid_of_file.size)
+    warp.setExternalMeshIndices(indices)
+    np.testing.assert_array_equal(warp.getSolverGrid(), grid_of_file.ravel()[indices])
+    change, weights = rng.normal(size=blade.shape), rng.normal(size=grid_of_file.size)
+    for solver in (True, False):
+        warp.warpDeriv(weights, solver)
+        moved = warp.warpDerivFwd(change, solver)
+        assert weights @ moved == pytest.approx((change * warp.getdXs()).sum(), rel=1e-10)
+
+
 def test_mesh_and_case_may_be_files(tmp_path):
     mesh = grid((6, 6), hole=HOLE[:2])
     sv.write(tmp_path / "mesh.su2", mesh)
@@ -190,7 +224,7 @@ def test_indices_of_the_grid_must_exist(wrong):
     warp = USMesh({"gridFile": mesh, "case": Case(roles={"x_m": "moving"})})
     assert mesh.points.size == 98
     warp.setExternalMeshIndices([0, 97])
-    with pytest.raises(CaseError, match=rf"go from {min(wrong, 0)} to .* has 98 coordinates"):
+    with pytest.raises(CaseError, match=rf"go from {min(wrong, 0)} to .* has 98 coord"):
         warp.setExternalMeshIndices([0, wrong])
 
 
@@ -223,7 +257,7 @@ def test_coordinates_must_be_as_many_and_agree_and_leave_what_is_held():
             CaseError, match=f"node {held} of .* was moved by 0.00173.* the role mov"
         ):
             warp.setSurfaceCoordinates(pulled)
-    with pytest.raises(CaseError, match="are infinite or no numbers"):
+    with pytest.raises(CaseError, match="values of the surface are infinite or no numbers"):
         warp.setSurfaceCoordinates(np.full_like(pts, np.nan))
     warp.warpMesh()
     np.testing.assert_array_equal(warp.getSolverGrid(), mesh.points.ravel())

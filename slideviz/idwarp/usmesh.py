@@ -1,9 +1,4 @@
-"""IDWarp's names for a deformation, for programs that call ``idwarp.USMesh`` (ADflow, DAFoam).
-
-The methods take and return what IDWarp's do (mdolab/idwarp, ``UnstructuredMesh.py``), so that such
-a program needs another import and other options. What deforms the mesh is a `slideviz.Deformer`:
-sliding, periodic and data-reduced as its case says, with exact derivatives. One process only.
-"""
+"""The class that stands for IDWarp's."""
 
 from __future__ import annotations
 
@@ -15,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.errors import CaseError
+from slideviz.idwarp.surface import Surface, surface_at
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from slideviz.case.model import Case
-
-COINCIDES = 1e-8
-"""How far a node of the surface may lie from one of the mesh, as a part of the mesh's extent."""
 
 _OURS = ("gridFile", "case", "displacements")
 _THEIRS = (
@@ -39,7 +32,9 @@ class USMesh:
 
     Coordinates of the surface are (N, d), in the order of `setSurfaceDefinition`, or without it
     (m, d), the moving nodes of the case in ascending order; those of the grid are flat. Indices of
-    `setExternalMeshIndices` are IDWarp's: of *coordinates* (d times the node plus the axis).
+    `setExternalMeshIndices` are IDWarp's: of *coordinates* (d times the node plus the axis), in the
+    order of the mesh; for a CGNS file in that of the file, block by block, with the nodes where
+    blocks meet as often as it has them.
 
     Nodes of a surface that the case does not move (hub and casing, when they slide) belong to it
     too, but cannot be prescribed: their coordinates are where they were or where the last
@@ -82,12 +77,15 @@ class USMesh:
             displacements = np.zeros((len(np.unique(np.concatenate(moving))), mesh.dim))
         self.comm = comm
         self.deformer = Deformer(mesh, case, displacements)
-        self._surface: IntArray = np.asarray(self.deformer.nodes)
-        self._of_moving, self._copies = _places(self._surface, self._surface)
-        self._indices: IntArray = np.arange(mesh.points.size)
-        self._displacement = np.zeros((len(self.deformer.nodes), mesh.dim))
-        self._start = mesh.points[self._surface]
-        self._coordinates = self._start.copy()
+        nodes = np.asarray(self.deformer.nodes)
+        self._surface = Surface(mesh, nodes, nodes)
+        # The nodes of a CGNS file: those where its blocks meet are in it several times.
+        self._order: IntArray = (
+            np.concatenate(mesh.cgns.numbers) if mesh.cgns else np.arange(len(mesh.points))
+        )
+        self._indices: IntArray = np.arange(self._order.size * mesh.dim)
+        self._displacement = np.zeros((len(nodes), mesh.dim))
+        self._coordinates = self._surface.start
         self._points = np.array(mesh.points)
         self._gradient = np.zeros_like(self._displacement)
 
@@ -101,11 +99,11 @@ class USMesh:
         CaseError
             There is no such coordinate.
         """
-        indices, size = np.asarray(ind, np.int64).ravel(), self._points.size
+        indices, size = np.asarray(ind, np.int64).ravel(), self._order.size * self._points.shape[1]
         if len(indices) and not 0 <= indices.min() <= indices.max() < size:
             raise CaseError(
                 f"indices of the solver's grid go from {indices.min()} to {indices.max()}; the "
-                f"mesh has {size} coordinates, numbered from 0: node times dimension plus axis"
+                f"file has {size} coordinates, numbered from 0: node times dimension plus axis"
             )
         self._indices = indices
 
@@ -126,33 +124,11 @@ class USMesh:
         CaseError
             A node is none of the mesh, or a moving node of the case is not in the surface.
         """
-        from scipy.spatial import cKDTree
-
         del conn, faceSizes, cgnsBlockID
-        mesh, nodes = self.deformer.mesh, np.asarray(self.deformer.nodes)
-        given = self._shaped(pts)
-        boundary = np.unique(np.concatenate([nodes, *(m.nodes for m in mesh.markers)]))
-        distance, found = cKDTree(mesh.points[boundary]).query(given)
-        far = np.asarray(distance)
-        if not far.max(initial=0.0) <= COINCIDES * mesh.extent:
-            worst = int(far.argmax())
-            raise CaseError(
-                f"node {worst} of the surface, at {given[worst].tolist()}, is {far[worst]:g} from "
-                f"the next boundary node of {mesh.name}; give the undeformed surface of this mesh"
-            )
-        surface = boundary[found]
-        missing = np.setdiff1d(nodes, surface)
-        if len(missing):
-            raise CaseError(
-                f"{len(missing)} of {len(nodes)} moving nodes of the case are not in the surface, "
-                f"the first one at {mesh.points[missing[0]].tolist()}; give the whole surface, or "
-                "other roles"
-            )
-        self._surface = surface
-        self._of_moving, self._copies = _places(surface, nodes)
-        self._start = mesh.points[surface]
-        now = self._start + self._spread(self._displacement)
-        self._coordinates = np.where(self._held, self._points[surface], now)
+        nodes = np.asarray(self.deformer.nodes)
+        self._surface = surface_at(self.deformer.mesh, nodes, self._shaped(pts))
+        now = self._surface.start + self._surface.spread(self._displacement)
+        self._coordinates = self._followed(now)
 
     # Coordinates ---------------------------------------------------------------------------
 
@@ -170,49 +146,26 @@ class USMesh:
             does not move.
         """
         given = self._shaped(coordinates)
-        if len(given) != len(self._surface):
-            raise CaseError(
-                f"{len(given)} nodes were given for a surface of {len(self._surface)}; give as "
-                "many as getSurfaceCoordinates returns"
-            )
-        if not np.isfinite(given).all():
-            raise CaseError("coordinates of the surface are infinite or no numbers; give numbers")
-        moved = given - self._start
-        displacement = self._gather(moved) / self._copies[:, None]
-        tolerance = COINCIDES * self.deformer.mesh.extent
-        off = _lengths(np.where(self._held, 0.0, moved - self._spread(displacement)))
-        if off.max(initial=0.0) > tolerance:
-            raise CaseError(
-                f"node {int(off.argmax())} of the surface is there several times, with coordinates "
-                f"that are {off.max():g} from their mean; copies of a node must move alike"
-            )
-        since = given - self._points[self._surface]
-        off = np.where(self._held[:, 0], np.minimum(_lengths(moved), _lengths(since)), 0.0)
-        if off.max(initial=0.0) > tolerance:
-            worst = int(off.argmax())
-            raise CaseError(
-                f"node {worst} of the surface, at {self._start[worst].tolist()}, was moved by "
-                f"{_lengths(moved)[worst]:g}, but its boundary is not a moving one in the case; "
-                "give it the role moving, or leave the node"
-            )
-        self._displacement, self._coordinates = displacement, given.copy()
+        now = self._points[self._surface.nodes]
+        self._displacement = self._surface.displacement(given, now)
+        self._coordinates = given.copy()
 
     def warpMesh(self) -> None:
         """Move the grid to the surface that was set."""
         self._points = np.array(self.deformer.deform(self._displacement))
-        self._coordinates = np.where(self._held, self._points[self._surface], self._coordinates)
+        self._coordinates = self._followed(self._coordinates)
 
     def getSolverGrid(self) -> FloatArray:
         """Return the coordinates of the grid, flat, those of `setExternalMeshIndices`."""
-        return self._points.ravel()[self._indices]
+        return self.getWarpGrid()[self._indices]
 
     def getWarpGrid(self) -> FloatArray:
-        """Return all coordinates of the grid, flat, in the order of the mesh."""
-        return self._points.ravel()
+        """Return all coordinates of the grid, flat, in the order of the file."""
+        return self._points[self._order].ravel()
 
     def getCommonGrid(self) -> FloatArray:
-        """Return all coordinates of the grid, flat, in the order of the mesh."""
-        return self._points.ravel()
+        """Return all coordinates of the grid, flat, in the order of the file."""
+        return self.getWarpGrid()
 
     def writeGrid(self, fileName: str | Path | None = None) -> None:
         """Write the grid into a file, of the format that its ending names.
@@ -233,19 +186,20 @@ class USMesh:
     def warpDeriv(self, dXv: ArrayLike, solverVec: bool = True) -> None:
         """Find the transposed product with ``dXv``, flat, at the surface that was set.
 
-        `getdXs` returns it. ``solverVec``: ``dXv`` is as `getSolverGrid` is, else as `getWarpGrid`.
+        `getdXs` returns it. ``solverVec``: ``dXv`` is as `getSolverGrid` is, else as
+        `getWarpGrid`.
         """
-        weights = self._of_grid(dXv, solverVec).reshape(self._points.shape)
+        weights = self._of_grid(dXv, solverVec)
         self._gradient = np.array(self.deformer.vjp(self._displacement, weights))
 
     def getdXs(self) -> FloatArray:
         """Return the product that `warpDeriv` found, for each node of the surface (N, d)."""
-        return self._spread(self._gradient / self._copies[:, None])
+        return self._surface.spread(self._gradient / self._surface.copies)
 
     def warpDerivFwd(self, dXs: ArrayLike, solverVec: bool = True) -> FloatArray:
         """Return the change of the grid, flat, for a change of the surface, (N, d) or flat."""
-        change = self._gather(self._shaped(dXs)) / self._copies[:, None]
-        moved = self.deformer.jvp(self._displacement, change).ravel()
+        change = self._surface.means(self._shaped(dXs))
+        moved = self.deformer.jvp(self._displacement, change)[self._order].ravel()
         return moved[self._indices] if solverVec else moved
 
     def verifyWarpDeriv(
@@ -263,47 +217,41 @@ class USMesh:
         ``dofStart`` to ``dofEnd - 1`` of the surface, for steps of ``h`` in units of the mesh.
         """
         if dXv is None:
-            weights = np.random.default_rng(randomSeed).random(self._points.size)
+            weights = np.random.default_rng(randomSeed).random(self._points.shape)
         else:
             weights = self._of_grid(dXv, solverVec)
-        shape = self._displacement.shape
-        exact = self.deformer.vjp(self._displacement, weights.reshape(self._points.shape))
-        exact = self._spread(exact / self._copies[:, None]).ravel()
+        exact = self.deformer.vjp(self._displacement, weights)
+        exact = self._surface.spread(exact / self._surface.copies).ravel()
         rows = []
         for k in range(dofStart, min(dofEnd, len(exact))):
             unit = np.zeros(len(exact))
             unit[k] = h
-            change = self._gather(unit.reshape(-1, shape[1])) / self._copies[:, None]
+            change = self._surface.means(self._shaped(unit))
             ends = [self.deformer.deform(self._displacement + s * change) for s in (1, -1)]
-            rows.append((exact[k], weights @ (ends[0] - ends[1]).ravel() / (2 * h)))
+            rows.append((exact[k], (weights * (ends[0] - ends[1])).sum() / (2 * h)))
         return np.array(rows).reshape(-1, 2)
 
     # Between the orders of numbers ---------------------------------------------------------
 
-    @property
-    def _held(self) -> NDArray[np.bool_]:
-        """Return which nodes of the surface the case does not move, (N, 1)."""
-        return self._of_moving[:, None] < 0
+    def _followed(self, coordinates: FloatArray) -> FloatArray:
+        """Return coordinates (N, d), those of nodes that are not moving as the grid has them."""
+        return np.where(self._surface.held, self._points[self._surface.nodes], coordinates)
 
     def _shaped(self, values: ArrayLike) -> FloatArray:
-        return np.asarray(values, np.float64).reshape(-1, self.deformer.mesh.dim)
-
-    def _gather(self, surface: FloatArray) -> FloatArray:
-        """Return the sums over the copies of each moving node (m, d)."""
-        out, moving = np.zeros_like(self._displacement), self._of_moving >= 0
-        np.add.at(out, self._of_moving[moving], surface[moving])
+        """Return a row for each node, (N, d), of numbers that may be flat."""
+        out = np.asarray(values, np.float64).reshape(-1, self.deformer.mesh.dim)
+        if not np.isfinite(out).all():
+            raise CaseError("values of the surface are infinite or no numbers; give numbers")
         return out
 
-    def _spread(self, moving: FloatArray) -> FloatArray:
-        """Return what each node of the surface has of its moving node (N, d), or 0."""
-        return np.where(self._held, 0.0, moving[np.maximum(self._of_moving, 0)])
-
     def _of_grid(self, values: ArrayLike, solver: bool) -> FloatArray:
-        """Return numbers in the order of the mesh, flat; of a coordinate, those of all copies."""
-        given = np.asarray(values, np.float64).ravel()
-        if not solver:
-            return given
-        return np.bincount(self._indices, given, self._points.size).astype(np.float64)
+        """Return sums of what is given for the points of the grid (n, d), flat, over all copies."""
+        given, dim = np.asarray(values, np.float64).ravel(), self._points.shape[1]
+        places = (self._order[:, None] * dim + np.arange(dim)).ravel()
+        if solver:
+            places = places[self._indices]
+        sums = np.bincount(places, given, self._points.size)
+        return sums.astype(np.float64).reshape(self._points.shape)
 
 
 def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
@@ -333,14 +281,3 @@ def _read(options: Mapping[str, Any]) -> tuple[Mesh, Case, Any]:
     if not isinstance(case, Case):
         case = Case.read(case)
     return mesh, case, options.get("displacements")
-
-
-def _places(surface: IntArray, nodes: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the place of each surface node among sorted nodes (N,), or -1, and copies (m,)."""
-    at = np.minimum(np.searchsorted(nodes, surface), len(nodes) - 1)
-    at = np.where(nodes[at] == surface, at, -1)
-    return at, np.bincount(at[at >= 0], minlength=len(nodes))
-
-
-def _lengths(vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
