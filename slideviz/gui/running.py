@@ -55,8 +55,8 @@ class Running(QObject):
         self.banner = banner
         self.runner = JobRunner(self)
         self._finish: Callable[[Any], object] | None = None
-        self._next: Callable[[], None] | None = None
-        self._deforms = False
+        self._next: Callable[[], object] | None = None
+        self._deforms = self._shows_design = False
         self.runner.doing.connect(self.doing)
         self.runner.doing.connect(self._tell)
         self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
@@ -89,15 +89,23 @@ class Running(QObject):
         if not self.runner.busy and not changes.run_requirements(self.store.session):
             self._start_run(self.store.session.case, output=output)
 
-    def show_design(self, case: Case, name: str) -> None:
-        """Show the run of a design; it is deformed first, unless that was done already."""
-        session = self.store.session
-        for run in session.runs:
+    def show_design(self, case: Case, name: str) -> bool:
+        """Show the run of a design; it is deformed first, unless that was done already.
+
+        Another design that is deformed meanwhile is given up; False where another job runs.
+        """
+        for run in self.store.session.runs:
             if run.name == name and run.case == case and run.end == "done":
                 self.store.change(changes.show_run, run.number)
-                return
-        if not self.runner.busy:
-            self._start_run(case, name)
+                return True
+        if self.runner.busy:
+            if self._shows_design:
+                self._next = partial(self.show_design, case, name)
+                self.cancel()
+            return self._shows_design
+        self._shows_design = True
+        self._start_run(case, name)
+        return True
 
     def _start_run(self, case: Case, name: str = "", output: Path | None = None) -> None:
         self.banner.hide()
@@ -127,7 +135,7 @@ class Running(QObject):
         return self.runner.close()
 
     def _end(self, how: str) -> None:
-        self._finish = None
+        self._finish, self._shows_design = None, False
         if self._deforms:
             self._deforms = False
             self.store.change(changes.end_run, how)

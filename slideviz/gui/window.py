@@ -279,9 +279,9 @@ class MainWindow(Services):
         if output is not None:
             self.running.start_run(output)
 
-    def show_design(self, case: Case, name: str) -> None:
-        """Show the run of a design; it is deformed first, unless that was done already."""
-        self.running.show_design(case, name)
+    def show_design(self, case: Case, name: str) -> bool:
+        """Show the run of a design, which is deformed first; False where another job runs."""
+        return self.running.show_design(case, name)
 
     def cancel(self) -> None:
         """Cancel the running job."""

@@ -85,6 +85,25 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
     assert len(window.store.session.runs) == 2
 
 
+def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, driver):
+    panel = passage
+    fill(panel, "STEPS", "40, 41, 42")
+    run(panel, qtbot)
+    for number in (1, 2, 3):
+        panel.show_design(number)
+    driver.settle()
+    qtbot.waitUntil(lambda: window.store.session.run_shown.name == "design 3")
+    driver.settle()
+    assert len(window.store.session.run_shown.frames) == 42
+    # Another job is not given up for it.
+    window.start_run()
+    assert window.runner.busy
+    panel.show_design(1)
+    assert panel.said.text().startswith("Another job runs")
+    assert panel.shown == 3
+    driver.settle()
+
+
 def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     panel = passage
     fill(panel, "SLIDING_MODE", "ps, none")

@@ -372,9 +372,11 @@ class DesignsPanel(Panel):
         except CaseError as error:
             self._say(str(error), wrong=True)
             return
+        if not self.services.show_design(design.case, f"design {number}"):
+            self._say("Another job runs in the window; wait for it, or cancel it.", wrong=True)
+            return
         self.shown = number
         self._say(f"Design {number} is shown.")
-        self.services.show_design(design.case, f"design {number}")
         self._sync()
 
     # The job ---------------------------------------------------------------------------

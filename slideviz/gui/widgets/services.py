@@ -65,8 +65,8 @@ class Services(QMainWindow):
         """Start a job beside the window; ``finish`` takes what it returns."""
         raise NotImplementedError
 
-    def show_design(self, case: Case, name: str) -> None:
-        """Show the run of a design; it is deformed first, unless that was done already."""
+    def show_design(self, case: Case, name: str) -> bool:
+        """Show the run of a design, which is deformed first; False where another job runs."""
         raise NotImplementedError
 
 
