@@ -17,7 +17,7 @@ from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen_step import FrozenStep, State
-from slideviz.design.loops import farthest
+from slideviz.design.loops import farthest, to_points
 from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.errors import CaseError, DeformError, ToleranceWarning, UnsoundError
@@ -25,8 +25,8 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, larges
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
 
-TOGETHER = 25_000_000
-"""Coordinates of designs that are deformed together: 200 MB, which share the radial functions."""
+TOGETHER = 128
+"""Designs that are deformed together, and share the radial functions."""
 
 Tell = Callable[[Progress], None]
 
@@ -43,6 +43,8 @@ class _Input:
         Whose displacement each has, by the place among the moving nodes, and how it is turned.
     known, source : (a,) int64
         Known nodes that move, by their place, and the one of ``points`` that each follows.
+    others, followed : (o,) int64
+        Moving nodes, by their place, that must move as one of ``points``, and that one.
     """
 
     points: FloatArray
@@ -50,6 +52,8 @@ class _Input:
     turn: FloatArray | None
     known: IntArray
     source: IntArray
+    others: IntArray
+    followed: IntArray
 
 
 class Deformer:
@@ -252,25 +256,43 @@ class Deformer:
     def _target(self, vectors: Array) -> Array:
         """Return the displacement (..., a, d) of the known nodes, in the frame."""
         setup, given = self._setup, self._input
-        self._require_alike(value(vectors))
         own = take(vectors, given.rows)
         if given.turn is not None:
             own = transform(given.turn, own)
         moved = difference(setup.frame, given.points, own)
+        self._require_alike(value(vectors), value(moved))
         shape = (len(setup.known), self.mesh.dim)
         return put(np.zeros(shape), given.known, take(moved, given.source))
 
-    def _require_alike(self, vectors: FloatArray) -> None:
-        """Raise where images, or copies and their originals, are displaced differently."""
+    def _require_alike(self, vectors: FloatArray, moved: FloatArray) -> None:
+        """Raise where images, or copies and their originals, are displaced differently.
+
+        Parameters
+        ----------
+        vectors, moved : (..., m, d), (..., s, d)
+            As given, and of those that count in the frame.
+        """
+        given, setup, mesh = self._input, self._setup, self.mesh
+        if len(given.others):
+            own = vectors[..., given.others, :]
+            follow = difference(setup.frame, mesh.points[self.nodes[given.others]], own)
+            gap = np.abs(value(follow) - moved[..., given.followed, :])
+            largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
+            allowed = self._alike * largest + ROUNDING * self._size
+            if (gap.max(axis=(-1, -2)) > allowed).any():
+                self._refuse(vectors)
+        if mesh.halo is not None:
+            self._refuse(vectors)
+
+    def _refuse(self, vectors: FloatArray) -> None:
+        """Raise what the solver raises where nodes that should be alike are not."""
         setup, mesh = self._setup, self.mesh
-        if not len(setup.images) and mesh.halo is None:
-            return
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)
             values = np.zeros(mesh.points.shape)
             values[moved.nodes] = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
             largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
-            allowed = self._alike * largest + ROUNDING * largest_coordinate(mesh.points)
+            allowed = self._alike * largest + ROUNDING * self._size
             spread(values, moved.nodes, setup.classes.stands, allowed)
 
     def _run(self, target: Array) -> list[State]:
@@ -286,19 +308,29 @@ class Deformer:
             target = value(self._target(displacement))
             states = self._run(target)
             return value(states[-1].points), self._errors(target, states)
-        together = max(1, TOGETHER // self.mesh.points.size) if len(self._steps) == 1 else 1
-        points, errors = np.empty((len(displacement), *self.mesh.points.shape)), []
-        for first in range(0, len(displacement), together):
-            part = slice(first, first + together)
-            if together == 1:
-                points[first], error = self._deformed(displacement[first])
-                errors.append(error)
-                continue
-            targets = value(self._target(displacement[part]))
-            states = self._run(targets)
-            points[part] = value(states[-1].points)
-            errors += self._errors(targets, states).tolist()
-        return points, np.array(errors)
+        points = np.empty((len(displacement), *self.mesh.points.shape))
+        if len(self._steps) > 1 or self.mesh.halo is not None:
+            errors = np.empty(len(points))
+            for k, each in enumerate(displacement):
+                points[k], errors[k] = self._deformed(each)
+            return points, errors
+        found = [
+            self._together(displacement[first : first + TOGETHER], points[first : first + TOGETHER])
+            for first in range(0, len(points), TOGETHER)
+        ]
+        return points, np.concatenate([np.empty(0), *found])
+
+    def _together(self, displacement: FloatArray, room: FloatArray) -> FloatArray:
+        """Deform designs in one step into ``room`` (k, n, d), and return their largest errors."""
+        setup, (step,) = self._setup, self._steps
+        targets = value(self._target(displacement))
+        state = step.moved(State(setup.coords), targets, room)
+        errors = np.maximum(self._off_track(room), state.max_error)
+        self._require_sound(1, 1.0, targets, state)
+        to_points(setup.frame, room, setup.coords, self.mesh.points)
+        for points in room:
+            self._require_alike_after(points)
+        return errors
 
     def _taped(self, displacement: FloatArray) -> tuple[list[State], Variable, Variable]:
         """Return the states of a design, and input and points as variables of one tape."""
@@ -322,6 +354,7 @@ class Deformer:
         errors = self._off_track(value(states[-1].coords))
         for index, (step, state) in enumerate(zip(self._steps, states, strict=True), start=1):
             self._require_sound(index, step.part, targets, state)
+            self._require_alike_after(value(state.points))
             errors = np.maximum(errors, state.max_error)
         return errors
 
@@ -329,7 +362,6 @@ class Deformer:
         """Raise where the results of a step cannot be right: what every run checks."""
         shape = self.mesh.points.shape
         coords = value(state.coords).reshape(-1, *shape)
-        points = value(state.points).reshape(-1, *shape)
         targets = targets.reshape(len(coords), *targets.shape[-2:])
         lost = np.broadcast_to(state.lost.reshape(-1), len(coords))
         far = farthest(coords, self._setup.coords)
@@ -338,12 +370,11 @@ class Deformer:
                 raise DeformError(f"step {index}: coordinates became infinite; use more steps")
             largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
             if far[k] > GROWTH * largest or lost[k] > HOPELESS * largest:
-                solution = Solution(points[k], 0, 0.0, self.nodes[:0], np.nan, lost=float(lost[k]))
+                solution = Solution(coords[k], 0, 0.0, self.nodes[:0], np.nan, lost=float(lost[k]))
                 setup = replace(self._setup, target=target)
                 unsound = unsoundness(setup, self.mesh, solution, coords[k], part)
                 if unsound:
                     raise UnsoundError(f"step {index}: {unsound}")
-            self._require_alike_after(points[k])
 
     def _require_alike_after(self, points: FloatArray) -> None:
         """Raise where periodic images have moved differently."""
@@ -420,4 +451,14 @@ def _input(mesh: Mesh, setup: Setup, asked: Displacements) -> _Input:
             f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
             "is on no moving marker; give both the same role"
         )
-    return _Input(frozen_array(mesh.points[nodes], np.float64), rows, turn, known, place)
+    lead = source[moved.nodes]
+    others = np.flatnonzero(lead != moved.nodes)
+    return _Input(
+        frozen_array(mesh.points[nodes], np.float64),
+        rows,
+        turn,
+        known,
+        place,
+        np.searchsorted(asked.nodes, moved.nodes[others]) if mesh.halo is None else others[:0],
+        np.searchsorted(nodes, lead[others]) if mesh.halo is None else others[:0],
+    )

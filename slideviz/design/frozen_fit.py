@@ -100,14 +100,20 @@ class FrozenFit:
             sums.append(self._solved(part, index, level, stage))
         self.found = self._plus(sums) if sums else None
 
-    def at(self, nodes: IntArray | slice, found: Sum | None = None) -> Array:
-        """Return the displacements (..., m, d) of nodes in the frame."""
+    def at(
+        self,
+        nodes: IntArray | slice,
+        found: Sum | None = None,
+        *,
+        room: FloatArray | None = None,
+    ) -> Array:
+        """Return the displacements (..., m, d) of nodes in the frame, in ``room`` if it fits."""
         found = found or self.found
         x = self._features
         here = x if isinstance(nodes, slice) else columns(x, nodes)
         if found is None:
             return np.zeros((value(here).shape[1], self._dim))
-        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights)
+        s = radial_sum(self._basis, here, columns(x, found.nodes), found.weights, room)
         if found.tail is not None:
             s = s + product(terms(self._basis, here), found.tail)
         return s

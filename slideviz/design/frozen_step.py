@@ -15,11 +15,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
-from slideviz.design.frozen_fit import FrozenFit, Keep, Rows
+from slideviz.design.frozen_fit import FrozenFit, Rows
 from slideviz.design.loops import keep_rest, shift
 from slideviz.design.normals import sliding_normals
 from slideviz.design.operations import columns, features, points, weighted_mean
@@ -34,6 +35,7 @@ from slideviz.design.tape import (
     inverse,
     join,
     length,
+    mixed,
     multiply,
     put,
     reshape,
@@ -61,8 +63,9 @@ class State:
     ----------
     coords : (..., n, d)
         Positions in the frame.
-    lag : (..., n, d) or None
-        What the interpolants so far lack at the boundary; None without data reduction.
+    lag : (..., b, d) or None
+        What the interpolants so far lack at the boundary nodes ``of`` (b,); None without data
+        reduction.
     max_error, lost : (...,) float64
         As of a ``Solution``.
     points : (..., n, d)
@@ -71,6 +74,7 @@ class State:
 
     coords: Array
     lag: Array | None = None
+    of: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     max_error: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     lost: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
@@ -128,11 +132,6 @@ class FrozenStep:
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
 
-    @property
-    def fixed(self) -> Keep:
-        """Return what keeps things that follow from positions alone."""
-        return self.constants if self.first else _anew
-
     def run(self, before: State, target: Array) -> State:
         """Return where nodes are after this step.
 
@@ -141,15 +140,22 @@ class FrozenStep:
         target : (..., a, d)
             Displacement of the known nodes after the last step, in the frame.
         """
+        state = self.moved(before, target)
+        coords, at = self._with_points(state.coords)
+        return replace(state, coords=coords, points=at)
+
+    def moved(self, before: State, target: Array, room: FloatArray | None = None) -> State:
+        """Return where nodes are after this step, without points, and without copies in a halo.
+
+        Parameters
+        ----------
+        room : (..., n, d), optional
+            Where the coordinates go, for designs without a variable.
+        """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
-        solved = _Solving(self, before, goal).run()
-        moved, at = self._moved(before.coords, solved.displacement, goal)
-        return State(moved, solved.lag, solved.max_error, solved.lost, at)
-
-    def _moved(self, coords: Array, displacement: Array, goal: Array) -> tuple[Array, Array]:
-        """Return coordinates and points after the step, with images and copies in place."""
-        setup, frame = self.setup, self.setup.frame
+        solved = _Solving(self, before, goal, room).run()
+        displacement = solved.displacement
         if len(setup.images):
             first, second = setup.images.T
             displacement = put(displacement, second, take(displacement, first), own=True)
@@ -159,7 +165,13 @@ class FrozenStep:
             held[:2] = 0.0
             still = multiply(take(displacement, on), held[None])
             displacement = put(displacement, on, still, own=True)
-        moved = put(_shifted(coords, displacement, own=True), setup.known, goal, own=True)
+        moved = _shifted(before.coords, displacement, own=True)
+        moved = put(moved, setup.known, goal, own=True)
+        return State(moved, solved.lag, solved.of, solved.max_error, solved.lost)
+
+    def _with_points(self, moved: Array) -> tuple[Array, Array]:
+        """Return coordinates and points, with copies in place."""
+        setup, frame = self.setup, self.setup.frame
         at = _at_rest(points(frame, moved), moved, setup.coords, self.mesh.points)
         halo = self.mesh.halo
         if halo is None:
@@ -194,6 +206,7 @@ def _at_rest(at: Array, moved: Array, start: FloatArray, before: FloatArray) -> 
 class _Solved:
     displacement: Array
     lag: Array | None
+    of: IntArray
     max_error: FloatArray
     lost: FloatArray
 
@@ -201,8 +214,11 @@ class _Solved:
 class _Solving:
     """The method on one step."""
 
-    def __init__(self, step: FrozenStep, before: State, goal: Array) -> None:
-        self._step, self._setup, self._lag = step, step.setup, before.lag
+    def __init__(
+        self, step: FrozenStep, before: State, goal: Array, room: FloatArray | None
+    ) -> None:
+        self._step, self._setup, self._before = step, step.setup, before
+        self._room = room
         setup, keep = step.setup, step.constants if step.first else _anew
         self._keep, self._coords = keep, before.coords
         self._features = keep("features", lambda: features(setup.frame, before.coords))
@@ -282,11 +298,11 @@ class _Solving:
                     free = self._within(level, free)
                 slid = self._project(level, free, name)
                 nodes, values = np.concatenate([nodes, level]), join(values, slid)
-        displacement = mean("all", slice(None))
+        displacement = self._in_room(mean("all", slice(None)))
         errors = np.linalg.norm(value(values) - value(displacement)[..., nodes, :], axis=-1)
         displacement = put(displacement, nodes, values, own=True)
         most = errors.max(axis=-1, initial=0.0)
-        return _Solved(displacement, None, most, np.zeros(most.shape))
+        return _Solved(displacement, None, nodes, most, np.zeros(most.shape))
 
     def _off(self, slid: FloatArray, free: FloatArray) -> IntArray:
         """Return which slid nodes leave a straight edge of a curved surface."""
@@ -325,7 +341,11 @@ class _Solving:
         return merged, multiply(gather(values, group, len(merged)), 1.0 / count[:, None])
 
     def _behind(self, nodes: IntArray) -> Array | None:
-        return None if self._lag is None else take(self._lag, nodes)
+        if self._before.lag is None:
+            return None
+        row = np.full(len(self._setup.coords), -1)
+        row[self._before.of] = np.arange(len(self._before.of))
+        return take(self._before.lag, row[nodes])
 
     def _plus_behind(self, values: Array, nodes: IntArray) -> Array:
         behind = self._behind(nodes)
@@ -446,12 +466,10 @@ class _Solving:
     def _finished(self, fit: FrozenFit, nodes: IntArray, values: Array) -> _Solved:
         """Evaluate at all nodes; boundary nodes are set, and what they lack is spread."""
         setup = self._setup
-        displacement = fit.at(slice(None))
+        displacement = self._in_room(fit.at(slice(None), room=self._room))
         errors = values - take(displacement, nodes)
         total = self._plus_behind(errors, nodes)
-        lag = None
-        if setup.reduction is not None:
-            lag = put(np.zeros(setup.coords.shape), nodes, total)
+        lag = total if setup.reduction is not None else None
         size = np.linalg.norm(value(total), axis=-1)
         lost = np.zeros(size.shape[:-1])
         if setup.reduction is None:
@@ -463,7 +481,14 @@ class _Solving:
         if spread is not None:
             displacement = self._spread(displacement, spread, errors)
         displacement = put(displacement, nodes, values, own=True)
-        return _Solved(displacement, lag, size.max(axis=-1, initial=0.0), lost)
+        return _Solved(displacement, lag, nodes, size.max(axis=-1, initial=0.0), lost)
+
+    def _in_room(self, displacement: Array) -> Array:
+        """Return the displacement where it is to go."""
+        if self._room is None or displacement is self._room:
+            return displacement
+        self._room[:] = value(displacement)
+        return self._room
 
     def _corrected(
         self, nodes: IntArray, errors: FloatArray, values: FloatArray, lost: float
@@ -500,9 +525,7 @@ class _Solving:
 
     def _spread(self, displacement: Array, spread: _Spread, errors: Array) -> Array:
         """Add what targets take over."""
-        count = len(spread.targets)
-        taken = multiply(take(errors, spread.source), spread.weight[:, None])
-        taken = gather(taken, spread.row, count)
+        taken = mixed(spread.mixing(value(errors).shape[-2]), errors)
         part = self._keep("shares", lambda: self._shares(spread))
         taken = multiply(taken, part)
         more = take(displacement, spread.targets) + taken
@@ -539,6 +562,11 @@ class _Spread:
     radius: float
     nearest: IntArray
     turn: IntArray
+
+    def mixing(self, count: int) -> csr_array:
+        """Return the matrix (h, count) that gives targets their means of boundary nodes."""
+        shape = len(self.targets), count
+        return csr_array((self.weight, (self.row, self.source)), shape=shape)
 
 
 def _above(size: FloatArray, least: float) -> np.ndarray:

@@ -9,7 +9,9 @@ from numba import prange
 
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
+from slideviz.mesh.periodic import axis_basis
 from slideviz.rbf.compiled import one_at_a_time
+from slideviz.rbf.frames import Frame
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
@@ -53,6 +55,23 @@ def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
             squares[part, k] = most
 
 
+@njit(parallel=True, **_OPTIONS)
+def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[no-untyped-def]
+    d = coords.shape[2]
+    for i in prange(coords.shape[1]):
+        for k in range(coords.shape[0]):
+            x = coords[k, i]
+            if x[0] == start[i, 0] and x[1] == start[i, 1] and x[d - 1] == start[i, d - 1]:
+                coords[k, i] = before[i]
+                continue
+            angle = x[1] * rate + theta0
+            a, b, c = x[0] * np.cos(angle), x[0] * np.sin(angle), 0.0
+            if d == 3:
+                c = x[2]
+            for j in range(d):
+                x[j] = a * basis[0, j] + b * basis[1, j] + c * basis[2, j] + origin[j]
+
+
 PARTS = 64
 
 
@@ -76,6 +95,26 @@ def keep_rest(
     with one_at_a_time(at.size):
         _rest(at.reshape(-1, *start.shape), moved.reshape(-1, *start.shape), start, before)
     return at
+
+
+def to_points(frame: Frame, coords: FloatArray, start: FloatArray, before: FloatArray) -> None:
+    """Turn coordinates (..., n, d) into points, in place; what rests is as ``before``.
+
+    As ``frame.points`` does, but for rounding. Parameters as of ``keep_rest``.
+    """
+    if frame.axis is None or frame.origin is None:
+        return
+    basis = axis_basis(frame.axis)
+    with one_at_a_time(8 * coords.size):
+        _turn(
+            coords.reshape(-1, *start.shape),
+            start,
+            before,
+            basis,
+            frame.origin,
+            1.0 / frame.radius,
+            frame.theta0,
+        )
 
 
 def farthest(moved: FloatArray, start: FloatArray) -> FloatArray:

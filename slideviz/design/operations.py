@@ -16,7 +16,7 @@ from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slo
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 
-PAIRS = 8_000_000
+PAIRS = 3_000_000
 """Pairs whose radial functions are in memory at a time when many columns share them."""
 
 CACHED = 500_000
@@ -100,15 +100,27 @@ def _turned(x: Array, out: FloatArray, slopes_of: Callable[[], FloatArray]) -> A
     )
 
 
-def radial_sum(basis: Basis, targets: Array, controls: Array, weights: Array) -> Array:
-    """Return s (..., N, d) at features (k, N), from features (k, n) and weights (..., n, d)."""
+def radial_sum(
+    basis: Basis,
+    targets: Array,
+    controls: Array,
+    weights: Array,
+    room: FloatArray | None = None,
+) -> Array:
+    """Return s (..., N, d) at features (k, N), from features (k, n) and weights (..., n, d).
+
+    Parameters
+    ----------
+    room : (..., N, d), optional
+        Where the sums of several designs go.
+    """
     x, c, w = value(targets), value(controls), value(weights)
 
     def turned(g: FloatArray) -> FloatArray:
         return many(basis, c, x, g)
 
     return apply(
-        many(basis, x, c, w),
+        many(basis, x, c, w, room),
         (
             targets,
             lambda t: _each(lambda each: push_positions(basis, x, c, w, moved=each), t),
@@ -131,7 +143,11 @@ def _each(work: Linear, stacked: FloatArray) -> FloatArray:
 
 
 def many(
-    basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray
+    basis: Basis,
+    targets: FloatArray,
+    controls: FloatArray,
+    weights: FloatArray,
+    room: FloatArray | None = None,
 ) -> FloatArray:
     """Return s (..., N, d) with the radial functions of each pair computed once for all weights."""
     if weights.ndim == 2:
@@ -139,7 +155,7 @@ def many(
     ahead, (n, d) = weights.shape[:-2], weights.shape[-2:]
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
-    out = np.empty((wide.shape[1] // d, total, d))
+    out = np.empty((wide.shape[1] // d, total, d)) if room is None else room
     size = max(1, PAIRS // max(1, n))
     least = max(1, CACHED // max(1, n))
     for start in range(0, total, size):

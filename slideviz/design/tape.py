@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from slideviz.mesh.model import FloatArray, IntArray
 
@@ -267,6 +269,21 @@ def gather(x: Array, rows: IntArray, count: int) -> Array:
     v = value(x)
     return apply(
         sums(v, rows, count), (x, lambda t: sums(t, rows, count), lambda g: g[..., rows, :])
+    )
+
+
+def mixed(matrix: csr_array, x: Array) -> Array:
+    """Return a sparse matrix (m, n) times the rows of x (..., n, c)."""
+
+    def times(a: csr_array, t: FloatArray) -> FloatArray:
+        n, c = t.shape[-2:]
+        count = int(np.prod(t.shape[:-2]))
+        wide = np.moveaxis(t.reshape(count, n, c), 0, 1).reshape(n, count * c)
+        found = (a @ wide).reshape(a.shape[0], count, c)
+        return np.moveaxis(found, 1, 0).reshape(*t.shape[:-2], a.shape[0], c)
+
+    return apply(
+        times(matrix, value(x)), (x, partial(times, matrix), lambda g: times(matrix.T.tocsr(), g))
     )
 
 
