@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,10 +11,10 @@ import numpy as np
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, Ffd, moves, named
 from slideviz.case.words import nearest
-from slideviz.errors import CaseError, SlidevizError
+from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.box import Box, Embedding, plane_corners, regular_box
 from slideviz.ffd.inverse import parametric
-from slideviz.ffd.section import boxes_of
+from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import IntArray, Mesh
 
 OFF = 1e-6
@@ -125,6 +126,12 @@ def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[obje
             continue
         mine = {name: nodes for name, nodes in on.items() if moves(motion, name)}
         moved = _moved(boxes[motion.box], mesh, motion, mine)
+        if moved is not None and len(motions) < len(case.motions) and _is_in(motion.box, mesh):
+            stays = Note(
+                f"the FFD box {motion.box!r} in the deformed mesh stays where it was, since other "
+                "motions move boundaries, too; define it anew to use it with that mesh"
+            )
+            moved = replace(moved, warnings=(*moved.warnings, stays))
         if moved is None and mine:
             of = " or ".join(repr(name) for name in named(motion.marker)) or "a moving marker"
             problems.append(
@@ -136,6 +143,10 @@ def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[obje
     if problems:
         raise CaseError("\n".join(problems))
     return found
+
+
+def _is_in(name: str, mesh: Mesh) -> bool:
+    return any(box.name == name for box in boxes_of(mesh))
 
 
 def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Displacements | None:
@@ -155,3 +166,18 @@ def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Dis
                 "it? Then define the box anew"
             )
     return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None
+
+
+def moved_boxes(case: Case, mesh: Mesh, part: float = 1.0) -> Mesh:
+    """Return the mesh with its boxes where a part of the motions takes them.
+
+    Where other motions move boundaries too, no box can follow, and all stay as they were.
+    """
+    motions = [motion for motion in case.motions if isinstance(motion, Ffd)]
+    if not motions or len(motions) < len(case.motions):
+        return mesh
+    moved = []
+    for box in boxes_of(mesh):
+        changes = [box.change(each.index, each.vector) for each in motions if each.box == box.name]
+        moved += [box.moved(part * np.sum(changes, axis=0))] if changes else []
+    return with_boxes(mesh, moved) if moved else mesh

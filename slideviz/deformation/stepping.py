@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slideviz.case.boxes import moved_boxes
 from slideviz.case.model import Case
 from slideviz.deformation.growth import unsoundness
 from slideviz.deformation.setup import Setup
@@ -143,7 +144,7 @@ class Stepping:
         return Step(
             index=index,
             total=total,
-            mesh=self.mesh.with_points(points),
+            mesh=moved_boxes(self.case, self.mesh, part).with_points(points),
             control_nodes=solution.control_nodes,
             max_error=solution.max_error,
             condition=solution.condition,

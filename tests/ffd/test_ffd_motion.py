@@ -200,3 +200,32 @@ def test_prescribed_displacements_move_their_nodes_and_leave_others():
     np.testing.assert_allclose(moved[nodes], given.vectors, atol=1e-15)
     others = np.setdiff1d(mesh.marker("y_low").nodes, nodes)
     np.testing.assert_allclose(moved[others], 0.0, atol=1e-15)
+
+
+def test_boxes_of_the_mesh_move_with_the_surface(tmp_path):
+    mesh = boxed(square())
+    one = sv.Ffd("y_low", "BOX", (1, 0, -1), (0.0, 0.05, 0.0))
+    two = sv.Ffd("y_low", "BOX", (2, -1, -1), (0.02, 0.0, 0.0))
+    steps = list(sv.deform(case(one, two, steps=2), mesh))
+    (before,), (after,) = boxes_of(mesh), boxes_of(steps[-1].mesh)
+    change = before.change(one.index, one.vector) + before.change(two.index, two.vector)
+    np.testing.assert_allclose(after.points - before.points, change, atol=1e-15)
+    np.testing.assert_allclose(boxes_of(steps[0].mesh)[0].points - before.points, 0.5 * change)
+    sv.write(tmp_path / "out.su2", steps[-1].mesh)
+    again = sv.read(tmp_path / "out.su2")
+    # The surface is still that of the box: it can be moved on from there.
+    found = displacements(case(one), again)
+    assert not found.warnings
+    nodes = mesh.marker("y_low").nodes
+    first = displacements(case(one), mesh).vectors
+    np.testing.assert_allclose(found.vectors, first, atol=1e-12)
+    assert not np.allclose(again.points[nodes], mesh.points[nodes])
+
+
+def test_boxes_that_cannot_follow_stay_and_a_note_says_so():
+    mesh = boxed(square())
+    one = sv.Ffd("y_low", "BOX", (1, 0, -1), (0.0, 0.05, 0.0))
+    *_, last = sv.deform(case(one, sv.Translate("y_low", (0.0, 0.01))), mesh)
+    assert np.array_equal(boxes_of(last.mesh)[0].points, boxes_of(mesh)[0].points)
+    (note,) = [text for text in last.warnings if "FFD" in text]
+    assert "the FFD box 'BOX' in the deformed mesh stays where it was" in note
