@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from slideviz.case.words import shown, without_comment
+from slideviz.case.words import COMMENT_SIGNS, shown, without_comment
 from slideviz.errors import CaseError
 from slideviz.mesh.io.file_checks import require_length
 
@@ -71,11 +71,14 @@ def read_text(path: Path, what: str) -> tuple[str, tuple[str, ...]]:
     return text, ()
 
 
-def entries_of(text: str) -> tuple[list[Entry], list[Problem]]:
-    """Return the entries of a case file in order, and what is wrong with its lines."""
+def entries_of(text: str, signs: str = COMMENT_SIGNS) -> tuple[list[Entry], list[Problem]]:
+    """Return the entries of a case file in order, and what is wrong with its lines.
+
+    Comments begin with one of ``signs``.
+    """
     entries: list[Entry] = []
     problems: list[Problem] = []
-    for line, content in _joined(text, problems):
+    for line, content in _joined(text, problems, signs):
         match = _KEY_LINE.match(content)
         if match is None:
             problems.append((line, f"{shown(content.strip())} is not `KEY= value`"))
@@ -84,12 +87,12 @@ def entries_of(text: str) -> tuple[list[Entry], list[Problem]]:
     return entries, problems
 
 
-def _joined(text: str, problems: list[Problem]) -> Iterator[tuple[int, str]]:
+def _joined(text: str, problems: list[Problem], signs: str) -> Iterator[tuple[int, str]]:
     """Return the lines that hold something, each with what goes on in the lines after it."""
     start = 0
     parts: list[str] = []
     for line, raw in enumerate(_END_OF_LINE.split(text), start=1):
-        content = without_comment(raw).rstrip()
+        content = without_comment(raw, signs).rstrip()
         # A comment between the lines of a long list does not end it; an empty line does.
         if parts and not content.strip() and raw.strip():
             continue

@@ -57,13 +57,13 @@ def words_of(text: str) -> list[Word]:
     return found
 
 
-def without_comment(line: str) -> str:
+def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
     """Return the line up to its comment sign; one between quotes is no comment."""
     inside = False
     for place, sign in enumerate(line):
         if sign == '"':
             inside = not inside
-        elif sign in COMMENT_SIGNS and not inside:
+        elif sign in signs and not inside:
             return line[:place]
     return line
 

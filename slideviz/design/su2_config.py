@@ -6,6 +6,7 @@ Such a file has hundreds of keys; those that concern other things are counted an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from slideviz.case.key import MOTION
@@ -58,6 +59,8 @@ OURS = {
 }
 SU2_CONTINUITY = "2ND_DERIVATIVE"
 """SU2's default of FFD_CONTINUITY."""
+ALIKE = 0.9
+"""From where a key that is not read may be one that is, mistyped."""
 CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
 """FFD_CONTINUITY, and how many planes of control points it holds."""
 
@@ -105,7 +108,7 @@ def read_config(path: Path) -> Su2Config:
         It cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
     """
     text, warnings = read_text(path, "case file")
-    entries, problems = entries_of(text)
+    entries, problems = entries_of(text, "%")  # other signs have a meaning in some values
     rows = {entry.key: entry for entry in entries}  # of two, SU2 would complain
     for entry in entries:
         if rows[entry.key] is not entry:
@@ -124,9 +127,19 @@ def read_config(path: Path) -> Su2Config:
         source=path,
         mesh_file=files["MESH_FILENAME"],
         mesh_out=_with_ending(files["MESH_OUT_FILENAME"], case),
-        warnings=warnings,
+        warnings=(*warnings, *_perhaps_ours(path, ignored, rows)),
     )
     return Su2Config(case, markers, variables, files, words, ignored, reader.named)
+
+
+def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) -> list[str]:
+    """Return warnings about keys that nearly are those that are read here."""
+    found = []
+    for key in ignored:
+        close = get_close_matches(key, _read_keys() - set(rows), n=1, cutoff=ALIKE)
+        if close:
+            found.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
+    return found
 
 
 def _read_keys() -> set[str]:

@@ -188,7 +188,9 @@ def regular_box(name: str, corners: FloatArray, degrees: Index, orders: Index | 
             )
     box = Box(name, lattice(corners, degrees), orders, corners)
     ends = np.array(list(product((0.0, 0.5, 1.0), repeat=3)))
-    if np.linalg.det(box.slopes(ends)).min() <= 0.0:
+    volume = np.linalg.det(box.slopes(ends))
+    # Of either hand, and perhaps with sides that shrink to an edge.
+    if volume.min() < 0.0 < volume.max() or not volume.any():
         raise CaseError(
             "the corners enclose no volume in their order; needed are those of the bottom "
             "counter-clockwise, then those above them"

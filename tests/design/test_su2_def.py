@@ -429,3 +429,21 @@ def test_binary_mesh_is_written_without_boxes_and_says_so(here, capsys):
     assert run(["def", "a.cfg"]) == 0
     assert sv.read("out.su2", file_format="su2b").points.shape == (49, 2)
     assert "an SU2 binary mesh" in capsys.readouterr().err
+
+
+def test_values_of_other_keys_may_hold_any_signs(here):
+    found = config(
+        "CUSTOM_OUTPUTS= 'v : Macro{sqrt(pow(VELOCITY_X, 2))};\\\n"
+        "    mean : MassFlowAvg{$v}[low]; # and more\\\n    last : $v'\n"
+        "OPT_CONSTRAINT= ( LIFT > 0.3 ) * 0.01\nDV_KIND= SCALE % comment\nDV_VALUE= 1.1\n"
+    )
+    assert found.ignored == ("CUSTOM_OUTPUTS", "OPT_CONSTRAINT")
+    assert found.variables[0].value == 1.1
+
+
+def test_mistyped_keys_of_ours_are_warned_about(here, capsys):
+    config("DV_KIND= SCALE\nDV_VALUE= 1.1\nSLIDING_MOD= ds\nDV_VALUE_NEW= 0\nMUSCL_FLOW= YES\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    err = capsys.readouterr().err
+    assert "a.cfg:7: SLIDING_MOD is not read; did you mean SLIDING_MODE?" in err
+    assert err.count("did you mean") == 1

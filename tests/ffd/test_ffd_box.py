@@ -195,7 +195,21 @@ def test_impossible_boxes_are_refused():
     with pytest.raises(CaseError, match="of j have the order 4, and 2 control points; needed is"):
         regular_box("B", WARPED, (5, 1, 1), (4, 4, 2))
     with pytest.raises(CaseError, match="enclose no volume in their order"):
-        regular_box("B", WARPED[[0, 3, 2, 1, 4, 7, 6, 5]], (1, 1, 1), None)
+        regular_box("B", WARPED[[0, 2, 1, 3, 4, 6, 5, 7]], (1, 1, 1), None)
+    with pytest.raises(CaseError, match="enclose no volume in their order"):
+        regular_box("B", WARPED * [1, 1, 0], (1, 1, 1), None)
+
+
+def test_boxes_of_the_other_hand_and_with_collapsed_sides_are_boxes():
+    turned = WARPED[[0, 3, 2, 1, 4, 7, 6, 5]]
+    wedge = CORNERS * 1.0
+    wedge[[2, 6]] = wedge[[1, 5]]
+    for corners in (turned, wedge):
+        box = regular_box("B", corners, (3, 2, 1), None)
+        uvw = 0.05 + 0.9 * inside(50)
+        found, within = parametric(box, box.at(uvw))
+        assert within.all()
+        np.testing.assert_allclose(found, uvw, atol=1e-9)
 
 
 def test_lattice_is_even_between_the_corners():
