@@ -122,7 +122,11 @@ def test_what_is_wrong(folder, capsys, monkeypatch, words, problem):
     assert problem in err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)],
+    ids=["SIGINT", "SIGTERM"],
+)
 def test_a_signal_ends_it_and_resume_goes_on(folder, number):
     lines = "\n".join(f"{0.0001 * k},5" for k in range(400))
     (folder / "designs.csv").write_text(f"airfoil.translate.dy,STEPS\n{lines}\n")

@@ -89,6 +89,7 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     wait_until(lambda: not is_running(pid))
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_is_told(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
