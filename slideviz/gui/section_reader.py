@@ -20,6 +20,9 @@ from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
 
+READING = "Reading the cells of the section"
+"""What news of it begin with."""
+
 
 class SectionReader(QObject):
     """The job that reads the cells that sections cut; a section that is dragged is read anew.
@@ -90,6 +93,7 @@ class SectionReader(QObject):
     def _read(self, slab: Frame) -> None:
         assert self._now is not None
         keep_slab(*self._now, slab)
+        self.said.emit("")
         self.found.emit()
         self._timer.start()
 
@@ -103,6 +107,6 @@ class SectionReader(QObject):
 
 def _reading(frame: Frame, section: Section, report: Report, stopped: Stopped) -> Frame:
     def tell(part: float) -> None:
-        report(Doing(f"Reading the cells of the section: {part:.0%}"))
+        report(Doing(f"{READING}: {part:.0%}"))
 
     return read_slab(frame, section, tell, partial(require_going, stopped))

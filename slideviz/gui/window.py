@@ -33,7 +33,7 @@ from slideviz.gui.panels.run import RunPanel
 from slideviz.gui.recovery import SessionRecovery
 from slideviz.gui.responsiveness.warmup_thread import WarmupThread
 from slideviz.gui.running import Running
-from slideviz.gui.section_reader import SectionReader
+from slideviz.gui.section_reader import READING, SectionReader
 from slideviz.gui.start import StartPage
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.player import Player
@@ -113,7 +113,7 @@ class MainWindow(Services):
         self.intersection_check = IntersectionCheck(self.store, self)
         self.section_reader = SectionReader(self.store, self)
         self.section_reader.found.connect(self.section_views.redraw)
-        self.section_reader.said.connect(self.say)
+        self.section_reader.said.connect(self._say_reading)
         self.warmup = WarmupThread(self)
         self.warmup.compiling.connect(self.preparing.setVisible)
         self._keep_session(kept)
@@ -290,6 +290,11 @@ class MainWindow(Services):
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty one takes it away."""
         self.statusBar().showMessage(text, 8000)
+
+    def _say_reading(self, text: str) -> None:
+        """Show how far a section was read; an empty text takes that away, and nothing else."""
+        if text or self.statusBar().currentMessage().startswith(READING):
+            self.say(text)
 
     # The view --------------------------------------------------------------------------
 

@@ -5,6 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.deformation.solver import deform
+from slideviz.gui.section_reader import READING
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import write_sample
 from slideviz.scene.actors import VALUES
@@ -77,6 +78,7 @@ def test_a_section_has_the_cells_and_colours_of_the_whole_mesh(stator, folder):
     one = add(stator, section)
     there = Cutter.of(whole).cut(whole.points, section)
     np.testing.assert_array_equal(one.frame.mesh.part.cells[one.polygons.cells], there.cells)
+    assert not stator.window.statusBar().currentMessage().startswith(READING)
     np.testing.assert_allclose(
         one.shown.shape.cell_data[VALUES], quality(whole).skew[there.cells], rtol=1e-12
     )
@@ -116,6 +118,8 @@ def test_what_needs_all_cells_is_disabled_with_the_reason(stator):
     for name in ("save_mesh", "export_quality"):
         assert not actions[name].isEnabled()
         assert "stays in its file" in actions[name].toolTip().replace("\n", " ")
+    panel = stator.window.docks_.panels["sections"]
+    assert not panel.picture.isEnabled()
     display = stator.window.docks_.panels["display"]
     assert not display.only.isEnabled()
     assert "stays in its file" in display.only.toolTip().replace("\n", " ")

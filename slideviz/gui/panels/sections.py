@@ -33,7 +33,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.section_cuts import can_cut
 from slideviz.session.section_start import first_section
-from slideviz.session.state import Session
+from slideviz.session.state import IN_FILE, Session
 
 if TYPE_CHECKING:
     from slideviz.gui.viewport.section_views import SectionViews
@@ -113,6 +113,7 @@ class SectionsPanel(Panel):
         self.picture = tool_button(
             "Save a picture of this section (PNG, SVG, PDF)…", image="picture", menu=self.sizes
         )
+        self._picture_tip = self.picture.toolTip()
         for words, paper in SIZES.items():
             choice = self.sizes.addAction(words)
             choice.triggered.connect(lambda _=False, paper=paper: self._want_picture(paper))
@@ -197,6 +198,8 @@ class SectionsPanel(Panel):
         self.flat.setChecked(chosen is not None and chosen.flat)
         self.look.setToolTip(words.look)
         self.look.setVisible(bool(words.look))
+        self.picture.setEnabled(not session.in_file)
+        self.picture.setToolTip(wrapped(IN_FILE) if session.in_file else self._picture_tip)
 
     # What is wanted --------------------------------------------------------------------
 
