@@ -21,7 +21,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import Pair
+from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
@@ -178,8 +178,8 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
+    alike = TOLERANCE if moved else alikeness(case, mesh, pairs)
     moved = moved or displaced(displacements(asked, mesh), mesh)
-    alike = alikeness(case, mesh, pairs)
     known, target, warnings = prescribed(
         case, mesh, moved, alike, boundary=boundary, fans=fans, classes=classes, frame=frame
     )

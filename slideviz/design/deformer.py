@@ -12,7 +12,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, Translate
 from slideviz.case.motion import ROUNDING, displacements
 from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
-from slideviz.deformation.prescribed import alikeness, displaced
+from slideviz.deformation.prescribed import displaced
 from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
@@ -22,6 +22,7 @@ from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.errors import CaseError, DeformError, ToleranceWarning, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
+from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
 
@@ -159,7 +160,6 @@ class Deformer:
             )
         self._setup, self._input = setup, _input(mesh, setup, asked)
         self._size = largest_coordinate(mesh.points)
-        self._alike = alikeness(case, mesh, setup.pairs)
         self.warnings = (*case.warnings, *setup.warnings)
         targets = [value(self._target(reference)) for reference in references]
         tell = progress or (lambda _: None)
@@ -278,7 +278,7 @@ class Deformer:
             follow = difference(setup.frame, mesh.points[self.nodes[given.others]], own)
             gap = np.abs(value(follow) - moved[..., given.followed, :])
             largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
-            allowed = self._alike * largest + ROUNDING * self._size
+            allowed = TOLERANCE * largest + ROUNDING * self._size
             if (gap.max(axis=(-1, -2)) > allowed).any():
                 self._refuse(vectors)
         if mesh.halo is not None:
@@ -292,7 +292,7 @@ class Deformer:
             values = np.zeros(mesh.points.shape)
             values[moved.nodes] = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
             largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
-            allowed = self._alike * largest + ROUNDING * self._size
+            allowed = TOLERANCE * largest + ROUNDING * self._size
             spread(values, moved.nodes, setup.classes.stands, allowed)
 
     def _run(self, target: Array) -> list[State]:

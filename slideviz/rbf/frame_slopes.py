@@ -6,6 +6,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import axis_basis, in_axis_frame
+from slideviz.mesh.threads import in_parts
 from slideviz.rbf.axis import ON_AXIS
 from slideviz.rbf.frames import Frame, _across
 
@@ -39,12 +40,16 @@ def points_slopes(frame: Frame, coords: FloatArray) -> FloatArray:
     if frame.axis is None:
         return np.broadcast_to(np.eye(d), (n, d, d))
     basis = axis_basis(frame.axis)
-    angle = coords[:, 1] / frame.radius + frame.theta0
-    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     out = np.empty((n, 3, 3))
-    out[:, :, 0] = cos * basis[0] + sin * basis[1]
-    out[:, :, 1] = coords[:, :1] / frame.radius * (cos * basis[1] - sin * basis[0])
-    out[:, :, 2] = basis[2]
+
+    def fill(part: slice) -> None:
+        angle = coords[part, 1] / frame.radius + frame.theta0
+        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        out[part, :, 0] = cos * basis[0] + sin * basis[1]
+        out[part, :, 1] = coords[part, :1] / frame.radius * (cos * basis[1] - sin * basis[0])
+        out[part, :, 2] = basis[2]
+
+    in_parts(fill, n)
     return out[:, :d, :d]
 
 
