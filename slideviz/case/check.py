@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from slideviz.case.boxes import ffd_problems
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.key import BOUNDARIES, FILES, MOTION, Key
@@ -128,6 +130,8 @@ def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
         problems = [*_motion_problems(motion, mesh.dim)]
         if isinstance(motion, Ffd) and not problems:
             problems += ffd_problems(case, mesh, motion)
+        elif isinstance(motion, Prescribed):
+            problems += _prescribed_problems(case, mesh, motion)
         found += [f"motion {place}: {text}" for text in problems]
     return tuple(found)
 
@@ -157,6 +161,18 @@ def _motion_problems(motion: Motion, dim: int) -> Iterator[str]:
             yield f"the axis {motion.axis} leaves the plane; in 2D leave the axis out"
     elif len(motion.factors) not in (1, dim):
         yield f"{len(motion.factors)} factors are given, and {needed}; give 1 or {dim}"
+
+
+def _prescribed_problems(case: Case, mesh: Mesh, motion: Prescribed) -> Iterator[str]:
+    if motion.vectors.shape[1] != mesh.dim:
+        has = motion.vectors.shape[1]
+        yield f"its vectors have {has} components, and the mesh {mesh.dim} dimensions"
+    names = (name for name in case.markers_with("moving") if moves(motion, name))
+    on = [mesh.marker(name).nodes for name in names if name in mesh.marker_names]
+    stray = np.setdiff1d(motion.nodes, np.concatenate([*on, np.empty(0, np.int64)]))
+    if len(stray):
+        more = f" (and {len(stray) - 1} more)" if len(stray) > 1 else ""
+        yield f"node {stray[0]}{more} is on none of the markers that it moves; take it out"
 
 
 def _value_problems(case: Case) -> Iterator[str]:

@@ -10,6 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.errors import CaseError
+from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
     FfdBlending,
     FileFormat,
@@ -110,6 +112,19 @@ class Prescribed:
     nodes: NDArray[np.int64]
     vectors: NDArray[np.float64]
     marker: Target = ""
+
+    def __post_init__(self) -> None:
+        nodes = frozen_array(self.nodes, np.int64)
+        vectors = frozen_array(self.vectors, np.float64)
+        if nodes.ndim != 1 or vectors.ndim != 2 or len(nodes) != len(vectors):
+            raise CaseError(
+                f"nodes and vectors have the shapes {nodes.shape} and {vectors.shape}; needed are "
+                "(k,) and (k, d)"
+            )
+        if (np.diff(nodes) <= 0).any() or not np.isfinite(vectors).all():
+            raise CaseError("nodes must be ascending, each once, and their vectors finite")
+        object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "vectors", vectors)
 
 
 Motion = Translate | Rotate | Scale | Radial | Ffd | FromFile | Prescribed

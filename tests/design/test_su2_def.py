@@ -447,3 +447,8 @@ def test_mistyped_keys_of_ours_are_warned_about(here, capsys):
     err = capsys.readouterr().err
     assert "a.cfg:7: SLIDING_MOD is not read; did you mean SLIDING_MODE?" in err
     assert err.count("did you mean") == 1
+
+
+def test_without_dv_marker_the_markers_of_a_deformed_mesh_move(here):
+    Path("a.cfg").write_text("MARKER_DEFORM_MESH= (high)\nDV_KIND= SCALE\nDV_VALUE= 1.1\n")
+    assert read_config(Path("a.cfg")).markers == ("high",)

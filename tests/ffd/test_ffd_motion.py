@@ -229,3 +229,17 @@ def test_boxes_that_cannot_follow_stay_and_a_note_says_so():
     assert np.array_equal(boxes_of(last.mesh)[0].points, boxes_of(mesh)[0].points)
     (note,) = [text for text in last.warnings if "FFD" in text]
     assert "the FFD box 'BOX' in the deformed mesh stays where it was" in note
+
+
+def test_wrong_prescribed_displacements_are_told():
+    mesh = square()
+    inner = 40
+    with pytest.raises(CaseError, match=r"motion 1: node 40 is on none of the markers that it mov"):
+        next(sv.deform(case(sv.Prescribed([inner], [[0.0, 0.1]])), mesh))
+    low = mesh.marker("y_low").nodes[2:3]
+    with pytest.raises(CaseError, match="its vectors have 3 components, and the mesh 2 dimensions"):
+        next(sv.deform(case(sv.Prescribed(low, [[0.0, 0.1, 0.0]])), mesh))
+    with pytest.raises(CaseError, match=r"the shapes \(2,\) and \(1, 2\); needed are"):
+        sv.Prescribed([1, 2], [[0.0, 0.1]])
+    with pytest.raises(CaseError, match="nodes must be ascending, each once"):
+        sv.Prescribed([2, 1], [[0.0, 0.1], [0.0, 0.1]])
