@@ -108,6 +108,17 @@ def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:
     return kept[box, marker]
 
 
+def off_points(box: Box, mesh: Mesh, marker: str) -> list[str]:
+    """Return a warning where the points of a box on a marker are not those of the mesh."""
+    _, off = embedding(box, mesh, marker)
+    said = (
+        f"{mesh.name}: the surface points of the FFD box {box.name!r} on {marker} are not those of "
+        f"the mesh, by up to {off:.1g} of the box; was the mesh moved without it? Then define the "
+        "box anew"
+    )
+    return [said] if off > OFF else []
+
+
 def ffd_displacements(case: Case, mesh: Mesh, names: Iterable[str]) -> dict[object, Displacements]:
     """Return what each motion of a box does to the nodes of the moving markers ``names``.
 
@@ -156,15 +167,10 @@ def _moved(box: Box, mesh: Mesh, motion: Ffd, on: Mapping[str, IntArray]) -> Dis
     change = box.change(motion.index, motion.vector)
     warnings, any_inside = [], False
     for name in on:
-        inside, off = embedding(box, mesh, name)
+        inside, _ = embedding(box, mesh, name)
         any_inside |= bool(len(inside.nodes))
         vectors[np.searchsorted(nodes, inside.nodes)] = inside.sums(change)[:, : mesh.dim]
-        if off > OFF:
-            warnings.append(
-                f"{mesh.name}: the surface points of the FFD box {box.name!r} on {name} are not "
-                f"those of the mesh, by up to {off:.1g} of the box; was the mesh moved without "
-                "it? Then define the box anew"
-            )
+        warnings += off_points(box, mesh, name)
     return Displacements(nodes, vectors, tuple(warnings)) if any_inside else None
 
 

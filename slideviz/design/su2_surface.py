@@ -5,12 +5,13 @@ As in SU2 each variable acts on the undeformed boundary, and what all of them do
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.boxes import boxes_for, defined_boxes, embedding
+from slideviz.case.boxes import boxes_for, defined_boxes, embedding, off_points
 from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.model import Case, Prescribed
@@ -21,9 +22,9 @@ from slideviz.design.su2_config import Su2Config
 from slideviz.design.su2_planes import idle_variables
 from slideviz.design.su2_positions import read_positions
 from slideviz.design.su2_variables import BOXED, Variable
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.box import Box, Embedding
-from slideviz.ffd.section import with_boxes
+from slideviz.ffd.section import boxes_of, with_boxes
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 RIGID = ("TRANSLATION", "ROTATION", "SCALE")
@@ -158,8 +159,10 @@ def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
                 f"{config.source}: no node of {', '.join(config.markers)} is in the FFD box "
                 f"{name!r}; correct the box or DV_MARKER"
             )
+    for box in boxes.values():
+        warnings += [text for name in config.markers for text in off_points(box, mesh, name)]
     idle, held = idle_variables(config, mesh, boxes)
-    warnings += [*held, *_overlaps(inside)]
+    warnings += [*held, *_overlaps(inside), *_left_behind(config, mesh)]
     return Surface(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
 
 
@@ -241,6 +244,19 @@ def _embedded(
     one, first = np.unique(every, return_index=True)
     inside = box.embed(np.searchsorted(nodes, one), uvw[first])
     return (box if box.embedded else replace(box, embedded=listed)), inside
+
+
+def _left_behind(config: Su2Config, mesh: Mesh) -> list[str]:
+    """Return a note where the surface moves otherwise than the boxes of the mesh."""
+    kinds = sorted({variable.kind for variable in config.variables} - {*BOXED})
+    with suppress(SlidevizError):  # a mesh whose boxes cannot be read has none that could be used
+        if kinds and boxes_of(mesh):
+            said = (
+                f"the FFD boxes in {config.case.mesh_out} follow their control points only, and "
+                f"not {', '.join(kinds)}; set them anew to use them with that mesh"
+            )
+            return [Note(said)]
+    return []
 
 
 def _overlaps(inside: dict[str, Embedding]) -> list[str]:

@@ -452,3 +452,18 @@ def test_mistyped_keys_of_ours_are_warned_about(here, capsys):
 def test_without_dv_marker_the_markers_of_a_deformed_mesh_move(here):
     Path("a.cfg").write_text("MARKER_DEFORM_MESH= (high)\nDV_KIND= SCALE\nDV_VALUE= 1.1\n")
     assert read_config(Path("a.cfg")).markers == ("high",)
+
+
+def test_boxes_that_the_surface_leaves_behind_are_told(here, capsys):
+    text = f"{BOXED}DV_KIND= FFD_SETTING\n"
+    config(text)
+    assert run(["def", "a.cfg", "-q"]) == 0
+    Path("out.su2").rename("mesh.su2")
+    config("DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.02\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    said = capsys.readouterr().err
+    assert "boxes in out.su2 follow their control points only, and not TRANSLATION" in said
+    Path("out.su2").rename("mesh.su2")
+    config("DV_KIND= FFD_CONTROL_POINT_2D\nDV_PARAM= (BOX, 1, 0, 0, 1)\nDV_VALUE= 0.02\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert "'BOX' on low are not those of the mesh, by up to 0.07" in capsys.readouterr().err
