@@ -41,7 +41,8 @@ def sweep(
 ) -> Iterator[Row]:
     """Return an iterator over the results of designs, each as it comes.
 
-    Each design is deformed as ``slideviz run`` would with its values, to the bit.
+    Each design is deformed as ``slideviz run`` would with its values: to the bit where that has one
+    thread, else to the rounding of a large system that several solve.
 
     Parameters
     ----------

@@ -370,3 +370,27 @@ def test_a_large_file_is_opened_in_the_other_process_too(passage, tmp_path, monk
     file.write_bytes(file.read_bytes() + b"% more\n")
     with pytest.raises(sv.SlidevizError, match="was changed while it was in use"):
         pickle.loads(content)
+
+
+def test_a_design_has_one_thread(passage, monkeypatch):
+    from numba import get_num_threads
+    from threadpoolctl import threadpool_info
+
+    from slideviz.design import sweep_worker
+
+    def threads():
+        return [get_num_threads(), *(one["num_threads"] for one in threadpool_info())]
+
+    found = []
+
+    def watched(*values):
+        found.append(threads())
+        return sv.deform(*values)
+
+    monkeypatch.setattr(sweep_worker, "deform", watched)
+    mesh = packed(passage.mesh)
+    work(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
+    before = threads()
+    assert work(Task(1, passage.case, mesh.name, packed=mesh)).row.problem == ""
+    assert set(found[-1]) == {1}
+    assert threads() == before

@@ -1,10 +1,12 @@
 """The table of designs of the window: ranges, combinations, edits, files."""
 
 import csv
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 import slideviz as sv
+from slideviz.design import sweep as sweeping
 from slideviz.design.sweep_row import Row
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
@@ -92,7 +94,9 @@ def test_files(passage, tmp_path):
     assert (second["design"], second["min"], second["mean"]) == ("2", "0.25", "0.5")
 
 
-def test_only_what_has_no_result_is_run(passage):
+def test_only_what_has_no_result_is_run(passage, monkeypatch):
+    made = staticmethod(lambda _cls, *_: ThreadPoolExecutor(1))  # processes take seconds to start
+    monkeypatch.setattr(sweeping, "Processes", type("Thread", (), {"__new__": made}))
     table = DesignTable().crossed("STEPS", ["1", "2", "3"]).with_results([Row(2, min=0.5)])
     told = []
     run_designs(passage.case, passage.mesh, table, told.append, lambda: False)
