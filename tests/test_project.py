@@ -43,6 +43,7 @@ def test_every_dependency_has_a_tested_version():
     }
     extras = PROJECT["project"]["optional-dependencies"].values()
     wanted = [*PROJECT["project"]["dependencies"], *chain.from_iterable(extras)]
+    wanted = [line for line in wanted if not line.startswith("slideviz[")]  # its own extras
     assert {_name(line) for line in wanted} <= pinned
 
 
