@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from slideviz.deformation.solver import Step, deform
     from slideviz.design.deformer import Deformer
     from slideviz.design.sweep import sweep
-    from slideviz.errors import SlidevizError, ToleranceWarning
+    from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
     from slideviz.mesh.io.convert import convert
     from slideviz.mesh.io.files import read, write
     from slideviz.mesh.model import Cells, Marker, Mesh
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Case": "case.model",
     "Cells": "mesh.model",
+    "ConditionWarning": "errors",
     "Deformer": "design.deformer",
     "Ffd": "case.model",
     "FromFile": "case.model",
@@ -62,6 +63,7 @@ _HOME = {
 __all__ = [
     "Case",
     "Cells",
+    "ConditionWarning",
     "Deformer",
     "Ffd",
     "FromFile",

@@ -39,6 +39,10 @@ class ToleranceWarning(UserWarning):
     """What was chosen for one displacement does not suffice for another."""
 
 
+class ConditionWarning(UserWarning):
+    """A system is so badly conditioned that derivatives have few digits."""
+
+
 class Cancelled(SlidevizError):
     """The one who pulls the work asked it to stop; nothing is wrong."""
 

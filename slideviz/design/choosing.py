@@ -52,7 +52,15 @@ def choose_steps(
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     return tuple(
         FrozenStep(
-            setup, mesh, case.sliding, part, k == 0, solution.stages, solution.dropped, weights
+            setup=setup,
+            mesh=mesh,
+            sliding=case.sliding,
+            part=part,
+            first=k == 0,
+            stages=solution.stages,
+            dropped=solution.dropped,
+            condition=solution.condition,
+            weights=weights,
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )

@@ -35,6 +35,9 @@ from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
 from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend, saddle_system
 
+SINGULAR = 1e15
+"""The condition number from which a system with a polynomial counts as singular."""
+
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns what is kept under a name, and makes it where there is nothing yet."""
 
@@ -240,6 +243,11 @@ class FrozenFit:
             system[:count, :count] = matrix(self._basis, (place, normals))
             system[:count, count:] = along[:, use]
             system[count:, :count] = along[:, use].T
+            if not self._chosen(f"{name} solved", lambda: np.linalg.cond(system, 1) < SINGULAR):
+                raise DeformError(
+                    f"the system is singular for RBF_KERNEL= {self._basis.kernel}, so that its "
+                    "solution has no derivative; use RBF_KERNEL= wendland-c2"
+                )
             return lu_factor(system), np.concatenate([np.arange(count), count + use])
 
         factor, rows = self._fixed(name, make)

@@ -115,6 +115,8 @@ class FrozenStep:
         Rows of the systems.
     dropped : (m,) int64
         Nodes that the pivot guard left out of them.
+    condition : float
+        Estimated condition number of the last of them, at the reference.
     weights : Weights or None
         Of inverse distance weighting, where that is the method.
     choices, constants : Kept
@@ -128,6 +130,7 @@ class FrozenStep:
     first: bool
     stages: tuple[Levels, ...]
     dropped: IntArray
+    condition: float
     weights: Weights | None = None
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)

@@ -9,7 +9,14 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.errors import CaseError, DeformError, NodeError, ToleranceWarning, UnsoundError
+from slideviz.errors import (
+    CaseError,
+    ConditionWarning,
+    DeformError,
+    NodeError,
+    ToleranceWarning,
+    UnsoundError,
+)
 from tests import builders
 from tests.test_laws import box, box_case, sector, sector_case
 
@@ -249,8 +256,15 @@ def test_what_has_no_derivative_is_refused():
     mesh, case = made("flat")
     with pytest.raises(DeformError, match="METHOD= elastic has no exact derivatives"):
         sv.Deformer(mesh, case.change(method="elastic"))
-    with pytest.raises(DeformError, match="RBF_KERNEL= quadric"):
-        sv.Deformer(mesh, case.change(kernel="quadric", reduction=None))
+    for reduction in (None, REDUCED):
+        with pytest.raises(DeformError, match="RBF_KERNEL= quadric"):
+            sv.Deformer(mesh, case.change(kernel="quadric", reduction=reduction))
+
+
+def test_a_badly_conditioned_system_is_told():
+    mesh, case = made("flat", reduction=None)
+    with pytest.warns(ConditionWarning, match="condition number of the system is"):
+        sv.Deformer(mesh, case.change(kernel="gaussian", influence_factor=20.0))
 
 
 def test_a_reduction_needs_a_displacement_to_choose_by():
@@ -270,7 +284,8 @@ def test_a_design_that_goes_beyond_all_bounds_is_refused():
     roles["x_m"] = roles["x_p"] = "fixed"
     case = case.change(roles=roles, reduction=None)
     up = np.tile([0.0, 0.05], (len(np.unique(mesh.marker("y_m").nodes)), 1))
-    deformer = sv.Deformer(mesh, case, np.zeros_like(up))
+    with pytest.warns(ConditionWarning):
+        deformer = sv.Deformer(mesh, case, np.zeros_like(up))
     with pytest.raises(UnsoundError, match=r"step 1: the interpolation misses its own"):
         deformer.deform(up)
 
