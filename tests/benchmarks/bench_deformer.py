@@ -17,7 +17,8 @@ DESIGNS = 100
 def stator(tmp_path_factory):
     """The sample stator, 238,504 cells, ready to be deformed."""
     folder = tmp_path_factory.mktemp("stator")
-    case = sv.Case.read(write_sample("stator", folder))
+    write_sample("stator", folder)
+    case = sv.Case.read(folder / "stator.cfg")
     deformer = sv.Deformer(sv.read(case.mesh_file), case)
     deformer.deform()
     return deformer
