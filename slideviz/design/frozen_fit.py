@@ -243,7 +243,11 @@ class FrozenFit:
             system[:count, :count] = matrix(self._basis, (place, normals))
             system[:count, count:] = along[:, use]
             system[count:, :count] = along[:, use].T
-            if not self._chosen(f"{name} solved", lambda: np.linalg.cond(system, 1) < SINGULAR):
+            # Lengths in any unit: what the polynomial's terms are worth must not count.
+            scale = np.ones(len(system))
+            scale[count:] /= np.abs(along[:, use]).max(axis=0)
+            alike = scale[:, None] * system * scale
+            if not self._chosen(f"{name} solved", lambda: np.linalg.cond(alike, 1) < SINGULAR):
                 raise DeformError(
                     f"the system is singular for RBF_KERNEL= {self._basis.kernel}, so that its "
                     "solution has no derivative; use RBF_KERNEL= wendland-c2"
