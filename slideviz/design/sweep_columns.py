@@ -86,13 +86,14 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
         Some are unknown, mean the same, or cannot vary: a sentence for each.
     """
     found: dict[str, Place | str] = {}
+    first: dict[Place | str, str] = {}
     problems = []
+    known = _all_names(case)
     for name in names:
         try:
-            meant = _meant(case, name)
-            twin = next((other for other, what in found.items() if what == meant), None)
-            if name in found or twin is not None:
-                raise CaseError(f"it means the same as column {twin or name}; keep one of them")
+            meant = _meant(case, name, known)
+            if first.setdefault(meant, name) != name or name in found:
+                raise CaseError(f"it means the same as column {first[meant]}; keep one of them")
             found[name] = meant
         except CaseError as problem:
             problems.append(f"column {shown(name)}: {problem}")
@@ -158,45 +159,51 @@ def own_values(case: Case, columns: Mapping[str, Place | str]) -> dict[str, Valu
     return found
 
 
-def _meant(case: Case, name: str) -> Place | str:
-    """Return the place of a number, or the key, that a name means."""
+def _meant(case: Case, name: str, known: Mapping[str, Place]) -> Place | str:
+    """Return the place of a number, or the key, that a name means.
+
+    ``known`` has the numbers by all their names: the shortest, and by the place of the motion.
+    """
     key = name.strip().upper()
     if key in KEYS:
         if KEYS[key].group in (FILES, VIEW):
             raise CaseError("files and the view are those of the case for all designs")
         return key
-    known = numbers_of(case)
-    wanted = _plain(name)
-    by_place = {
-        _plain(f"motion{at + 1}.{part}"): place
+    wanted = _usual(name)
+    if wanted in known:
+        return known[wanted]
+    # Markers may differ in capitals alone.
+    found = {place for other, place in known.items() if other.lower() == wanted.lower()}
+    if len(found) == 1:
+        return found.pop()
+    shortest = numbers_of(case)
+    several = any(
+        f"{_head(motion)}.{part}".lower() == wanted.lower()
         for at, motion in enumerate(case.motions)
-        for part, place in _parts(motion, at)
-    }
-    by_name = {_plain(other): place for other, place in known.items()}
-    if name.strip() in known:  # markers may differ in capitals alone
-        return known[name.strip()]
-    if wanted in by_name or wanted in by_place:
-        return by_name.get(wanted) or by_place[wanted]
-    if any(_plain(f"{_head(motion)}.{part}") == wanted for motion, part in _all_parts(case)):
-        raise CaseError(f"several motions have it; say which, as {_listed(known) or 'motion1.x'}")
-    there = f"the motions have {_listed(known)}" if known else "the motions have no numbers"
-    hint = nearest(name, [*known, *KEYS])
+        for part, _ in _parts(motion, at)
+    )
+    if several:
+        raise CaseError(f"several motions have it; say which, as {_listed(shortest)}")
+    there = f"the motions have {_listed(shortest)}" if shortest else "the motions have no numbers"
     raise CaseError(
-        f"there is no such number of a motion, and no such key{hint}; {there}; "
-        "`slideviz keys` lists the keys"
+        f"there is no such number of a motion, and no such key{nearest(name, [*shortest, *KEYS])}; "
+        f"{there}; `slideviz keys` lists the keys"
     )
 
 
-def _all_parts(case: Case) -> Iterator[tuple[Motion, str]]:
-    for at, motion in enumerate(case.motions):
-        for part, _ in _parts(motion, at):
-            yield motion, part
+def _all_names(case: Case) -> dict[str, Place]:
+    """Return the numbers of the motions by all their names."""
+    return numbers_of(case) | {
+        f"motion{at + 1}.{part}": place
+        for at, motion in enumerate(case.motions)
+        for part, place in _parts(motion, at)
+    }
 
 
-def _plain(name: str) -> str:
-    """Return a name in small letters, with the usual name of its number."""
-    head, dot, part = name.strip().lower().rpartition(".")
-    return f"{head}{dot}{_ALSO.get(part, part)}"
+def _usual(name: str) -> str:
+    """Return a name with the usual name of its number."""
+    head, dot, part = name.strip().rpartition(".")
+    return f"{head}{dot}{_ALSO.get(part.lower(), part.lower())}"
 
 
 def _head(motion: Motion) -> str:

@@ -16,7 +16,7 @@ from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import is_number
-from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
+from slideviz.design.sweep_columns import numbers_of, own_values
 from slideviz.design.sweep_designs import read_designs
 from slideviz.design.sweep_row import NUMBERS, Row
 from slideviz.errors import CaseError
@@ -137,8 +137,8 @@ def column_choices(case: Case) -> dict[str, str]:
         for name, key in KEYS.items()
         if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
     }
-    found = columns_of(case, [*numbers_of(case), *keys])
-    return {name: _shown(value) for name, value in own_values(case, found).items()}
+    found = own_values(case, {**numbers_of(case), **keys})
+    return {name: _shown(value) for name, value in found.items()}
 
 
 def values_of(text: str) -> list[str]:

@@ -173,6 +173,14 @@ def test_displacements_of_a_program(passage, here, tmp_path):
         swept(other, {"STEPS": [1]}, here, resume=True, **asked)
 
 
+def test_markers_that_differ_in_capitals_alone():
+    case = sv.Case(motions=(sv.Translate("ab", (0.0, 0.0)), sv.Translate("AB", (0.0, 0.0))))
+    found = columns_of(case, ["AB.translate.dx", "ab.translate.dx"])
+    assert [place.motion for place in found.values()] == [1, 0]
+    with pytest.raises(CaseError, match=r"say which, as ab.translate.x, .*AB.translate.x"):
+        columns_of(case, ["Ab.translate.dx"])
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [

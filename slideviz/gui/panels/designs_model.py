@@ -10,9 +10,9 @@ from typing import Any
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 from qtpy.QtGui import QBrush, QColor
 
-from slideviz.color_scheme import INVERTED_COLOUR
 from slideviz.design.sweep_row import NUMBERS, Row
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.theme import alarm
 from slideviz.session.design_table import DesignTable
 
 Index = QModelIndex | QPersistentModelIndex
@@ -100,7 +100,7 @@ class DesignsModel(QAbstractTableModel):
             return self.table.rows[at][index.column()] if shown else None
         if role == Qt.ItemDataRole.ForegroundRole and row is not None:
             bad = row.problem or row.inverted
-            return QBrush(QColor(INVERTED_COLOUR)) if bad and column < 3 else None
+            return QBrush(QColor(alarm())) if bad and column < 3 else None
         if role == Qt.ItemDataRole.DisplayRole and row is not None:
             return self._text(row, list(RESULTS)[column])
         return None
