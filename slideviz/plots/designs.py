@@ -128,6 +128,8 @@ def against_designs(
     if words:
         every = -(-len(words) // _MOST_WORDS)
         axes.set_xticks(range(0, len(words), every), words[::every])
+    else:
+        axes.locator_params(axis="x", nbins=4)  # there is a legend beside, and little room
     if several:
         title = curves[0].others if curves and len(curves) > 1 else ""
         beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}

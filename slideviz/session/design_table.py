@@ -24,6 +24,8 @@ from slideviz.mesh.io.atomic import atomic_write
 
 MOST = 100_000
 """Designs that a table in the window has room for."""
+FINE = 1e-5
+"""What values of a range may be off, as a part of the step between them."""
 _RANGE = re.compile(r"(\S+)\s*(?:to|\.\.)\s*(\S+)\s*(?:in|:)\s*(\d+)\Z", re.IGNORECASE)
 
 
@@ -158,8 +160,13 @@ def values_of(text: str) -> list[str]:
     first, last, count = match.groups()
     if not (is_number(first) and is_number(last)) or not 2 <= int(count) <= MOST:
         raise CaseError("A range has two numbers and how many values it has, as -8 to 0 in 9")
-    # Not 0.30000000000000004.
-    return [format(v, ".12g") for v in np.linspace(float(first), float(last), int(count))]
+    values = np.linspace(float(first), float(last), int(count))
+    step = abs(values[1] - values[0])
+    for decimals in range(18):  # not 0.30000000000000004, nor more than the steps need
+        texts = [format(round(value, decimals), ".15g") for value in values.tolist()]
+        if max(abs(float(text) - v) for text, v in zip(texts, values, strict=True)) <= FINE * step:
+            return texts
+    return [repr(value) for value in values.tolist()]
 
 
 def _shown(value: str | float) -> str:

@@ -31,5 +31,5 @@ def run_designs(
     for done, row in enumerate(rows, start=1):
         report(replace(row, design=left[row.design - 1]))
         rest = (time.monotonic() - begin) / done * (len(left) - done)
-        words = f"{total - len(left) + done} of {total} designs, about {rest:.0f} s left"
+        words = f"{total - len(left) + done} of {total}, {rest:.0f} s left"
         report(Doing(words, done / len(left)))

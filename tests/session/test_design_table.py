@@ -3,6 +3,7 @@
 import csv
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 
 import slideviz as sv
@@ -35,6 +36,15 @@ from slideviz.session.jobs_designs import run_designs
 )
 def test_values(text, values):
     assert values_of(text) == values
+
+
+def test_values_have_no_more_digits_than_their_steps_need():
+    found = values_of("-24 to 0 in 60")
+    assert found[1] == "-23.59322"
+    assert [float(text) for text in found] == pytest.approx(np.linspace(-24, 0, 60), abs=1e-6)
+    assert values_of("100000 to 100001 in 3") == ["100000", "100000.5", "100001"]
+    assert values_of("0 to 1e-30 in 2") == ["0.0", "1e-30"]
+    assert values_of("1 to 1 in 2") == ["1", "1"]
 
 
 @pytest.mark.parametrize("text", ["", "1,,2", "1 to 2 in 1", "a to b in 3", "1 to 2 in 9999999"])
@@ -104,7 +114,7 @@ def test_only_what_has_no_result_is_run(passage, monkeypatch):
     assert sorted((row.design, row.steps) for row in rows) == [(1, 1), (3, 3)]
     news = [one for one in told if isinstance(one, Doing)]
     assert news[-1].fraction == 1.0
-    assert "3 of 3 designs" in news[-1].text
+    assert news[-1].text == "3 of 3, 0 s left"
 
 
 def test_it_can_be_stopped(passage):

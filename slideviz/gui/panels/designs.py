@@ -142,6 +142,7 @@ class DesignsPanel(Panel):
         self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.view.setAlternatingRowColors(True)
         self.view.setWordWrap(False)
+        self.view.setShowGrid(False)
         self.view.setTabKeyNavigation(False)
         self.view.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + 6)
         heads = self.view.horizontalHeader()
@@ -245,7 +246,6 @@ class DesignsPanel(Panel):
             self.across.clear()
             for name in table.columns:
                 self.across.addItem(name, name)
-            self.canvas.wipe()
         self._sync()
 
     def _sync(self) -> None:

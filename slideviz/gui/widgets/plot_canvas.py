@@ -61,6 +61,7 @@ class PlotCanvas(QWidget):
         self._last = 0.0
         self._picture = Picture()
         self._coming: Future[Picture] | None = None
+        self._before: Future[Picture] | None = None
         self._timer = later(self, self.fill)
         # Asked for rather than signalled: the thread need not know of a widget that may be gone.
         self._look_after = QTimer(self)
@@ -96,7 +97,7 @@ class PlotCanvas(QWidget):
 
     def wipe(self) -> None:
         """Show nothing until the next drawing is there: the present one is of another plot."""
-        self.wiped = True
+        self.wiped, self._before = True, self._coming
         self.update()
 
     def _rest_ms(self) -> float:
@@ -123,7 +124,7 @@ class PlotCanvas(QWidget):
         self._last = time.monotonic()
         self._picture = coming.result()
         # One that was asked for before it was wiped is still the other plot.
-        self.wiped = self.wiped and self._stale
+        self.wiped = self.wiped and coming is self._before
         self.update()
         self.drawn.emit()
         if self._stale:
