@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slideviz.errors import MeshError
-from slideviz.mesh.check import path_error
+from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.source import open_source, unreadable
@@ -163,10 +163,8 @@ def write(
     values = _checked(mesh, cell_data or {})
     kind = file_format or path.suffix.lower().removeprefix(".")
     if kind not in ("su2", "su2b"):
-        from slideviz.mesh.io.meshio_write import write_other_format
-
         moved = {} if base is None else {"displacement": mesh.points - base.points}
-        write_other_format(path, mesh, values, moved, replaces)
+        _write_other(path, mesh, values, moved, replaces)
         return
     if values:
         raise path_error(
@@ -177,6 +175,35 @@ def write(
             file.write(block)
             if going_on is not None:
                 going_on()
+
+
+def _write_other(
+    path: Path,
+    mesh: Mesh,
+    values: dict[str, NDArray],
+    point_data: dict[str, NDArray],
+    replaces: Path | None,
+) -> None:
+    """Write a mesh in a format that is none of SU2's, by its ending."""
+    ending = path.suffix.lower()
+    if ending == ".cgns":
+        from slideviz.mesh.io.cgns_write import write_cgns
+
+        if values:
+            raise path_error(
+                path, f"a CGNS file gets no cell data ({', '.join(values)}); write a .vtu file"
+            )
+        check_mesh(mesh)
+        write_cgns(path, mesh, replaces)
+    elif ending == ".vtkhdf":
+        from slideviz.mesh.io.vtkhdf import write_vtkhdf
+
+        check_mesh(mesh)
+        write_vtkhdf(path, mesh, values, point_data, replaces)
+    else:
+        from slideviz.mesh.io.meshio_write import write_other_format
+
+        write_other_format(path, mesh, values, point_data, replaces)
 
 
 def _is_source(path: Path, mesh: Mesh) -> bool:

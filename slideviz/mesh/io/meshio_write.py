@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.cgns_write import write_cgns
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
 from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
-from slideviz.mesh.io.vtkhdf import VTKHDF, write_vtkhdf
 from slideviz.mesh.model import IntArray, Mesh
 
 if TYPE_CHECKING:
@@ -59,10 +57,10 @@ def write_other_format(
     point_data: Mapping[str, NDArray] | None = None,
     replaces: Path | None = None,
 ) -> None:
-    """Write a mesh in the format that the ending names.
+    """Write a mesh as VTU, or in the format of meshio that the ending names.
 
-    Only VTU and VTKHDF files get the point data. Names of boundaries are kept in these, in Gmsh,
-    MED and Abaqus files; other formats get numbers at most. What meshio wrote is read again and
+    Only VTU files get the point data. Names of boundaries are kept in these, in Gmsh, MED and
+    Abaqus files; other formats get numbers at most. What meshio wrote is read again and
     compared, for it leaves out what a format cannot hold.
 
     Raises
@@ -71,17 +69,6 @@ def write_other_format(
         The file cannot be written, or the format cannot hold the mesh.
     """
     check_mesh(mesh)
-    if path.suffix.lower() == ".cgns":
-        if cell_data:
-            raise path_error(
-                path,
-                f"a CGNS file gets no cell data ({', '.join(cell_data)}); write a .vtu file",
-            )
-        write_cgns(path, mesh, replaces)
-        return
-    if path.suffix.lower() == VTKHDF:
-        write_vtkhdf(path, mesh, cell_data, point_data or {}, replaces)
-        return
     if path.suffix.lower() == ".vtu":
         with atomic_write(path, replaces=replaces) as file:
             for block in vtu_blocks(mesh, cell_data, point_data):
