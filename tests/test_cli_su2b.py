@@ -7,7 +7,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.mesh.io.su2b_layout import MAGIC
+from slideviz.mesh.io.su2b.layout import MAGIC
 from slideviz.samples.table import write_sample
 from slideviz.session.formats import left_out
 from tests.mesh.test_su2b import THREE_D, TWO_D, packed

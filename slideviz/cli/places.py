@@ -148,7 +148,7 @@ def _meet(one: Output, other: Output) -> bool:
 
 def _require_mesh_ending(file: Path) -> None:
     if file.suffix.lower() not in (".su2", ".su2b", ".vtu", ".vtkhdf"):
-        from slideviz.mesh.io.meshio_calls import formats_of
+        from slideviz.mesh.io.meshio.calls import formats_of
 
         formats_of(file)
 
@@ -163,7 +163,7 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
     """
     kind = file_format or output.suffix.lower().removeprefix(".")
     if kind == "cgns":
-        from slideviz.mesh.io.cgns_write import require_cgns
+        from slideviz.mesh.io.cgns.write import require_cgns
 
         require_cgns(output, mesh)
     if kind != "su2b":
@@ -173,7 +173,7 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
             remedy = f"write a {ending} file to keep them"
             print(f"slideviz: warning: {words}; {remedy}", file=sys.stderr, flush=True)
         return
-    from slideviz.mesh.io.su2b_write import lost_in_binary, require_binary
+    from slideviz.mesh.io.su2b.write import lost_in_binary, require_binary
 
     require_binary(mesh)
     lost = lost_in_binary(mesh)

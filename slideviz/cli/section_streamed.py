@@ -15,7 +15,7 @@ from slideviz.deformation.rated import Rated, Zone, rated_blocks
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import require_binary
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b_elements import taken
+from slideviz.mesh.io.su2b.elements import taken
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.skin import read_skin

@@ -16,8 +16,8 @@ from slideviz.deformation.rest import Rest
 from slideviz.deformation.solver import folded_at
 from slideviz.errors import MeshError
 from slideviz.mesh.io.cleanup import draft
-from slideviz.mesh.io.su2b_elements import Block
-from slideviz.mesh.io.su2b_layout import Source, ZonePlace
+from slideviz.mesh.io.su2b.elements import Block
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality, quality
 from slideviz.mesh.skin import Index, index_of

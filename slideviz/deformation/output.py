@@ -20,10 +20,10 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
-from slideviz.mesh.io.partial import Partial, partial_copy
-from slideviz.mesh.io.su2b import chosen_zone
-from slideviz.mesh.io.su2b_elements import element_block
-from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.elements import element_block
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.partial import Partial, partial_copy
+from slideviz.mesh.io.su2b.read import chosen_zone
 from slideviz.mesh.ranks import Alone
 from slideviz.rbf.problem import Watch
 from slideviz.terms import Metric

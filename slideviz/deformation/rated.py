@@ -11,9 +11,9 @@ import numpy as np
 
 from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, require_one_way
 from slideviz.errors import MeshError
-from slideviz.mesh.io.su2b import chosen_zone
-from slideviz.mesh.io.su2b_elements import Block, element_blocks
-from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.elements import Block, element_blocks
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.read import chosen_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.skin import index_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.ffd.box import Box, Index, plane_corners, regular_box
-from slideviz.mesh.io.su2_sections import is_ffd
+from slideviz.mesh.io.su2.sections import is_ffd
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 _LETTERS = "IJK"

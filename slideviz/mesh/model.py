@@ -16,9 +16,9 @@ from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
-    from slideviz.mesh.io.cgns import CgnsForm
-    from slideviz.mesh.io.su2 import Document
-    from slideviz.mesh.io.su2b import BinaryForm
+    from slideviz.mesh.io.cgns.read import CgnsForm
+    from slideviz.mesh.io.su2.read import Document
+    from slideviz.mesh.io.su2b.read import BinaryForm
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

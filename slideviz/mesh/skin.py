@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
-from slideviz.mesh.io.su2b import chosen_zone, point_block, read_elements
-from slideviz.mesh.io.su2b_elements import BLOCK, Block, element_block, require_used, taken
-from slideviz.mesh.io.su2b_layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.elements import BLOCK, Block, element_block, require_used, taken
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.read import chosen_zone, point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 from slideviz.mesh.ranks import ALONE, Alone
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b_write import Zone
+from slideviz.mesh.io.su2b.write import Zone
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.blade import Section, Shares, camber, counts
 from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points

@@ -12,7 +12,7 @@ from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.su2b_write import Zone, file_head, zone_blocks
+from slideviz.mesh.io.su2b.write import Zone, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from slideviz.mesh.io.su2b_write import lost_in_binary
+from slideviz.mesh.io.su2b.write import lost_in_binary
 from slideviz.mesh.model import Mesh
 
 

@@ -11,8 +11,8 @@ from typing import Any
 from slideviz.case.model import Case, Translate
 from slideviz.errors import Cancelled, SlidevizError
 from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2 import read_su2
-from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.io.su2.read import read_su2
+from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from slideviz.deformation.solver import free_memory
 from slideviz.deformation.streaming import NEEDED
-from slideviz.mesh.io.su2b import chosen_zone, is_su2b
-from slideviz.mesh.io.su2b_layout import Source, find_zones
+from slideviz.mesh.io.su2b.layout import Source, find_zones
+from slideviz.mesh.io.su2b.read import chosen_zone, is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.skin import read_skin

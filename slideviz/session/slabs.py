@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.deformation.measuring import PointFiles
-from slideviz.mesh.io.su2b_elements import element_blocks, elements_between, taken
+from slideviz.mesh.io.su2b.elements import element_blocks, elements_between, taken
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.sections.cut import sides_of
 from slideviz.sections.model import ON_SECTION, Section

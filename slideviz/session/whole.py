@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.deformation.measuring import PointFiles
-from slideviz.mesh.io.su2b import chosen_zone
-from slideviz.mesh.io.su2b_elements import SIZES, Block, element_at, element_blocks
-from slideviz.mesh.io.su2b_layout import Source, find_zones
+from slideviz.mesh.io.su2b.elements import SIZES, Block, element_at, element_blocks
+from slideviz.mesh.io.su2b.layout import Source, find_zones
+from slideviz.mesh.io.su2b.read import chosen_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
 from slideviz.session.results import Frame

@@ -21,8 +21,8 @@ from slideviz.deformation import output
 from slideviz.deformation.streaming import stream
 from slideviz.errors import MeshError, NodeError
 from slideviz.mesh import ranks, skin, threads
-from slideviz.mesh.io.partial import names_of
-from slideviz.mesh.io.su2b_layout import MAGIC
+from slideviz.mesh.io.su2b.layout import MAGIC
+from slideviz.mesh.io.su2b.partial import names_of
 from slideviz.samples.table import write_sample
 from tests.builders import grid
 from tests.deformation.test_streaming import made

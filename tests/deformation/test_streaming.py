@@ -20,9 +20,9 @@ from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
 from slideviz.errors import CaseError, MeshError, NodeError, UnsoundError
-from slideviz.mesh.io import partial
-from slideviz.mesh.io.partial import names_of
-from slideviz.mesh.io.su2b_layout import MAGIC
+from slideviz.mesh.io.su2b import partial
+from slideviz.mesh.io.su2b.layout import MAGIC
+from slideviz.mesh.io.su2b.partial import names_of
 from slideviz.mesh.skin import read_skin
 from slideviz.samples.table import write_sample
 from tests.builders import grid

@@ -16,8 +16,8 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, first_fault
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2 import read_su2
-from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.io.su2.read import read_su2
+from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.periodic import find_pairs
 from slideviz.mesh.quality import quality
@@ -262,7 +262,7 @@ def test_lost_coordinate_in_space(tmp_path):
 
 @pytest.mark.parametrize("block", [1, 30, 1 << 20])
 def test_first_of_several_faults_is_named(tmp_path, monkeypatch, block):
-    monkeypatch.setattr("slideviz.mesh.io.su2_scan.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.mesh.io.su2.scan.BLOCK_BYTES", block)
     text = edited(edited(SQUARE, "1.1 0.3 1", "1.1 a 1"), "1.1 1.7 4", "b1 1.7 4")
     text = text.replace("b1 1.7 4", "1.1 b 4")
     with pytest.raises(MeshError, match=":8: 'a' stands"):

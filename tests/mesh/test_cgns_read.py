@@ -27,7 +27,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOCGNSReader import vtkCGNSReader
 
 from slideviz.errors import MeshError
-from slideviz.mesh.io.cgns import read_cgns
+from slideviz.mesh.io.cgns.read import read_cgns
 from slideviz.mesh.io.files import read
 from slideviz.mesh.periodic import match
 

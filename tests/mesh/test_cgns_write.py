@@ -14,7 +14,7 @@ from test_cgns_read import judged, points_of
 from slideviz import quality
 from slideviz.cli import run
 from slideviz.errors import MeshError
-from slideviz.mesh.io.cgns import read_cgns
+from slideviz.mesh.io.cgns.read import read_cgns
 from slideviz.mesh.io.files import read, write
 from slideviz.session.formats import formats_for, left_out
 

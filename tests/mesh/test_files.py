@@ -17,7 +17,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.meshio_bridge import read_with_meshio
+from slideviz.mesh.io.meshio.bridge import read_with_meshio
 from slideviz.mesh.model import Cells, Marker, Mesh
 
 GMSH_22 = """\
@@ -620,7 +620,7 @@ def test_disk_full_for_the_draft(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("slideviz.mesh.io.meshio_write.draft", full)
+    monkeypatch.setattr("slideviz.mesh.io.meshio.write.draft", full)
     with pytest.raises(
         MeshError, match=r"out.vtk: cannot be written: No space left on device; fre"
     ):

@@ -7,7 +7,7 @@ import pytest
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import read
-from slideviz.mesh.io.meshio_bridge import read_with_meshio
+from slideviz.mesh.io.meshio.bridge import read_with_meshio
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 TRIANGLE = [("triangle", np.array([[0, 1, 2]]))]

@@ -11,7 +11,7 @@ from su2_samples import MESSY, SQUARE, assert_same, save
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.source import Source, open_source
-from slideviz.mesh.io.su2 import read_su2
+from slideviz.mesh.io.su2.read import read_su2
 
 
 @pytest.fixture(params=["in memory", "open"])

@@ -11,7 +11,7 @@ from su2_samples import bits, save
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.su2_loops import point_block
+from slideviz.mesh.io.su2.loops import point_block
 from slideviz.mesh.model import Cells, Mesh
 
 MANY = 100_000

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from su2_samples import MESSY, SAMPLES, SOLID, SQUARE, ZONES, assert_same, bits, save
 
-import slideviz.mesh.io.su2_scan as su2_scan
+import slideviz.mesh.io.su2.scan as su2_scan
 from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.io.files import read
-from slideviz.mesh.io.su2_write import su2_blocks
+from slideviz.mesh.io.su2.write import su2_blocks
 
 
 def test_square(tmp_path):
@@ -58,7 +58,7 @@ def test_byte_order_mark_is_skipped(tmp_path):
 def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     path = save(tmp_path, SAMPLES[name])
     whole = read(path)
-    monkeypatch.setattr("slideviz.mesh.io.su2_scan.BLOCK_BYTES", block)
+    monkeypatch.setattr("slideviz.mesh.io.su2.scan.BLOCK_BYTES", block)
     small = read(path)
     assert_same(small, whole)
     assert len(small.document.rows) > len(whole.document.rows)

@@ -106,7 +106,7 @@ def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, block):
     mesh = read(save(tmp_path, ZONES), zone=2)
     for name, value in (("moved", mesh.with_points(mesh.points / 3)), ("anew", _anew(mesh))):
         write(tmp_path / f"{name}.su2", value)
-        monkeypatch.setattr("slideviz.mesh.io.su2_write._BLOCK_ROWS", block)
+        monkeypatch.setattr("slideviz.mesh.io.su2.write._BLOCK_ROWS", block)
         write(tmp_path / "out.su2", value)
         monkeypatch.undo()
         assert (tmp_path / "out.su2").read_bytes() == (tmp_path / f"{name}.su2").read_bytes()

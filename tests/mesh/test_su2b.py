@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.halo import Halo
-from slideviz.mesh.io import su2b, su2b_write
 from slideviz.mesh.io.convert import convert
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.su2b_elements import element_blocks
-from slideviz.mesh.io.su2b_write import su2b_blocks
+from slideviz.mesh.io.su2b import read as su2b
+from slideviz.mesh.io.su2b import write as su2b_write
+from slideviz.mesh.io.su2b.elements import element_blocks
+from slideviz.mesh.io.su2b.write import su2b_blocks
 from slideviz.mesh.model import Cells, Marker, Mesh
 from tests.builders import grid
 

@@ -12,7 +12,7 @@ from su2_samples import SOLID, assert_same, save
 from slideviz.errors import MeshError
 from slideviz.mesh.io import subprocess_reader
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.meshio_bridge import read_with_meshio
+from slideviz.mesh.io.meshio.bridge import read_with_meshio
 
 NETGEN = """\
 mesh3d

@@ -188,7 +188,7 @@ def test_sample_meshes_folder_holds_a_small_stator():
 
 @pytest.mark.parametrize("block", [1000, 1 << 18])
 def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
-    from slideviz.mesh.io import su2b_write
+    from slideviz.mesh.io.su2b import write as su2b_write
 
     monkeypatch.setattr(su2b_write, "BLOCK", block)
     whole = stator(7_777)

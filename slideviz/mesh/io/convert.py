@@ -9,8 +9,8 @@ from pathlib import Path
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.io.su2_write import su2_blocks
-from slideviz.mesh.io.su2b_write import su2b_blocks
+from slideviz.mesh.io.su2.write import su2_blocks
+from slideviz.mesh.io.su2b.write import su2b_blocks
 from slideviz.mesh.model import Mesh
 
 _ZONED = {".su2": "su2", ".su2b": "su2b"}

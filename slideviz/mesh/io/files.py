@@ -14,11 +14,11 @@ from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_ordinary
 from slideviz.mesh.io.source import open_source, unreadable
-from slideviz.mesh.io.su2 import read_su2
-from slideviz.mesh.io.su2_scan import Progress
-from slideviz.mesh.io.su2_write import su2_blocks
-from slideviz.mesh.io.su2b import is_su2b, read_su2b
-from slideviz.mesh.io.su2b_write import su2b_blocks
+from slideviz.mesh.io.su2.read import read_su2
+from slideviz.mesh.io.su2.scan import Progress
+from slideviz.mesh.io.su2.write import su2_blocks
+from slideviz.mesh.io.su2b.read import is_su2b, read_su2b
+from slideviz.mesh.io.su2b.write import su2b_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.terms import FileFormat
 
@@ -187,7 +187,7 @@ def _write_other(
     """Write a mesh in a format that is none of SU2's, by its ending."""
     ending = path.suffix.lower()
     if ending == ".cgns":
-        from slideviz.mesh.io.cgns_write import write_cgns
+        from slideviz.mesh.io.cgns.write import write_cgns
 
         if values:
             raise path_error(
@@ -201,7 +201,7 @@ def _write_other(
         check_mesh(mesh)
         write_vtkhdf(path, mesh, values, point_data, replaces)
     else:
-        from slideviz.mesh.io.meshio_write import write_other_format
+        from slideviz.mesh.io.meshio.write import write_other_format
 
         write_other_format(path, mesh, values, point_data, replaces)
 

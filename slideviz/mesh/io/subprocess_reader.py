@@ -20,10 +20,10 @@ from pathlib import Path
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import path_error
-from slideviz.mesh.io.cgns import CgnsForm, read_cgns
+from slideviz.mesh.io.cgns.read import CgnsForm, read_cgns
 from slideviz.mesh.io.cleanup import ended
-from slideviz.mesh.io.meshio_bridge import read_with_meshio
-from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.meshio.bridge import read_with_meshio
+from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.model import Cells, Marker, Mesh, frozen_array
 
 CGNS = ".cgns"

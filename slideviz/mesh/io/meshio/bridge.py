@@ -18,9 +18,9 @@ import numpy as np
 
 from slideviz.mesh.check import check_mesh, first_fault, path_error, printable
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
-from slideviz.mesh.io.meshio_markers import Block, find_markers
-from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.meshio.calls import formats_of, load, meshio_errors
+from slideviz.mesh.io.meshio.markers import Block, find_markers
+from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 
 if TYPE_CHECKING:

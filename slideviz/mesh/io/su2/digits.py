@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.caching import njit
-from slideviz.mesh.io.su2_decimal import OPTIONS, U10, U48, ends
-from slideviz.mesh.io.su2_loops import is_numeric
+from slideviz.mesh.io.su2.decimal import OPTIONS, U10, U48, ends
+from slideviz.mesh.io.su2.loops import is_numeric
 
 
 @njit(inline="always", **OPTIONS)

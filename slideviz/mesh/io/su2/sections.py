@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from slideviz.errors import MeshError
-from slideviz.mesh.io.su2_lines import KEYWORD, Lines, show
+from slideviz.mesh.io.su2.lines import KEYWORD, Lines, show
 
 _KEY = re.compile(rb"[A-Za-z_]\w*")
 _COUNT = re.compile(rb"\+?\d{1,18}")

@@ -1,6 +1,6 @@
 """Reading SU2 binary meshes (``.su2b``), block by block, and what is kept for writing them again.
 
-Coordinates and indices of points have a fixed stride; elements are those of `su2b_elements`.
+Coordinates and indices of points have a fixed stride; elements are those of `su2b.elements`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 
 from slideviz.mesh.check import first_fault, path_error, printable
-from slideviz.mesh.io.su2_scan import Progress
-from slideviz.mesh.io.su2b_elements import BLOCK, element_blocks, taken
-from slideviz.mesh.io.su2b_layout import MAGIC, Elements, Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2.scan import Progress
+from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks, taken
+from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zones
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
 
 

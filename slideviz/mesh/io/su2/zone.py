@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.io.su2_lines import ROWS, Lines, Rows, number_of, show
-from slideviz.mesh.io.su2_sections import KNOWN, Bounds, Section, count_of, misspelt
+from slideviz.mesh.io.su2.lines import ROWS, Lines, Rows, number_of, show
+from slideviz.mesh.io.su2.sections import KNOWN, Bounds, Section, count_of, misspelt
 
 SEND_RECEIVE = "SEND_RECEIVE"
 _NAME_IT = "; name the marker"

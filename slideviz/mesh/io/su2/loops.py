@@ -1,7 +1,7 @@
 """Compiled loops over the text of SU2 files: where lines are, and the numbers on them.
 
 They do what is plain. A row with anything else on it (a sign before a node, a wrong type, a number
-that is none, or not finite) is only listed: `su2_numbers` looks at it with all of Python.
+that is none, or not finite) is only listed: `su2.numbers` looks at it with all of Python.
 
 Every text ends with a line break.
 """
@@ -12,8 +12,8 @@ import numpy as np
 
 from slideviz.mesh.caching import njit
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.su2_decimal import OPTIONS, U10, U48, decimal
-from slideviz.mesh.io.su2_lines import KEYWORD, ROWS, TEXT
+from slideviz.mesh.io.su2.decimal import OPTIONS, U10, U48, decimal
+from slideviz.mesh.io.su2.lines import KEYWORD, ROWS, TEXT
 
 SIZES = np.zeros(257, np.int64)
 """Number of nodes by element type; the last row is for all types that are none."""

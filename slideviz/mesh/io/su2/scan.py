@@ -10,7 +10,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2_lines import Lines, line_end, text_of
+from slideviz.mesh.io.su2.lines import Lines, line_end, text_of
 from slideviz.mesh.model import IntArray
 
 BLOCK_BYTES = 1 << 20
@@ -32,7 +32,7 @@ def scan(raw: Source, progress: Progress) -> Lines:
     MeshError
         The file is empty or not text.
     """
-    from slideviz.mesh.io.su2_loops import RUN_COLUMNS, scan_block
+    from slideviz.mesh.io.su2.loops import RUN_COLUMNS, scan_block
 
     def scanned(bounds: tuple[int, int]) -> tuple[IntArray, int, bool]:
         text = text_of(raw, *bounds)

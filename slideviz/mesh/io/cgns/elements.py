@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.cgns_tree import Node
+from slideviz.mesh.io.cgns.tree import Node
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.orientation import corner_sums
 

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 
 from slideviz.mesh.check import path_error, printable
-from slideviz.mesh.io.cgns import CgnsForm
-from slideviz.mesh.io.cgns_join import JOINED
+from slideviz.mesh.io.cgns.join import JOINED
+from slideviz.mesh.io.cgns.read import CgnsForm
 from slideviz.mesh.io.hdf5 import hdf5_write
 from slideviz.mesh.model import FloatArray, Mesh
 

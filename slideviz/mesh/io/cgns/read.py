@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.check import check_mesh, path_error, printable
-from slideviz.mesh.io.cgns_elements import selected
-from slideviz.mesh.io.cgns_join import Interface, Joined, join
-from slideviz.mesh.io.cgns_tree import Node, cgns_file
-from slideviz.mesh.io.cgns_zone import Zone, conditions, facets_of, read_zone, region_of
-from slideviz.mesh.io.meshio_bridge import flattened, require_own
-from slideviz.mesh.io.meshio_markers import in_node_sets
+from slideviz.mesh.io.cgns.elements import selected
+from slideviz.mesh.io.cgns.join import Interface, Joined, join
+from slideviz.mesh.io.cgns.tree import Node, cgns_file
+from slideviz.mesh.io.cgns.zone import Zone, conditions, facets_of, read_zone, region_of
+from slideviz.mesh.io.meshio.bridge import flattened, require_own
+from slideviz.mesh.io.meshio.markers import in_node_sets
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
 from slideviz.mesh.unique_rows import row_groups
 

@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from slideviz.mesh.io.cgns_elements import grid_nodes
-from slideviz.mesh.io.cgns_tree import Node
-from slideviz.mesh.io.cgns_zone import Zone, faces_by_number, facets_of
+from slideviz.mesh.io.cgns.elements import grid_nodes
+from slideviz.mesh.io.cgns.tree import Node
+from slideviz.mesh.io.cgns.zone import Zone, faces_by_number, facets_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.mesh.topology import components
 

@@ -19,8 +19,8 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, path_error
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.cleanup import draft
-from slideviz.mesh.io.meshio_bridge import MESHIO_TYPES
-from slideviz.mesh.io.meshio_calls import formats_of, load, meshio_errors
+from slideviz.mesh.io.meshio.bridge import MESHIO_TYPES
+from slideviz.mesh.io.meshio.calls import formats_of, load, meshio_errors
 from slideviz.mesh.model import IntArray, Mesh
 
 if TYPE_CHECKING:

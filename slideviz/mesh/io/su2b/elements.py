@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.io.su2b_layout import Elements, Source, ZonePlace
+from slideviz.mesh.io.su2b.layout import Elements, Source, ZonePlace
 from slideviz.mesh.model import Cells, IntArray
 
 BLOCK = 1 << 18

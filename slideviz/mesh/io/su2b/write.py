@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
-from slideviz.mesh.io.su2b import BinaryForm
-from slideviz.mesh.io.su2b_elements import BLOCK, SIZES, taken
-from slideviz.mesh.io.su2b_layout import NAME_BYTES, SEND_RECEIVE
+from slideviz.mesh.io.su2b.elements import BLOCK, SIZES, taken
+from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
+from slideviz.mesh.io.su2b.read import BinaryForm
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
 _SORTED = (3, 5, 9, 10, 12, 13, 14)

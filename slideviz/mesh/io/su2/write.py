@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.io.in_order import in_order
-from slideviz.mesh.io.su2 import Document
-from slideviz.mesh.io.su2_lines import Piece
-from slideviz.mesh.io.su2_scan import BLOCK_BYTES
-from slideviz.mesh.io.su2_sections import is_ffd
-from slideviz.mesh.io.su2_zone import SEND_RECEIVE
+from slideviz.mesh.io.su2.lines import Piece
+from slideviz.mesh.io.su2.read import Document
+from slideviz.mesh.io.su2.scan import BLOCK_BYTES
+from slideviz.mesh.io.su2.sections import is_ffd
+from slideviz.mesh.io.su2.zone import SEND_RECEIVE
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
 _BLOCK_ROWS = 20_000
@@ -122,7 +122,7 @@ def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
 
 def _piece(document: Document, points: FloatArray, piece: Piece) -> bytes:
     """Return some rows of points with every coordinate that changed in its place."""
-    from slideviz.mesh.io.su2_print import print_changed
+    from slideviz.mesh.io.su2.digits import print_changed
 
     text = document.raw[piece.begin : piece.end]
     mine = slice(piece.row, piece.row + piece.rows)
@@ -173,7 +173,7 @@ def _starts(count: int) -> range:
 
 def _point_rows(points: FloatArray, first: int) -> bytes:
     """Return a line for each point of a block: coordinates and index."""
-    from slideviz.mesh.io.su2_print import print_points
+    from slideviz.mesh.io.su2.digits import print_points
 
     mine = points[first : first + _BLOCK_ROWS]
     numbers = _digits(mine)
@@ -195,7 +195,7 @@ def _elements(cells: Cells, *, numbered: bool) -> Iterator[bytes]:
 
 def _cell_rows(cells: Cells, numbered: bool, first: int) -> bytes:
     """Return a line for each element of a block."""
-    from slideviz.mesh.io.su2_print import print_cells
+    from slideviz.mesh.io.su2.digits import print_cells
 
     types = cells.types[first : first + _BLOCK_ROWS]
     offsets = cells.offsets[first : first + len(types) + 1]

@@ -12,8 +12,8 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import first_fault
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.in_order import in_order
-from slideviz.mesh.io.su2_lines import Lines, Piece, Rows, number_of, show
-from slideviz.mesh.io.su2_scan import Progress
+from slideviz.mesh.io.su2.lines import Lines, Piece, Rows, number_of, show
+from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 
 _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
@@ -43,7 +43,7 @@ def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Pro
     MeshError
         An element is not what it should be; the message has its line.
     """
-    from slideviz.mesh.io.su2_loops import cell_block
+    from slideviz.mesh.io.su2.loops import cell_block
 
     types = np.empty(number_of(rows), np.uint8)
     nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)
@@ -163,7 +163,7 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> Floa
     MeshError
         A point is not what it should be; the message has its line.
     """
-    from slideviz.mesh.io.su2_loops import point_block
+    from slideviz.mesh.io.su2.loops import point_block
 
     points = np.empty((number_of(rows), dim))
     # Of each piece: the most numbers on a row, and the first row that may have lost a coordinate.

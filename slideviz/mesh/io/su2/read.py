@@ -7,12 +7,12 @@ from itertools import pairwise
 
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.source import Source
-from slideviz.mesh.io.su2_halo import find_halo
-from slideviz.mesh.io.su2_lines import Lines, Rows, number_of
-from slideviz.mesh.io.su2_numbers import parse_cells, parse_points
-from slideviz.mesh.io.su2_scan import Progress, scan
-from slideviz.mesh.io.su2_sections import find_bounds, find_sections
-from slideviz.mesh.io.su2_zone import find_zone
+from slideviz.mesh.io.su2.halo import find_halo
+from slideviz.mesh.io.su2.lines import Lines, Rows, number_of
+from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
+from slideviz.mesh.io.su2.scan import Progress, scan
+from slideviz.mesh.io.su2.sections import find_bounds, find_sections
+from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 
 _SCANNED = 0.2

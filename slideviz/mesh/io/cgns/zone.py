@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from slideviz.mesh.cached_boundary import outer_facets
-from slideviz.mesh.io.cgns_elements import (
+from slideviz.mesh.io.cgns.elements import (
     Elements,
     dimensions,
     grid_cells,
@@ -17,8 +17,8 @@ from slideviz.mesh.io.cgns_elements import (
     read_sections,
     selected,
 )
-from slideviz.mesh.io.cgns_tree import DATA, Node
-from slideviz.mesh.io.meshio_markers import in_node_sets
+from slideviz.mesh.io.cgns.tree import DATA, Node
+from slideviz.mesh.io.meshio.markers import in_node_sets
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 
 _AXES = ("CoordinateX", "CoordinateY", "CoordinateZ")

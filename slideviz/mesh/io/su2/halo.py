@@ -14,8 +14,8 @@ from itertools import product
 import numpy as np
 
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
-from slideviz.mesh.io.su2_lines import Lines
-from slideviz.mesh.io.su2_zone import SendRows, Zone
+from slideviz.mesh.io.su2.lines import Lines
+from slideviz.mesh.io.su2.zone import SendRows, Zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]

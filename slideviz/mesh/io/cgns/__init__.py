@@ -1,0 +1,1 @@
+"""CGNS files: reading, and writing as a changed copy."""

@@ -1,0 +1,1 @@
+"""SU2's text form: reading and writing."""

@@ -1,0 +1,1 @@
+"""SU2's binary form: reading, in blocks too, and writing."""
