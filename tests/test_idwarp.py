@@ -228,6 +228,12 @@ def test_indices_of_the_grid_must_exist(wrong):
         warp.setExternalMeshIndices([0, wrong])
 
 
+def test_vectors_must_be_as_long_as_the_grid():
+    warp, mesh = warped()
+    with pytest.raises(CaseError, match=rf"has 5 numbers; needed are {mesh.points.size}, as getS"):
+        warp.warpDeriv(np.ones(5))
+
+
 def test_the_surface_must_be_that_of_the_mesh_and_whole():
     warp, mesh = warped()
     pts, *_ = facets(mesh, "BLOCK")

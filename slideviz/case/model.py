@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -85,6 +85,9 @@ class FromFile:
 
     path: Path
     marker: Target = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", Path(self.path))
 
 
 @dataclass(frozen=True)
@@ -191,9 +194,9 @@ class Case:
     None where their endings tell. ``direction`` is the
     component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
     where none is given; it and ``curved`` are RBF-SliDe's and without effect, since the matching
-    of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0 for as
-    many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where all
-    boundary nodes are control nodes, however many, ``idw_power`` where it is the number of
+    of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0, or "auto",
+    for as many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where
+    all boundary nodes are control nodes, however many, ``idw_power`` where it is the number of
     dimensions. ``view`` has how a window showed the case, by key: it changes no result.
     ``ffd_boxes`` are boxes for free-form deformation that the mesh does not have: their names and
     8 corners (24 numbers; in 2D the first 4 count), ``ffd_degrees`` their degrees, ``ffd_orders``
@@ -247,8 +250,27 @@ class Case:
     view: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        given: object = self.steps
+        if isinstance(given, str):
+            if given.lower() != "auto":  # as in a case file
+                raise CaseError(f'steps is {given!r}; needed is a whole number, or "auto"')
+            object.__setattr__(self, "steps", 0)
+
     def change(self, **values: Any) -> Case:
-        """Return the case with other values."""
+        """Return the case with other values.
+
+        Raises
+        ------
+        CaseError
+            A case has no such value.
+        """
+        from slideviz.case.words import nearest
+
+        names = [each.name for each in fields(self)]
+        for name in values:
+            if name not in names:
+                raise CaseError(f"a case has no {name!r}{nearest(name, names)}")
         return replace(self, **values)
 
     def markers_with(self, role: Role) -> tuple[str, ...]:

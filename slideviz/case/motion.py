@@ -36,6 +36,7 @@ from slideviz.case.model import (
     moves,
 )
 from slideviz.errors import CaseError
+from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import ordered_sum
 
@@ -82,6 +83,7 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     stacked = np.concatenate(vectors)[order]
     owner = np.repeat(np.arange(len(names)), [len(on[name]) for name in names])[order]
     nodes = nodes[order]
+    _require_size(mesh, nodes, stacked)
     first = np.searchsorted(nodes, nodes)
     apart = np.abs(stacked - stacked[first]).max(axis=1, initial=0.0) > same(stacked, mesh)
     if apart.any():
@@ -91,6 +93,18 @@ def displacements(case: Case, mesh: Mesh) -> Displacements:
     keep = np.flatnonzero(first == np.arange(len(nodes)))
     warnings = [text for file in files.values() for text in file.warnings]
     return Displacements(nodes[keep], stacked[keep], tuple(dict.fromkeys(warnings)))
+
+
+def _require_size(mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> None:
+    """Raise CaseError where a node would go to where nothing can be computed."""
+    there = mesh.points[nodes] + vectors
+    if not within(there, LARGEST) and within(mesh.points, LARGEST):
+        k = int(np.argmax(~(np.abs(there) <= LARGEST).all(axis=1)))
+        where = ", ".join(f"{value:.6g}" for value in there[k])
+        raise CaseError(
+            f"{mesh.name}: the motion takes node {nodes[k]} to ({where}); nothing can be computed "
+            f"with coordinates larger than {LARGEST:g}, so move it less"
+        )
 
 
 def moved_together(

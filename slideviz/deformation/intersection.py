@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import ceil, pi
+from math import ceil, floor, pi
 
 import numpy as np
 
@@ -120,8 +120,8 @@ def _is_lost(case: Case, mesh: Mesh, after: FloatArray, facets: IntArray) -> boo
     there = there[[not _is_out(whole, mesh.points, point[None]) for point in before]]
     if not len(there) or not _is_out(whole, after, there):
         return False
-    far = float(np.linalg.norm(after[facets] - mesh.points[facets], axis=-1).max())
-    return all(_is_out(whole, after, image) for image in _images(case, mesh, there, far))
+    others = np.setdiff1d(whole, facets)
+    return all(_is_out(whole, after, image) for image in _images(case, mesh, there, after[others]))
 
 
 def _beside(points: FloatArray, facets: IntArray) -> FloatArray:
@@ -139,16 +139,18 @@ def _is_out(facets: IntArray, points: FloatArray, at: FloatArray) -> bool:
     return all(winding(points, facets, point[None])[0] < HALF for point in at)
 
 
-def _images(case: Case, mesh: Mesh, at: FloatArray, far: float) -> Iterator[FloatArray]:
-    """Yield points in the neighbouring copies of a mesh that repeats, as far as they may be."""
+def _images(case: Case, mesh: Mesh, at: FloatArray, around: FloatArray) -> Iterator[FloatArray]:
+    """Yield the images of points (m, d) that may be within points ``around`` (n, d), by periods."""
     names = case.markers_with("periodic")
     if case.periodic not in ("fixed", "moving") or not names:
         return
     pair = pair_up(mesh, names, case.periodic_type, case.axis, case.origin)[0]
     if pair.kind == "translational":
-        for count in range(1, ceil(far / pair.period) + 2):
-            yield at + count * pair.vector
-            yield at - count * pair.vector
+        along = pair.vector / pair.period**2
+        far, place = at @ along, around @ along
+        first, last = floor(place.min() - far.max()), ceil(place.max() - far.min())
+        for count in range(first, last + 1):
+            yield at + float(count) * pair.vector
         return
     basis = axis_basis(pair.axis)
     local = in_axis_frame(at, pair.axis, pair.origin)

@@ -250,6 +250,11 @@ class USMesh:
         places = (self._order[:, None] * dim + np.arange(dim)).ravel()
         if solver:
             places = places[self._indices]
+        if len(given) != len(places):
+            raise CaseError(
+                f"a vector of the grid has {len(given)} numbers; needed are {len(places)}, as "
+                f"{'getSolverGrid' if solver else 'getWarpGrid'} returns"
+            )
         sums = np.bincount(places, given, self._points.size)
         return sums.astype(np.float64).reshape(self._points.shape)
 

@@ -89,3 +89,15 @@ def test_a_program_is_told_of_an_absurd_radius(value):
     )
     with pytest.raises(CaseError, match=r"INFLUENCE_FACTOR: 1e[-+]300 is out of range; needed is"):
         next(sv.deform(case, mesh))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_program_is_told_of_absurd_steps_and_names():
+    case = Case(roles={"BLOCK": "moving"}, motions=(Translate("BLOCK", (0.02, 1e300)),))
+    with pytest.raises(CaseError, match=r"takes node \d+ to \(.*, 1e\+300\); .* so move it less"):
+        next(sv.deform(case, builders.square(6)))
+    assert case.change(steps="auto").steps == Case(steps="AUTO").steps == 0
+    with pytest.raises(CaseError, match="a case has no 'stepz'; did you mean steps"):
+        case.change(stepz=3)
+    with pytest.raises(CaseError, match="steps is 'many'; needed is a whole number"):
+        case.change(steps="many")

@@ -6,6 +6,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
+from slideviz.deformation import intersection
 from slideviz.deformation.intersection import intersection_message as message
 from slideviz.deformation.intersection import jump_message
 from slideviz.errors import CaseError
@@ -103,6 +104,17 @@ def test_a_jump_over_a_wall_inside_is_a_warning():
     assert any("goes through other" in text for text in last.warnings)
     lost = moved(case, mesh, Translate("one", (60.0, 0.0)))
     assert "takes one out of the mesh" in message(*lost)
+
+
+def test_a_motion_by_very_many_periods_is_looked_at_at_once(monkeypatch):
+    found = sample("passage", size=12)
+    mesh, looked = found.mesh, []
+    inside = intersection.winding
+    monkeypatch.setattr(intersection, "winding", lambda *a: looked.append(None) or inside(*a))
+    for far in (1.0, 1e9):
+        looked.clear()
+        message(*moved(found.case, mesh, Translate("airfoil", (0.0, far))))
+        assert 0 < len(looked) < 60
 
 
 @pytest.mark.parametrize("gone", ["RIGHT", "UPPER"])
