@@ -103,6 +103,8 @@ def test_derivatives_beside_differences(steps):
     warp, mesh = warped(2, steps=steps)
     pts, conn, sizes, _ = facets(mesh, "BLOCK")
     warp.setSurfaceDefinition(pts, conn, sizes)
+    at_rest = warp.verifyWarpDeriv(dofEnd=pts.size)
+    np.testing.assert_allclose(at_rest[:, 0], at_rest[:, 1], rtol=1e-6, atol=1e-8)
     warp.setSurfaceCoordinates(shaken(pts))
     rows = warp.verifyWarpDeriv(dofStart=2, dofEnd=9)
     assert rows.shape == (7, 2)

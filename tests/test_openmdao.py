@@ -19,6 +19,7 @@ from mphys.scenarios import ScenarioAerodynamic  # noqa: E402
 from openmdao.utils.assert_utils import assert_check_partials, assert_check_totals  # noqa: E402
 
 from slideviz.openmdao import MeshDeformation, MeshDeformationBuilder  # noqa: E402
+from slideviz.samples.table import write_sample  # noqa: E402
 
 HOLE = ((1, 3), (1, 3), (1, 3))
 
@@ -98,6 +99,17 @@ def test_two_scenarios_in_one_model_have_exact_partials_forward_and_reverse(step
         assert {of for of, _ in pairs} == {"aero_vol_coords", "minimum_quality", "mean_quality"}
         assert all(found["J_fwd"].any() and found["J_rev"].any() for found in pairs.values())
     assert_check_partials(checked, atol=2e-7, rtol=2e-7)
+
+
+def test_partials_can_be_checked_at_the_undeformed_mesh(tmp_path):
+    write_sample("passage", tmp_path, 12)
+    mesh, case = sv.read(tmp_path / "mesh.su2"), sv.Case.read(tmp_path / "passage.cfg")
+    model = om.Group()
+    model.add_subsystem("mesh", MeshDeformation(deformer=sv.Deformer(mesh, case.change(steps=1))))
+    problem = problem_of(model)
+    problem.run_model()
+    checked = problem.check_partials(out_stream=None, form="central", step=1e-6)
+    assert_check_partials(checked, atol=1e-6, rtol=1e-6)
 
 
 class Sum(om.ExplicitComponent):

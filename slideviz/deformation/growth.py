@@ -31,7 +31,12 @@ HOPELESS = 0.1
 
 
 def unsoundness(
-    setup: Setup, mesh: Mesh, solution: Solution, moved: FloatArray, part: float
+    setup: Setup,
+    mesh: Mesh,
+    solution: Solution,
+    moved: FloatArray,
+    part: float,
+    least: float = 0.0,
 ) -> str | None:
     """Return a sentence where the result of a step cannot be right: why, and what helps.
 
@@ -42,6 +47,8 @@ def unsoundness(
         body that turns takes nothing farther than itself.
     part : float
         Of the whole displacement, 0 to 1.
+    least : float
+        A distance up to which any motion may carry nodes, however small it is.
     """
     largest = part * float(np.linalg.norm(setup.target, axis=1).max(initial=0.0))
     if solution.lost > HOPELESS * largest:
@@ -50,6 +57,7 @@ def unsoundness(
             f"largest displacement is {largest:.3g} (condition number {solution.condition:.0e}): "
             f"{_cause(setup, mesh, moved)}"
         )
+    asked, largest = largest, max(largest, part * least)
     length = np.empty(len(moved))
 
     def measure(part: slice) -> None:
@@ -72,7 +80,7 @@ def unsoundness(
     return (
         f"node {mesh.number(node)} at ({where}) would go {length[node]:.3g} far, more than "
         f"{GROWTH:g} times the {reach[node]:.3g} that the motion reaches, whose largest "
-        f"displacement so far is {largest:.3g}: {_cause(setup, mesh, moved)}"
+        f"displacement so far is {asked:.3g}: {_cause(setup, mesh, moved)}"
     )
 
 

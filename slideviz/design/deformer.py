@@ -169,6 +169,7 @@ class Deformer:
             )
         self._setup, self._input = setup, _input(mesh, setup, asked)
         self._size = largest_coordinate(mesh.points)
+        self._least = max(float(sizes.max()), _usual_edge(setup))
         self.warnings = (*case.warnings, *setup.warnings)
         targets = [value(self._target(reference)) for reference in references]
         tell = progress or (lambda _: None)
@@ -369,7 +370,11 @@ class Deformer:
         return errors
 
     def _require_sound(self, index: int, part: float, targets: FloatArray, state: State) -> None:
-        """Raise where the results of a step cannot be right: what every run checks."""
+        """Raise where the results of a step cannot be right: what every run checks.
+
+        Nodes may go as far as by the reference, or by an edge of what moves: the finite difference
+        that moves one node alone by next to nothing has no other motion to be judged by.
+        """
         shape = self.mesh.points.shape
         coords = value(state.coords).reshape(-1, *shape)
         targets = targets.reshape(len(coords), *targets.shape[-2:])
@@ -379,10 +384,11 @@ class Deformer:
             if not np.isfinite(far[k]):
                 raise DeformError(f"step {index}: coordinates became infinite; use more steps")
             largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
-            if far[k] > GROWTH * largest or lost[k] > HOPELESS * largest:
+            reach = max(largest, part * self._least)
+            if far[k] > GROWTH * reach or lost[k] > HOPELESS * largest:
                 solution = Solution(coords[k], 0, 0.0, self.nodes[:0], np.nan, lost=float(lost[k]))
                 setup = replace(self._setup, target=target)
-                unsound = unsoundness(setup, self.mesh, solution, coords[k], part)
+                unsound = unsoundness(setup, self.mesh, solution, coords[k], part, self._least)
                 if unsound:
                     raise UnsoundError(f"step {index}: {unsound}")
 
@@ -437,6 +443,16 @@ class Deformer:
             ToleranceWarning,
             stacklevel=3,
         )
+
+
+def _usual_edge(setup: Setup) -> float:
+    """Return the median distance of neighbours on what moves, in the frame; 0 without any."""
+    facets = setup.boundary.facets
+    facets = facets[np.isin(facets, setup.classes.moving).all(axis=1)]
+    ends = setup.coords[np.roll(facets, -1, axis=1)] - setup.coords[facets]
+    gaps = np.linalg.norm(ends, axis=-1)
+    gaps = gaps[gaps > 0.0]
+    return float(np.median(gaps)) if len(gaps) else 0.0
 
 
 def _asked(case: Case, mesh: Mesh) -> Displacements:

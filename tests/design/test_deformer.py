@@ -290,6 +290,41 @@ def test_a_design_that_goes_beyond_all_bounds_is_refused():
         deformer.deform(up)
 
 
+@KINDS
+@STEPS
+@QUIET
+@pytest.mark.parametrize("reference", [1.0, 0.0], ids=["motion", "rest"])
+def test_one_node_may_move_by_next_to_nothing_from_the_undeformed_mesh(kind, steps, reference):
+    mesh, case = made(kind, steps=steps)
+    own = sv.Deformer(mesh, case).displacement
+    deformer = sv.Deformer(mesh, case, reference * own)
+    still, size, overshoot = np.zeros_like(own), 1e-6, 0.0
+    np.testing.assert_array_equal(deformer.deform(still), mesh.points)
+    for node, axis in np.ndindex(own.shape):
+        unit = still.copy()
+        unit[node, axis] = 1.0
+        ends = [deformer.deform(sign * size * unit) for sign in (1, -1)]
+        exact = deformer.jvp(still, unit)
+        np.testing.assert_allclose((ends[0] - ends[1]) / (2 * size), exact, rtol=1e-5, atol=1e-6)
+        overshoot = max(overshoot, np.abs(exact).max())
+    assert overshoot >= 1.0
+
+
+def test_a_design_that_overshoots_is_refused_only_beyond_what_the_reference_moves():
+    mesh = builders.grid((14, 14))
+    roles = dict.fromkeys(mesh.marker_names, "internal") | {"y_m": "moving"}
+    case = Case(roles=roles, motions=(Translate("y_m", (0.0, 0.05)),), kernel="wendland-c6")
+    deformer = sv.Deformer(mesh, case)
+    jagged = deformer.displacement * (-1.0) ** np.arange(len(deformer.nodes))[:, None]
+    small = 1e-3 * jagged
+    overshoot = np.abs(deformer.deform(small) - mesh.points).max()
+    assert overshoot > 10 * np.abs(small).max()
+    with pytest.raises(UnsoundError, match=r"step 1: node .* would go"):
+        deformer.deform(jagged)
+    with pytest.raises(UnsoundError):
+        deformer.deform(np.stack([small, jagged]))
+
+
 def test_whoever_watches_can_stop_it():
     mesh, case = made("flat", steps=2)
     seen = []
