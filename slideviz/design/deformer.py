@@ -16,6 +16,7 @@ from slideviz.deformation.prescribed import displaced
 from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
+from slideviz.design.frozen_fit import BADLY_CONDITIONED
 from slideviz.design.frozen_step import FrozenStep, State
 from slideviz.design.loops import farthest, to_points
 from slideviz.design.operations import difference, flat
@@ -25,10 +26,6 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, larges
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
-
-BADLY_CONDITIONED = 1e14
-"""From this condition number on, forward and reverse derivatives may differ in their sixth digit:
-measured on random meshes and cases."""
 
 TOGETHER = 128
 """Designs that are deformed together, and share the radial functions."""
@@ -143,7 +140,7 @@ class Deformer:
         Warns
         -----
         ConditionWarning
-            The system is so badly conditioned that derivatives have few digits.
+            The system is so badly conditioned that derivatives and points have few digits.
         """
         _require_derivative(case)
         if displacements is not None and not case.motions:
@@ -423,9 +420,10 @@ class Deformer:
         if not worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
             return
         warnings.warn(
-            f"the condition number of the system is {worst:.0e}, so that derivatives may have few "
-            "correct digits; use DATA_REDUCTION= YES with a larger tolerance, a less smooth "
-            "RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR",
+            f"the condition number of the system is {worst:.0e}, so that derivatives, and points "
+            "between the boundary nodes, may have few correct digits; use DATA_REDUCTION= YES with "
+            "a larger tolerance, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
+            "INFLUENCE_FACTOR",
             ConditionWarning,
             stacklevel=3,
         )

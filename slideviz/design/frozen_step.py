@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
-from slideviz.design.frozen_fit import FrozenFit, Rows
+from slideviz.design.frozen_fit import BADLY_CONDITIONED, FrozenFit, Rows
 from slideviz.design.loops import keep_rest, shift
 from slideviz.design.normals import sliding_normals
 from slideviz.design.operations import columns, features, points, weighted_mean
@@ -320,6 +320,7 @@ class _Solving:
             setup.coords.shape[1],
             chosen=self._step.choices,
             fixed=self._keep,
+            refined=self._step.condition > BADLY_CONDITIONED,
         )
 
     def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
