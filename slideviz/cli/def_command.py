@@ -148,6 +148,8 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
         for name, count in counts.items():
             print(f"FFD box {name}: {count} surface nodes")
         print(f"mesh: {case.mesh_out}")
+    for warning in case.warnings:
+        print(f"slideviz: warning: {warning}", file=sys.stderr)
     for name, count in counts.items():
         if not count:
             words = f"no node of {', '.join(config.markers)} is in the FFD box {name}"

@@ -59,8 +59,11 @@ OURS = {
 }
 SU2_CONTINUITY = "2ND_DERIVATIVE"
 """SU2's default of FFD_CONTINUITY."""
-ALIKE = 0.9
-"""From where a key that is not read may be one that is, mistyped."""
+OWN = {name for name in OURS if not name.startswith(("FFD_", "MARKER_"))}
+"""Keys of ours that no key of SU2 is like."""
+ALIKE, ALIKE_OWN = 0.9, 0.8
+"""From where a key that is not read may be one that is, mistyped. SU2 itself has MARKER_INTERFACE
+(0.84 of MARKER_INTERNAL), SOLUTION_FILENAME (0.895 of SOLUTION_ADJ_FILENAME) and more such."""
 CONTINUITIES = {"NO_DERIVATIVE": 1, "1ST_DERIVATIVE": 2, "2ND_DERIVATIVE": 3, "USER_INPUT": 0}
 """FFD_CONTINUITY, and how many planes of control points it holds."""
 
@@ -136,7 +139,9 @@ def _perhaps_ours(path: Path, ignored: tuple[str, ...], rows: dict[str, Entry]) 
     """Return warnings about keys that nearly are those that are read here."""
     found = []
     for key in ignored:
-        close = get_close_matches(key, _read_keys() - set(rows), n=1, cutoff=ALIKE)
+        close = get_close_matches(key, OWN, n=1, cutoff=ALIKE_OWN) or get_close_matches(
+            key, _read_keys() - set(rows), n=1, cutoff=ALIKE
+        )
         if close:
             found.append(f"{path}:{rows[key].line}: {key} is not read; did you mean {close[0]}?")
     return found

@@ -449,6 +449,38 @@ def test_mistyped_keys_of_ours_are_warned_about(here, capsys):
     assert err.count("did you mean") == 1
 
 
+@pytest.mark.parametrize(
+    ("row", "meant"),
+    [
+        ("STEPZ= 3", "STEPS"),
+        ("SLIDING_MODEL= ps", "SLIDING_MODE"),
+        ("MULTILEVELS= NO", "MULTILEVEL"),
+    ],
+)
+def test_mistyped_keys_of_our_own_are_told_though_shorter_or_given_besides(row, meant, here):
+    key = row.partition("=")[0]
+    text = f"DV_KIND= SCALE\nDV_VALUE= 1.1\nSLIDING_MODE= ps\n{row}\n"
+    assert config(text).case.warnings == (f"a.cfg:8: {key} is not read; did you mean {meant}?",)
+
+
+def test_keys_that_su2_has_are_not_taken_for_mistyped_ones(here):
+    keys = """
+        CONV_FILENAME DV_VALUE_NEW GAMMA_VALUE MARKER_CUSTOM MARKER_FAR MARKER_INTERFACE MGLEVEL
+        MARKER_ISOTHERMAL MARKER_MATCH_DEFORM_MESH MARKER_NEARFIELD MARKER_PLOTTING MESH_BOX_SIZE
+        MULTIZONE OBJECTIVE_WEIGHT SOLUTION_FILENAME TIME_STEP VALUE_OBJFUNC_FILENAME
+        VOLUME_ADJ_FILENAME WRT_BINARY_RESTART
+    """.split()
+    found = config("DV_KIND= SCALE\nDV_VALUE= 1\n" + "".join(f"{key}= 1\n" for key in keys))
+    assert found.ignored == tuple(keys)
+    assert not found.case.warnings
+
+
+def test_setting_boxes_tells_its_warnings_too(here, capsys):
+    config(f"{BOXED}DV_KIND= FFD_SETTING\nSTEPZ= 3\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert "warning: a.cfg:8: STEPZ is not read; did you mean STEPS?" in capsys.readouterr().err
+
+
 def test_without_dv_marker_the_markers_of_a_deformed_mesh_move(here):
     Path("a.cfg").write_text("MARKER_DEFORM_MESH= (high)\nDV_KIND= SCALE\nDV_VALUE= 1.1\n")
     assert read_config(Path("a.cfg")).markers == ("high",)
