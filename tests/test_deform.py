@@ -162,9 +162,7 @@ def test_coordinates_that_are_not_finite_are_refused_by_node(bad):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_displacement_that_overflows_is_told(method):
     mesh = builders.square(6)
-    overflow = np.errstate(over="ignore", invalid="ignore")
-    text = "became infinite; use more|through"
-    with overflow, pytest.raises((DeformError, CaseError), match=text):
+    with pytest.raises(CaseError, match="so move it less"):
         last(square_case(mesh, vector=(1e308, 1e308), sliding=method), mesh)
 
 
