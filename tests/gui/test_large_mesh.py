@@ -5,6 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.deformation.solver import deform
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.section_reader import READING
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import write_sample
@@ -192,3 +193,12 @@ def test_elasticity_says_that_it_needs_all_cells(stator):
 
 def test_the_reason_is_a_sentence():
     assert IN_FILE.endswith(".")
+
+
+def test_designs_are_not_swept_of_its_boundary_alone(stator):
+    stator.window.actions_.by_name["designs"].trigger()
+    panel = stator.window.docks["designs"].findChild(DesignsPanel)
+    assert "sweep it with `slideviz sweep`" in panel.said.text()
+    assert not any(widget.isEnabled() for widget in (panel.add, panel.load, panel.run))
+    panel.start()
+    assert not panel.runner.busy

@@ -250,18 +250,21 @@ class DesignsPanel(Panel):
 
     def _sync(self) -> None:
         busy, rows = self.runner.busy, bool(self.table.rows)
-        opened = self.store.session.mesh is not None
+        in_file = self.store.session.in_file
+        opened = self.store.session.mesh is not None and not in_file
         self.left.setCurrentWidget(self.view if rows else self.hint)
         self.model.editable = not busy
         for widget, able in (
             (self.add, opened and not busy),
             (self.load, opened and not busy),
             (self.remove, rows and not busy),
-            (self.run, rows and not busy),
+            (self.run, rows and opened and not busy),
             (self.stop, busy),
             (self.save, rows),
         ):
             widget.setEnabled(able)
+        if in_file:
+            self._say("This mesh stays in its file: sweep it with `slideviz sweep`.")
         count = len(self.table.rows)
         self.run.setText(f"Run {count} design{'' if count == 1 else 's'}" if rows else "Run")
         self.bar.setVisible(busy)
@@ -277,6 +280,7 @@ class DesignsPanel(Panel):
 
     def _say(self, text: str, wrong: bool = False) -> None:
         self.said.setText(text)
+        self.said.setToolTip(text)
         set_style(self.said, "bad", wrong)
 
     # Drawing ---------------------------------------------------------------------------
@@ -362,6 +366,8 @@ class DesignsPanel(Panel):
         row = self.table.results.get(number)
         if session.mesh is None or session.mesh is not (self.mesh or session.mesh):
             return
+        if session.in_file:
+            return  # only its boundary is in memory
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
             self._say(f"Design {number}: {row.problem}", wrong=True)
@@ -384,7 +390,7 @@ class DesignsPanel(Panel):
     def start(self) -> None:
         """Run the designs that have no result yet, or all again."""
         session = self.store.session
-        if self.runner.busy or session.mesh is None or not self.table.rows:
+        if self.runner.busy or session.mesh is None or session.in_file or not self.table.rows:
             return
         done = {number: row for number, row in self.table.results.items() if not row.problem}
         table = self.table.without_results()
