@@ -37,10 +37,11 @@ def add_config(call: argparse.ArgumentParser) -> None:
 
 
 def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
-    """Return the configuration, with the changes of ``--set``, and its mesh."""
+    """Return the configuration, with the changes of ``--set``, as it fits its mesh, and that."""
     from slideviz import read
     from slideviz.cli.places import note_case
     from slideviz.design.su2_config import read_config
+    from slideviz.design.su2_markers import on_mesh
     from slideviz.errors import CaseError
 
     config = read_config(arguments.case)
@@ -59,7 +60,8 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
             f"{file}: is not in the working folder, but beside {arguments.case}; as SU2 does, this "
             f"takes paths from the working folder: go to {arguments.case.parent} first"
         )
-    return config, read(file, zone=config.case.zone, file_format=config.case.mesh_format)
+    mesh = read(file, zone=config.case.zone, file_format=config.case.mesh_format)
+    return on_mesh(config, mesh), mesh
 
 
 def run_def(arguments: argparse.Namespace) -> int:

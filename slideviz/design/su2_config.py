@@ -200,9 +200,10 @@ class _Reader:
                 case = row.put(case, row.kind.read(entry.value))
             except CaseError as problem:
                 self.note(entry, str(problem))
-        moving = self.names("DV_MARKER") or self.names("MARKER_DEFORM_MESH")
+        mover = "DV_MARKER" if self.names("DV_MARKER") else "MARKER_DEFORM_MESH"
+        moving = self.names(mover)
         self.named |= {name: ROLES[role].key for name, role in case.roles.items()}
-        self.named |= dict.fromkeys(moving, "DV_MARKER")
+        self.named |= dict.fromkeys(moving, mover)
         roles |= {**case.roles, **dict.fromkeys(moving, "moving")}
         case = case.change(roles=roles, **self.formats())
         slides = "sliding" in roles.values() or "periodic" in roles.values()

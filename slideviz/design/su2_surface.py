@@ -19,6 +19,7 @@ from slideviz.case.words import nearest
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.steps import Step
 from slideviz.design.su2_config import Su2Config
+from slideviz.design.su2_markers import require_markers
 from slideviz.design.su2_planes import idle_variables
 from slideviz.design.su2_positions import read_positions
 from slideviz.design.su2_variables import BOXED, Variable
@@ -144,7 +145,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
     CaseError
         Boundaries or boxes are not there, a box has no such control point or no node inside.
     """
-    _require_markers(config, mesh)
+    require_markers(config, mesh)
     nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in config.markers]))
     variables = config.variables
     names = tuple(dict.fromkeys(v.box for v in variables if v.kind in BOXED))
@@ -191,7 +192,7 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     CaseError
         There are none, or a box is not possible.
     """
-    _require_markers(config, mesh)
+    require_markers(config, mesh)
     raise_all(tuple(text for _, text in ffd_contradictions(config.case)))
     boxes = []
     for box in defined_boxes(config.case, mesh).values():
@@ -201,20 +202,6 @@ def set_boxes(config: Su2Config, mesh: Mesh) -> tuple[Mesh, tuple[Box, ...]]:
     if not boxes:
         raise CaseError(f"{config.source}: FFD_SETTING needs FFD_DEFINITION, which has no box")
     return with_boxes(mesh, boxes, anew=True), tuple(boxes)
-
-
-def _require_markers(config: Su2Config, mesh: Mesh) -> None:
-    if not config.markers:
-        raise CaseError(f"{config.source}: DV_MARKER names no boundary; nothing would move")
-    known = mesh.marker_names
-    has = f"it has {', '.join(known)}" if known else "it has none"
-    unknown = [
-        f"{config.source}: {key}: {mesh.name} has no marker {name!r}"
-        f"{nearest(name, known) or f'; {has}'}"
-        for name, key in config.named.items()
-        if name not in known
-    ]
-    raise_all(tuple(unknown))
 
 
 def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None:

@@ -383,6 +383,78 @@ def test_what_the_mesh_does_not_have_is_told(text, message, here):
         make_surface(read_config(Path("a.cfg")), sv.read("mesh.su2"))
 
 
+@pytest.mark.parametrize(
+    ("row", "roles", "modes"),
+    [
+        ("MARKER_SYM= (axis, left, top)", {"left": "sliding"}, ("ps", "none")),
+        ("MARKER_SYM= (axis)", {}, ("none", "none")),
+        ("MARKER_PERIODIC= (p, q, 0, 0, 0, 0, 0, 0, 1, 0, 0)", {}, ("none", "none")),
+        (
+            "MARKER_PERIODIC= (p, q, 0, 0, 0, 0, 0, 0, 1, 0, 0)\nMARKER_SYM= (left)",
+            {"left": "sliding"},
+            ("ps", "none"),
+        ),
+        ("MARKER_DEFORM_MESH_SYM_PLANE= (axis)", {}, ("none", "none")),
+    ],
+)
+def test_boundaries_of_su2s_keys_that_the_mesh_lacks_are_passed_over(row, roles, modes, here):
+    from slideviz.design.su2_markers import on_mesh
+
+    found = on_mesh(config(f"DV_KIND= SCALE\nDV_VALUE= 1.1\n{row}\n"), sv.read("mesh.su2"))
+    assert dict(found.case.roles) == {"low": "moving", **roles}
+    assert (found.case.sliding, found.case.periodic) == modes
+    key = row.partition("=")[0]
+    (warning,) = found.case.warnings
+    assert warning.startswith(f"a.cfg: {key}: mesh.su2 has no marker '")
+    assert "passed over, as in SU2" in warning
+
+
+def test_command_passes_over_a_boundary_and_is_that_without_it(here, capsys):
+    text = "DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.05\n"
+    config(text + "MARKER_SYM= (left, right)\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    expected = Path("out.su2").read_bytes()
+    capsys.readouterr()
+    config(text + "MARKER_SYM= (left, axis, right)\n")
+    assert run(["def", "a.cfg", "-q", "--json", "a.json"]) == 0
+    assert Path("out.su2").read_bytes() == expected
+    said = "a.cfg: MARKER_SYM: mesh.su2 has no marker 'axis', which is passed over, as in SU2"
+    assert capsys.readouterr().err.count(said) == 1
+    assert said in json.loads(Path("a.json").read_text())["warnings"]
+    config("DV_KIND= FFD_SETTING\nMARKER_SYM= (axis)\n" + BOXED)
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert said in capsys.readouterr().err
+
+
+def test_without_dv_marker_some_of_the_deformed_boundaries_may_be_missing(here, capsys):
+    rest = "MESH_FILENAME= mesh.su2\nMESH_OUT_FILENAME= out.su2\nDV_KIND= SCALE\nDV_VALUE= 1.1\n"
+    Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (low, flap)\n")
+    assert run(["def", "a.cfg", "-q"]) == 0
+    assert "MARKER_DEFORM_MESH: mesh.su2 has no marker 'flap', whi" in capsys.readouterr().err
+    Path("a.cfg").write_text(f"{rest}MARKER_DEFORM_MESH= (slat, flap)\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    assert "MARKER_DEFORM_MESH: mesh.su2 has no marker 'slat'; it has" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("MARKER_SLIDING= (axis)", "MARKER_SLIDING: mesh.su2 has no marker 'axis'"),
+        ("MARKER_FIXED= (axis)", "MARKER_FIXED: mesh.su2 has no marker 'axis'"),
+        ("MARKER_SYM= (lo)\nDV_MARKER= (low, lo)", "DV_MARKER: mesh.su2 has no marker 'lo'"),
+        (
+            "MARKER_PERIODIC= (left, q, 0, 0, 0, 0, 0, 0, 1, 0, 0)",
+            "MARKER_PERIODIC: mesh.su2 has no marker 'q'",
+        ),
+    ],
+)
+def test_other_boundaries_that_the_mesh_lacks_are_errors(row, message, here, capsys):
+    files = FILES.replace("DV_MARKER= ( low )\n", "") if "DV_MARKER" in row else FILES
+    Path("a.cfg").write_text(f"{files}DV_KIND= SCALE\nDV_VALUE= 1.1\n{row}\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    assert message in capsys.readouterr().err
+
+
 def test_paths_are_those_of_the_working_folder(here, capsys):
     Path("deep").mkdir()
     config("DV_KIND= SCALE\nDV_VALUE= 1.1\n")
@@ -464,12 +536,27 @@ def test_mistyped_keys_of_our_own_are_told_though_shorter_or_given_besides(row, 
 
 
 def test_keys_that_su2_has_are_not_taken_for_mistyped_ones(here):
-    keys = """
-        CONV_FILENAME DV_VALUE_NEW GAMMA_VALUE MARKER_CUSTOM MARKER_FAR MARKER_INTERFACE MGLEVEL
-        MARKER_ISOTHERMAL MARKER_MATCH_DEFORM_MESH MARKER_NEARFIELD MARKER_PLOTTING MESH_BOX_SIZE
-        MULTIZONE OBJECTIVE_WEIGHT SOLUTION_FILENAME TIME_STEP VALUE_OBJFUNC_FILENAME
-        VOLUME_ADJ_FILENAME WRT_BINARY_RESTART
-    """.split()
+    keys = [
+        "CONV_FILENAME",
+        "DV_VALUE_NEW",
+        "GAMMA_VALUE",
+        "MARKER_CUSTOM",
+        "MARKER_FAR",
+        "MARKER_INTERFACE",
+        "MGLEVEL",
+        "MARKER_ISOTHERMAL",
+        "MARKER_MATCH_DEFORM_MESH",
+        "MARKER_NEARFIELD",
+        "MARKER_PLOTTING",
+        "MESH_BOX_SIZE",
+        "MULTIZONE",
+        "OBJECTIVE_WEIGHT",
+        "SOLUTION_FILENAME",
+        "TIME_STEP",
+        "VALUE_OBJFUNC_FILENAME",
+        "VOLUME_ADJ_FILENAME",
+        "WRT_BINARY_RESTART",
+    ]
     found = config("DV_KIND= SCALE\nDV_VALUE= 1\n" + "".join(f"{key}= 1\n" for key in keys))
     assert found.ignored == tuple(keys)
     assert not found.case.warnings

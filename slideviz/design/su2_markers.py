@@ -1,0 +1,77 @@
+"""Boundaries that a configuration of SU2 names, and the mesh may lack.
+
+One configuration often serves several meshes, so SU2 passes over boundaries that one of them lacks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from slideviz.case.check import raise_all
+from slideviz.case.words import nearest
+from slideviz.design.su2_config import ROLE_KEYS, Su2Config
+from slideviz.errors import CaseError
+from slideviz.mesh.model import Mesh
+
+PASSED_OVER = {*ROLE_KEYS, "MARKER_DEFORM_MESH"}
+"""Keys of SU2 and its branches, whose boundaries a mesh may lack."""
+
+
+def on_mesh(config: Su2Config, mesh: Mesh) -> Su2Config:
+    """Return a configuration without the boundaries that SU2 passes over, with a warning each key.
+
+    Raises
+    ------
+    CaseError
+        `require_markers` does, or one of a periodic pair is missing, or all that would move.
+    """
+    lacking = [name for name in config.named if name not in mesh.marker_names]
+    passed = {name: key for name in lacking if (key := config.named[name]) in PASSED_OVER}
+    roles = config.case.roles
+    if sum(roles[name] == "periodic" for name in passed) % 2:
+        # Without its partner, the other one could not repeat.
+        passed = {name: key for name, key in passed.items() if roles[name] != "periodic"}
+    markers = tuple(name for name in config.markers if name not in passed)
+    if not markers:
+        passed = {name: key for name, key in passed.items() if name not in config.markers}
+        markers = config.markers
+    named = {name: key for name, key in config.named.items() if name not in passed}
+    left = {name: role for name, role in roles.items() if name not in passed}
+    case = config.case.change(
+        roles=left, warnings=(*config.case.warnings, *_warnings(config, mesh, passed))
+    )
+    if passed and "periodic" not in left.values():
+        case = case.change(periodic="none")
+        if "sliding" not in left.values():
+            case = case.change(sliding="none")
+    config = replace(config, case=case, named=named, markers=markers)
+    require_markers(config, mesh)
+    return config
+
+
+def require_markers(config: Su2Config, mesh: Mesh) -> None:
+    """Raise CaseError where nothing would move, or where the mesh lacks a boundary."""
+    if not config.markers:
+        raise CaseError(f"{config.source}: DV_MARKER names no boundary; nothing would move")
+    known = mesh.marker_names
+    has = f"it has {', '.join(known)}" if known else "it has none"
+    unknown = [
+        f"{config.source}: {key}: {mesh.name} has no marker {name!r}"
+        f"{nearest(name, known) or f'; {has}'}"
+        for name, key in config.named.items()
+        if name not in known
+    ]
+    raise_all(tuple(unknown))
+
+
+def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str]:
+    """Return a sentence for each key."""
+    found = []
+    for key in dict.fromkeys(passed.values()):
+        names = [name for name in passed if passed[name] == key]
+        close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
+        found.append(
+            f"{config.source}: {key}: {mesh.name} has no marker {', '.join(map(repr, names))}, "
+            f"which is passed over, as in SU2{close}"
+        )
+    return found
