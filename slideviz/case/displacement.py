@@ -27,6 +27,32 @@ PART = 4000
 """Lines that are turned into numbers at a time."""
 
 
+@dataclass(frozen=True)
+class Form:
+    """What the numbers of a node are.
+
+    Attributes
+    ----------
+    what : str
+        For messages.
+    names : (str, str, str)
+        Of the columns after the node.
+    flat : bool
+        Whether a plane mesh may have a third, of zeros.
+    """
+
+    what: str
+    names: tuple[str, str, str]
+    flat: bool = False
+
+    def columns(self, dim: int) -> str:
+        """Return the names of all columns."""
+        return " ".join(("node", *self.names[:dim]))
+
+
+DISPLACEMENT = Form("displacement", ("dx", "dy", "dz"))
+
+
 @dataclass(frozen=True, eq=False)
 class Displacements:
     """Prescribed displacements.
@@ -92,17 +118,10 @@ def parse_displacements(
     CaseError
         The text has mistakes: a line ``file:line: sentence`` for each.
     """
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if any(sign in text for sign in COMMENT_SIGNS):
-        text = _COMMENT.sub("", text)
-    lines = text.translate(_SEPARATORS).split("\n")
-    table = _table(path, lines, shape[1])
-    problems = _table_problems(table, lines, nodes, count=shape[0], of=of)
-    if problems:
-        raise CaseError(listed(path, problems))
-    given, first = np.unique(table[:, 0].astype(np.int64), return_index=True)
+    table = parse_rows(text, path, nodes, shape, of)
+    given = table[:, 0].astype(np.int64)
     vectors = np.zeros((len(nodes), shape[1]))
-    vectors[np.searchsorted(nodes, given)] = table[first, 1:]
+    vectors[np.searchsorted(nodes, given)] = table[:, 1:]
     if len(given) < len(nodes):
         missing = len(nodes) - len(given)
         warning = f"{path}: {missing} of {len(nodes)} nodes on {of} are not listed; they stay"
@@ -110,7 +129,35 @@ def parse_displacements(
     return Displacements(nodes, vectors)
 
 
-def _table(path: Path, lines: list[str], dim: int) -> FloatArray:
+def parse_rows(
+    text: str,
+    path: Path,
+    nodes: IntArray,
+    shape: tuple[int, ...],
+    of: str,
+    form: Form = DISPLACEMENT,
+) -> FloatArray:
+    """Return nodes and their numbers, (k, 1 + d), each node once and in ascending order.
+
+    Parameters as of `read_displacements`; ``path`` and ``form`` are for messages.
+
+    Raises
+    ------
+    CaseError
+        The text has mistakes: a line ``file:line: sentence`` for each.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if any(sign in text for sign in COMMENT_SIGNS):
+        text = _COMMENT.sub("", text)
+    lines = text.translate(_SEPARATORS).split("\n")
+    table = _table(path, lines, shape[1], form)
+    problems = _table_problems(table, lines, nodes, count=shape[0], of=of, what=form.what)
+    if problems:
+        raise CaseError(listed(path, problems))
+    return table[np.unique(table[:, 0], return_index=True)[1]]
+
+
+def _table(path: Path, lines: list[str], dim: int, form: Form) -> FloatArray:
     """Return the numbers of the file, (m, 1 + d).
 
     Raises
@@ -119,19 +166,22 @@ def _table(path: Path, lines: list[str], dim: int) -> FloatArray:
         It has none, or lines with something else.
     """
     if not any(line.strip() for line in lines):
-        raise CaseError(f"{path}: the file lists no node; needed are lines {_columns(dim)}")
+        raise CaseError(f"{path}: the file lists no node; needed are lines {form.columns(dim)}")
     try:
         table = _numbers([line for line in lines if line.strip()])
     except ValueError:
         table = np.empty((0, 0))
     if table.shape[1] == 1 + dim and np.isfinite(table).all():
         return table
+    flat = form.flat and dim == 2 and table.shape[1] == 4
+    if flat and np.isfinite(table).all() and not table[:, 3].any():
+        return table[:, :3]
     # Slower, but it tells every line that is wrong.
     rows: list[list[float]] = []
     problems: list[Problem] = []
     for line, content in enumerate(lines, start=1):
         try:
-            rows += _row(content, dim)
+            rows += _row(content, dim, form)
         except CaseError as problem:
             problems.append((line, str(problem)))
     if problems:
@@ -147,23 +197,25 @@ def _numbers(lines: list[str]) -> FloatArray:
     )
 
 
-def _row(content: str, dim: int) -> list[list[float]]:
+def _row(content: str, dim: int, form: Form) -> list[list[float]]:
     """Return the numbers of a line, as one row or, of an empty line, none."""
     words = content.split()
+    if form.flat and dim == 2 and len(words) == 4:
+        if number(words[3]) != 0.0:
+            raise CaseError(
+                f"z is {shown(words[3])}, and the mesh has 2 dimensions; write 0 or leave it out"
+            )
+        words.pop()
     if words and len(words) != 1 + dim:
         sentence = f"{shown(content.strip())} has {len(words)} columns; needed are {1 + dim}"
-        raise CaseError(f"{sentence}: {_columns(dim)} (put % before a heading)")
+        raise CaseError(f"{sentence}: {form.columns(dim)} (put % before a heading)")
     return [[number(word) for word in words]] if words else []
 
 
-def _columns(dim: int) -> str:
-    return "node dx dy" if dim == 2 else "node dx dy dz"
-
-
 def _table_problems(
-    table: FloatArray, lines: list[str], nodes: IntArray, *, count: int, of: str
+    table: FloatArray, lines: list[str], nodes: IntArray, *, count: int, of: str, what: str
 ) -> list[Problem]:
-    """Return the lines whose node is none of ``nodes``, or was displaced differently before."""
+    """Return the lines whose node is none of ``nodes``, or has other numbers before."""
     index = table[:, 0]
     broken = index != np.floor(index)
     outside = ~broken & ((index < 0) | (index >= count))
@@ -185,7 +237,7 @@ def _table_problems(
     ]
     for k in _first(differ):
         before, after = row_line[order[k]], row_line[order[k + 1]]
-        sentence = f"node {int(index[order[k]])} has another displacement in line {before}"
+        sentence = f"node {int(index[order[k]])} has another {what} in line {before}"
         problems.append((after, f"{sentence}; keep one of the two"))
     return problems
 

@@ -20,9 +20,11 @@ _LISTED = 30
 LARGEST = {
     "case file": 16_000_000,
     "displacement file": 2_000_000_000,
+    "surface file": 2_000_000_000,
+    "file of sensitivities": 2_000_000_000,
     "table of designs": 100_000_000,
 }
-"""Bytes that a kind of file may have: a displacement file has a line for each node at most."""
+"""Bytes that a kind of file may have: most have a line for each node at most."""
 
 
 @dataclass(frozen=True)

@@ -6,32 +6,53 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.case.displacement import parse_displacements
+from slideviz.case.displacement import Form, parse_rows
 from slideviz.case.lines import read_text
+from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
+POSITION = Form("position", ("x", "y", "z"), flat=True)
 
-def read_positions(path: Path, nodes: IntArray, mesh: Mesh) -> FloatArray:
-    """Return the new positions of nodes, (m, d); those the file does not list stay.
 
-    Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between. As in SU2,
-    nodes that are on none of the moving boundaries are passed over.
+def read_positions(
+    path: Path, nodes: IntArray, mesh: Mesh, of: str
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the new positions of nodes, (m, d), and warnings; nodes that are not listed stay.
+
+    Lines are ``index x y [z]`` in any order, with blanks, tabs or commas between; a plane mesh may
+    have a z of 0. As in SU2, nodes that are on none of the moving boundaries are passed over, but
+    not without a word.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    nodes : (m,) int64
+        Of the moving boundaries, ascending.
+    mesh : Mesh
+    of : str
+        What these boundaries are, for messages: ``DV_MARKER= (low)``.
 
     Raises
     ------
     CaseError
-        The file cannot be read, or has mistakes: a line ``file:line: sentence`` for each.
+        The file cannot be read, has mistakes (a line ``file:line: sentence`` for each), or none of
+        these nodes.
     """
-    text, _ = read_text(path, "displacement file")
+    text, warnings = read_text(path, "surface file")
     every = np.arange(len(mesh.points))
-    read = parse_displacements(text, path, every, mesh.points.shape, "the mesh")
-    listed = _listed(text)
-    given = np.isin(nodes, listed)
-    return np.where(given[:, None], read.at(nodes), mesh.points[nodes])
-
-
-def _listed(text: str) -> IntArray:
-    """Return the nodes that a file lists, whose lines are known to be right."""
-    lines = (line.replace(",", " ").replace(";", " ").split() for line in text.splitlines())
-    words = (row[0] for row in lines if row and row[0][0] not in "%#$")
-    return np.array([int(float(word)) for word in words], np.int64)
+    table = parse_rows(text, path, every, mesh.points.shape, "the mesh", POSITION)
+    listed = table[:, 0].astype(np.int64)
+    moving = np.isin(listed, nodes)
+    others = int(np.count_nonzero(~moving))
+    if others == len(listed):
+        raise CaseError(
+            f"{path}: none of its {others} nodes is on {of}, so that nothing would move; correct "
+            "the file or the boundaries"
+        )
+    positions = mesh.points[nodes]
+    positions[np.searchsorted(nodes, listed[moving])] = table[moving, 1:]
+    if others:
+        said = f"{path}: {others} of {len(listed)} nodes are not on {of}; they are passed over"
+        warnings = (*warnings, said)
+    return positions, warnings

@@ -41,7 +41,7 @@ def is_number(word: str) -> bool:
 
 def _csv(path: Path) -> tuple[list[str], FloatArray]:
     """Return the names of the columns and the rows of a restart in text."""
-    text, _ = read_text(path, "displacement file")
+    text, _ = read_text(path, "file of sensitivities")
     head, _, body = text.partition("\n")
     names = [name.strip().strip('"').strip() for name in head.split(",")]
     lines = body.splitlines()

@@ -257,7 +257,7 @@ def _unordered(path: Path, mesh: Mesh) -> Sensitivities:
 
 def _rows(path: Path) -> Iterator[list[float]]:
     """Yield the numbers of each line; lines that begin with none are headings."""
-    text, _ = read_text(path, "displacement file")
+    text, _ = read_text(path, "file of sensitivities")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.replace(",", " ").split()
         if not words or not is_number(words[0]):

@@ -67,13 +67,21 @@ class Surface:
     def displacement(self) -> FloatArray:
         """Return the displacement of the nodes, (m, d), in the mesh's length unit."""
         points = self.mesh.points[self.nodes]
+        if self.config.variables[0].kind == "SURFACE_FILE":  # which stands alone
+            return self._listed[0] - points
         total = np.zeros_like(points)
         for place, variable in enumerate(self.config.variables):
-            if variable.kind == "SURFACE_FILE":
-                path = self.config.files["DV_FILENAME"]
-                return read_positions(path, self.nodes, self.mesh) - points
             total += self._moved(place, variable, points)
         return total
+
+    @cached_property
+    def _listed(self) -> tuple[FloatArray, tuple[str, ...]]:
+        """Return positions from the file, and warnings; none where there is no SURFACE_FILE."""
+        if self.config.variables[0].kind != "SURFACE_FILE":
+            return self.mesh.points[self.nodes], ()
+        config = self.config
+        of = f"{config.named[config.markers[0]]}= ({', '.join(config.markers)})"
+        return read_positions(config.files["DV_FILENAME"], self.nodes, self.mesh, of)
 
     def slope(self, place: int, undeformed: bool = False) -> FloatArray:
         """Return the derivative of the displacement for the value of a variable, (m, d).
@@ -120,7 +128,7 @@ class Surface:
         if not others and kinds <= {*RIGID} and case.kernel == Case().kernel:
             # All boundaries move as a body does, or grow: this kernel has that exactly inside.
             case = case.change(kernel="thin-plate")
-        warnings = (*case.warnings, *self.warnings)
+        warnings = (*case.warnings, *self.warnings, *self._listed[1])
         motion = Prescribed(self.nodes, self.displacement)
         return case.change(motions=(motion,), warnings=warnings)
 

@@ -181,11 +181,56 @@ def test_surface_file_gives_positions_in_any_order(here):
     assert new[3].tolist() == pytest.approx([0.5, 0.1])
     assert new[1].tolist() == pytest.approx([0.2, 0.05])
     assert not found.displacement[[0, 2, 4, 5, 6]].any()
-    Path("p.dat").write_text("3 0.5\n")
-    with pytest.raises(CaseError, match=r"p.dat:1: '3 0.5' has 2 columns; needed are 3"):
-        _ = surface("DV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n").displacement
-    with pytest.raises(CaseError, match=r"surface_positions\.dat: there is no such displacement"):
+    said = "p.dat: 1 of 3 nodes are not on DV_MARKER= (low); they are passed over"
+    assert found.case().warnings == (said,)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, r"surface_positions\.dat: there is no such surface file; check name"),
+        ("", r"the file is empty; needed is a surface file"),
+        ("% nothing\n", r"the file lists no node; needed are lines node x y$"),
+        ("3 0.5\n", r"dat:1: '3 0.5' has 2 columns; needed are 3: node x y \(put"),
+        ("3 1 2\n3 1 3\n", r"dat:2: node 3 has another position in line 1; keep one"),
+        ("3 1 2 0.0\n4 1 2 1e-9\n", r"dat:2: z is '1e-9', and the mesh has 2 dim"),
+        ("3 1 2\n4 1 2 1\n", r"dat:2: z is '1', and the mesh has 2 dim"),
+        ("3 1 2 0 0\n", r"dat:1: '3 1 2 0 0' has 5 columns; needed are 3"),
+        ("99 1 2\n", r"node 99 is not in the mesh; its nodes are 0 to 48"),
+        ("30 1 2\n48 1 1\n", r"none of its 2 nodes is on DV_MARKER= \(low\), so that nothing"),
+    ],
+)
+def test_mistakes_of_a_surface_file_speak_of_positions(text, message, here):
+    if text is not None:
+        Path("surface_positions.dat").write_text(text)
+    with pytest.raises(CaseError, match=message) as found:
         _ = surface("DV_KIND= SURFACE_FILE\n").displacement
+    assert "displacement" not in str(found.value)
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_surface_file_of_a_plane_mesh_may_have_a_third_coordinate_of_zero(mixed, here):
+    Path("p.dat").write_text(f"3\t0.5\t0.1\t0.0\n1, 0.2, 0.05{'' if mixed else ', -0e5'}\n")
+    found = surface("DV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n")
+    new = found.mesh.points[found.nodes] + found.displacement
+    assert new[[1, 3]].tolist() == [[0.2, 0.05], [0.5, 0.1]]
+    assert not found.case().warnings
+
+
+def test_surface_file_of_another_boundary_is_refused_and_writes_nothing(here, capsys):
+    mesh = sv.read("mesh.su2")
+    high = mesh.marker("high").nodes
+    rows = [f"{k} {x!r} {y!r}" for k, (x, y) in zip(high, mesh.points[high].tolist(), strict=True)]
+    Path("p.dat").write_text("\n".join(rows))
+    config("DV_KIND= SURFACE_FILE\nDV_FILENAME= p.dat\n")
+    assert run(["def", "a.cfg", "-q"]) == 1
+    assert "p.dat: none of its 7 nodes is on DV_MARKER= (low)" in capsys.readouterr().err
+    assert not Path("out.su2").exists()
+    Path("p.dat").write_text("\n".join([*rows, "2 0.3 0.02"]))
+    assert run(["def", "a.cfg", "-q", "--json", "a.json"]) == 0
+    said = "p.dat: 7 of 8 nodes are not on DV_MARKER= (low); they are passed over"
+    assert capsys.readouterr().err.count(said) == 1
+    assert said in json.loads(Path("a.json").read_text())["warnings"]
 
 
 def test_real_surface_file_is_met_to_the_digit(here):
