@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +13,18 @@ from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2_sensitivities import match, read_sensitivities
 from slideviz.design.su2_surface import Surface
-from slideviz.errors import ToleranceWarning
+from slideviz.errors import CaseError, ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray
 
 DIRECTIONS = 16
 """At a design of zeros, control nodes are chosen for so many directions together."""
 REACH = 1e-3
 """How far these move the boundary, as a part of the mesh."""
+
+INSUFFICIENT = (
+    "the control nodes do not suffice for this design: boundary nodes still get exactly their "
+    "displacement, and the gradient is that of such a deformation; see what `slideviz def` warns of"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +63,10 @@ def find_gradients(
     ------
     SlidevizError
         The sensitivities are not there or of another mesh, or the deformation is not possible.
+
+    Notes
+    -----
+    What a `Deformer` warns of is among the warnings of the result.
     """
     config, mesh = surface.config, surface.mesh
     found = read_sensitivities(config, mesh)
@@ -68,9 +78,8 @@ def find_gradients(
         kept.append(_deformer(surface, displacement, progress))
         return kept[0].deform(displacement)
 
-    with warnings.catch_warnings():
-        # The control nodes are those of this design: a run tells where they do not suffice.
-        warnings.simplefilter("ignore", ToleranceWarning)
+    said: list[str] = []
+    with _heard(said):
         matched = match(found, mesh, design if moves else None)
         if moves and not matched.at_design:
             displacement, kept = np.zeros_like(displacement), []
@@ -86,8 +95,30 @@ def find_gradients(
         points=mesh.points[surface.nodes] + displacement,
         at_design=matched.at_design,
         source=str(found.path),
-        warnings=(*deformer.warnings, *matched.warnings),
+        warnings=(*deformer.warnings, *matched.warnings, *dict.fromkeys(said)),
     )
+
+
+@contextmanager
+def _heard(said: list[str]) -> Iterator[None]:
+    """Add what a deformer warns of to a list, and to errors; other warnings go on."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ConditionWarning)
+        warnings.simplefilter("always", ToleranceWarning)
+        try:
+            yield
+        except CaseError as problem:
+            reasons = [str(one.message) for one in caught if one.category is ConditionWarning]
+            if not reasons:
+                raise
+            raise CaseError(f"{problem}; this may come from it: {reasons[0]}") from problem
+    for one in caught:
+        if one.category is ConditionWarning:
+            said.append(str(one.message))
+        elif one.category is ToleranceWarning:  # its remedy is one for Python
+            said.append(INSUFFICIENT)
+        else:
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
 
 
 def _deformer(

@@ -384,3 +384,49 @@ def test_sensitivities_of_a_slightly_other_design_are_warned_about(case, capsys)
     assert (
         "its points are off those of this design by 1e-07: is it older?" in capsys.readouterr().err
     )
+
+
+def heard(extra, values, points, weights, capsys):
+    """What ``dot`` tells, which must be whole sentences of its own, in the report as well."""
+    Path("dot.cfg").write_text(simple(values) + extra)
+    write_csv("adj_cd.csv", points, weights)
+    capsys.readouterr()
+    code = run(["dot", "dot.cfg", "-q", "--json", "dot.json"])
+    lines = capsys.readouterr().err.splitlines()
+    if code == 0:
+        told = json.loads(Path("dot.json").read_text())["warnings"]
+        assert lines == [f"slideviz: warning: {one}" for one in told]
+    return code, lines
+
+
+def test_a_badly_conditioned_system_is_told_by_the_command_itself(case, capsys):
+    points, weights = case
+    extra = "RBF_KERNEL= gaussian\nINFLUENCE_FACTOR= 20\nDATA_REDUCTION= NO\n"
+    code, lines = heard(extra, "0.0, 0.0", sv.read("mesh.su2").points, weights, capsys)
+    assert code == 0
+    assert any("the condition number of the system is" in line for line in lines)
+    code, lines = heard(extra, "0.05, 0.02", points + 0.3, weights, capsys)
+    assert code == 1
+    assert "this may come from it: the condition number of the system is" in lines[-1]
+
+
+def test_control_nodes_that_do_not_suffice_are_told(case, capsys):
+    extra = "DATA_REDUCTION= YES\nDATA_RED_TOLERANCE= 1e-6\nMAX_CONTROL_NODES= 5\n"
+    points = written(simple() + extra)
+    code, lines = heard(extra, "0.05, 0.02", points, case[1], capsys)
+    assert code == 0
+    assert "the control nodes do not suffice for this design" in lines[-1]
+
+
+def test_other_warnings_of_python_go_on(recwarn):
+    import warnings
+
+    from slideviz.design.su2_gradients import _heard
+
+    said = []
+    warnings.simplefilter("always")
+    with _heard(said):
+        warnings.warn("another", UserWarning, stacklevel=1)
+        warnings.warn("mine", sv.ConditionWarning, stacklevel=1)
+    assert said == ["mine"]
+    assert [str(one.message) for one in recwarn] == ["another"]
