@@ -265,17 +265,26 @@ def _overlaps(inside: dict[str, Embedding]) -> list[str]:
     return [said] if shared else []
 
 
+def _shown(point: FloatArray) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in point)})"
+
+
 def _turned(
     numbers: tuple[float, ...], points: FloatArray, angle_deg: float, derivative: bool = False
 ) -> FloatArray:
     """Return the change of points (m, d) by a turn about a line, or its derivative by radians.
 
-    The line goes through both points of ``numbers``, in 2D through the first along z. Rodrigues:
+    The line goes through both points of ``numbers``, in 2D along z. Rodrigues:
     ``sin(a) k x v + (1 - cos(a)) k x (k x v)``.
     """
     dim, angle = points.shape[1], np.radians(angle_deg)
     first, second = np.array(numbers).reshape(2, 3)
     axis = second - first if dim == 3 else np.array([0.0, 0.0, 1.0])
+    if dim == 2 and (first != second)[:2].any():
+        raise CaseError(
+            f"ROTATION: the line from {_shown(first)} to {_shown(second)} leaves the normal of a "
+            "mesh of 2 dimensions; give both points the same x and y"
+        )
     length = np.linalg.norm(axis)
     if length == 0.0:
         raise CaseError("ROTATION: its two points are one; the line between them has no direction")

@@ -114,6 +114,16 @@ def test_rotation_in_3d_turns_about_its_line(here):
     np.testing.assert_allclose(found.displacement, expected, atol=1e-13)
 
 
+def test_rotation_in_2d_is_about_a_line_along_z(here):
+    text = "DV_KIND= ROTATION\nDV_VALUE= 30\nDV_PARAM="
+    expected = surface(f"{text} (0.5, 1, 0, 0.5, 1, 1)\n").displacement
+    for same in ("(0.5, 1, 0, 0.5, 1, 0)", "(0.5, 1, 2, 0.5, 1, 9)"):
+        np.testing.assert_array_equal(surface(f"{text} {same}\n").displacement, expected)
+    message = r"ROTATION: the line from \(0.5, 1, 0\) to \(0.6, 1, 1\) leaves the normal"
+    with pytest.raises(CaseError, match=message):
+        _ = surface(f"{text} (0.5, 1, 0, 0.6, 1, 1)\n").displacement
+
+
 def test_control_points_of_a_defined_box_move_the_surface(here):
     text = (
         f"{BOXED}DV_KIND= FFD_CONTROL_POINT_2D, FFD_CONTROL_POINT\n"
