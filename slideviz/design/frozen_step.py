@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
 from slideviz.design.frozen_fit import BADLY_CONDITIONED, FrozenFit, Rows
-from slideviz.design.loops import keep_rest, shift
+from slideviz.design.loops import keep_rest, shift, take_over
 from slideviz.design.normals import sliding_normals
 from slideviz.design.operations import columns, features, points, weighted_mean
 from slideviz.design.operations import coords as coords_of
@@ -529,8 +529,12 @@ class _Solving:
 
     def _spread(self, displacement: Array, spread: _Spread, errors: Array) -> Array:
         """Add what targets take over."""
-        taken = mixed(spread.mixing(value(errors).shape[-2]), errors)
+        means = spread.mixing(value(errors).shape[-2])
         part = self._keep("shares", lambda: self._shares(spread))
+        if displacement is self._room and not isinstance(part, Variable):
+            take_over(self._room, spread.targets, means, part[:, 0], value(errors))
+            return displacement
+        taken = mixed(means, errors)
         taken = multiply(taken, part)
         more = take(displacement, spread.targets) + taken
         return put(displacement, spread.targets, more, own=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from math import factorial
 from typing import Any
 
 import numpy as np
 from numba import prange
+from scipy.sparse import csr_array
 
 from slideviz.mesh.caching import njit
-from slideviz.mesh.model import FloatArray
+from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.periodic import axis_basis
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
@@ -16,25 +18,58 @@ from slideviz.rbf.frames import Frame
 _OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
+BLOCK = 256
+"""Nodes of a task: those of each design lie one after the other, and designs far apart."""
+
+
 @njit(parallel=True, **_OPTIONS)
 def _shift(start, by):  # type: ignore[no-untyped-def]
-    for i in prange(by.shape[1]):
+    n = by.shape[1]
+    for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(by.shape[0]):
-            for j in range(by.shape[2]):
-                u, x = by[k, i, j], start[i, j]
-                # Adding zero would turn -0.0 into 0.0.
-                by[k, i, j] = x if u == 0.0 else x + u
+            for i in range(task * BLOCK, min(n, (task + 1) * BLOCK)):
+                for j in range(by.shape[2]):
+                    u, x = by[k, i, j], start[i, j]
+                    # Adding zero would turn -0.0 into 0.0.
+                    by[k, i, j] = x if u == 0.0 else x + u
 
 
 @njit(parallel=True, **_OPTIONS)
 def _rest(at, moved, start, before):  # type: ignore[no-untyped-def]
-    for i in prange(at.shape[1]):
+    n = at.shape[1]
+    for task in prange((n + BLOCK - 1) // BLOCK):
         for k in range(at.shape[0]):
-            rests = True
-            for j in range(at.shape[2]):
-                rests = rests and moved[k, i, j] == start[i, j]
-            if rests:
-                at[k, i] = before[i]
+            for i in range(task * BLOCK, min(n, (task + 1) * BLOCK)):
+                rests = True
+                for j in range(at.shape[2]):
+                    rests = rests and moved[k, i, j] == start[i, j]
+                if rests:
+                    at[k, i] = before[i]
+
+
+@njit(**_OPTIONS)
+def place(found, first, out):  # type: ignore[no-untyped-def]
+    """Write numbers (b, k d) of nodes from ``first`` on to their place in ``out`` (k, n, d).
+
+    In one thread, so that several may do so at once.
+    """
+    d = out.shape[2]
+    for k in range(out.shape[0]):
+        for i in range(found.shape[0]):
+            for j in range(d):
+                out[k, first + i, j] = found[i, k * d + j]
+
+
+@njit(parallel=True, **_OPTIONS)
+def _taken(out, targets, starts, source, weight, part, lacking):  # type: ignore[no-untyped-def]
+    for k in prange(out.shape[0]):
+        for row in range(len(targets)):
+            i = targets[row]
+            for j in range(out.shape[2]):
+                total = 0.0
+                for at in range(starts[row], starts[row + 1]):
+                    total += weight[at] * lacking[k, source[at], j]
+                out[k, i, j] += part[row] * total
 
 
 @njit(parallel=True, **_OPTIONS)
@@ -55,21 +90,57 @@ def _farthest(moved, start, squares):  # type: ignore[no-untyped-def]
             squares[part, k] = most
 
 
+_S = tuple((-1.0) ** k / float(factorial(2 * k + 1)) for k in range(1, 7))
+_C = tuple((-1.0) ** k / float(factorial(2 * k)) for k in range(1, 8))
+
+
+@njit(inline="always", **_OPTIONS)
+def _sine(x):  # type: ignore[no-untyped-def]
+    """Return sin x for |x| <= NEAR, to the last bits."""
+    t = x * x
+    p = t * (_S[2] + t * (_S[3] + t * (_S[4] + t * _S[5])))
+    return x + x * (t * (_S[0] + t * (_S[1] + p)))
+
+
+@njit(inline="always", **_OPTIONS)
+def _cosine(x):  # type: ignore[no-untyped-def]
+    """Return cos x as ``_sine`` does."""
+    t = x * x
+    p = t * (_C[2] + t * (_C[3] + t * (_C[4] + t * (_C[5] + t * _C[6]))))
+    return 1.0 + t * (_C[0] + t * (_C[1] + p))
+
+
+NEAR = 0.25
+"""Angle in radians up to which a few terms are enough."""
+
+
 @njit(parallel=True, **_OPTIONS)
 def _turn(coords, start, before, basis, origin, rate, theta0):  # type: ignore[no-untyped-def]
-    d = coords.shape[2]
-    for i in prange(coords.shape[1]):
+    n, d = coords.shape[1:]
+    for task in prange((n + BLOCK - 1) // BLOCK):
+        first, last = task * BLOCK, min(n, (task + 1) * BLOCK)
+        cos, sin = np.empty(BLOCK), np.empty(BLOCK)
+        for i in range(first, last):
+            angle = start[i, 1] * rate + theta0
+            cos[i - first], sin[i - first] = np.cos(angle), np.sin(angle)
         for k in range(coords.shape[0]):
-            x = coords[k, i]
-            if x[0] == start[i, 0] and x[1] == start[i, 1] and x[d - 1] == start[i, d - 1]:
-                coords[k, i] = before[i]
-                continue
-            angle = x[1] * rate + theta0
-            a, b, c = x[0] * np.cos(angle), x[0] * np.sin(angle), 0.0
-            if d == 3:
-                c = x[2]
-            for j in range(d):
-                x[j] = a * basis[0, j] + b * basis[1, j] + c * basis[2, j] + origin[j]
+            for i in range(first, last):
+                x0, x1, x2 = coords[k, i, 0], coords[k, i, 1], 0.0
+                if d == 3:
+                    x2 = coords[k, i, 2]
+                if x0 == start[i, 0] and x1 == start[i, 1] and (d == 2 or x2 == start[i, 2]):
+                    coords[k, i] = before[i]
+                    continue
+                by, c, s = (x1 - start[i, 1]) * rate, cos[i - first], sin[i - first]
+                if abs(by) <= NEAR:
+                    c, s = c * _cosine(by) - s * _sine(by), s * _cosine(by) + c * _sine(by)
+                else:
+                    c, s = np.cos(x1 * rate + theta0), np.sin(x1 * rate + theta0)
+                a, b = x0 * c, x0 * s
+                for j in range(d):
+                    coords[k, i, j] = (
+                        a * basis[0, j] + b * basis[1, j] + x2 * basis[2, j] + origin[j]
+                    )
 
 
 PARTS = 64
@@ -80,6 +151,22 @@ def shift(start: FloatArray, by: FloatArray) -> FloatArray:
     with one_at_a_time(by.size):
         _shift(start, by.reshape(-1, *start.shape))
     return by
+
+
+def take_over(
+    out: FloatArray, targets: IntArray, means: csr_array, part: FloatArray, lacking: FloatArray
+) -> None:
+    """Add to targets (h,) of designs ``out`` (k, n, d) their part of means of what others lack.
+
+    Parameters
+    ----------
+    means : (h, b)
+        The weights of those that they take over from.
+    part : (h,)
+    lacking : (k, b, d)
+    """
+    with one_at_a_time(len(out) * means.nnz * out.shape[-1]):
+        _taken(out, targets, means.indptr, means.indices, means.data, part, lacking)
 
 
 def keep_rest(

@@ -8,19 +8,23 @@ from functools import partial
 import numpy as np
 
 from slideviz.baselines.idw import weighted_means
+from slideviz.design.loops import place
 from slideviz.design.tape import Array, Linear, Variable, apply, value
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.frame_slopes import coords_slopes, features_slopes, points_slopes
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
+from slideviz.rbf.solve import enough_threads
 
-PAIRS = 3_000_000
-"""Pairs whose radial functions are in memory at a time when many columns share them."""
+PAIRS = 250_000
+"""Pairs whose radial functions are in memory at a time, in each thread, when many columns share
+them: they, and what they are multiplied to, stay in the cache."""
 
-CACHED = 500_000
-"""Of these, as many as are multiplied at once: they stay in the cache."""
+ROWS = 512
+"""Targets of these, at most."""
 
 
 def flat(rows: FloatArray) -> FloatArray:
@@ -156,15 +160,16 @@ def many(
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d)) if room is None else room
-    size = max(1, PAIRS // max(1, n))
-    least = max(1, CACHED // max(1, n))
-    for start in range(0, total, size):
-        stop = min(total, start + size)
-        values = matrix(basis, (targets[:, start:stop], None), (controls, None))
-        for first in range(start, stop, least):
-            last = min(stop, first + least)
-            found = values[first - start : last - start] @ wide
-            out[:, first:last] = np.moveaxis(found.reshape(-1, len(out), d), 1, 0)
+    size = min(ROWS, max(16, PAIRS // max(1, n)))
+
+    def fill(part: slice) -> None:
+        for first in range(part.start, part.stop, size):
+            here = slice(first, min(part.stop, first + size))
+            values = matrix(basis, (targets[:, here], None), (controls, None))
+            place(values @ wide, first, out)
+
+    with enough_threads(0.0):  # the threads are those of the parts
+        in_parts(fill, total)
     return out.reshape(*ahead, total, d)
 
 

@@ -325,6 +325,21 @@ def test_a_design_that_overshoots_is_refused_only_beyond_what_the_reference_move
         deformer.deform(np.stack([small, jagged]))
 
 
+def test_designs_that_turn_far_in_a_cylindrical_frame_are_as_each_alone():
+    mesh, case = made("rotational", steps=1)
+    deformer = sv.Deformer(mesh, case)
+    x = mesh.points[deformer.nodes]
+
+    def turned_by(angle):
+        c, s = np.cos(angle), np.sin(angle)
+        return x @ np.array([[c, s], [-s, c]]) - x
+
+    angles = [0.0, 1e-9, -0.05, 0.2, -0.249, 0.251, 0.4]
+    designs = np.stack([turned_by(angle) for angle in angles])
+    each = np.stack([deformer.deform(design) for design in designs])
+    np.testing.assert_allclose(deformer.deform(designs), each, rtol=0, atol=2e-14)
+
+
 def test_whoever_watches_can_stop_it():
     mesh, case = made("flat", steps=2)
     seen = []
