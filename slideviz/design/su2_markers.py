@@ -71,7 +71,7 @@ def _warnings(config: Su2Config, mesh: Mesh, passed: dict[str, str]) -> list[str
         names = [name for name in passed if passed[name] == key]
         close = nearest(names[0], mesh.marker_names) if len(names) == 1 else ""
         found.append(
-            f"{config.source}: {key}: {mesh.name} has no marker {', '.join(map(repr, names))}, "
-            f"which is passed over, as in SU2{close}"
+            f"{config.source}: {key}: {mesh.name} has no marker {' or '.join(map(repr, names))}: "
+            f"passed over, as in SU2{close}"
         )
     return found
