@@ -19,7 +19,7 @@ from slideviz.rbf.frames import Frame
 from slideviz.rbf.slopes import pull_positions, push_positions, sum_powers
 from slideviz.rbf.solve import enough_threads
 
-PAIRS = 250_000
+PAIRS = 1_000_000
 """Pairs whose radial functions are in memory at a time, in each thread, when many columns share
 them: they, and what they are multiplied to, stay in the cache."""
 
@@ -160,7 +160,7 @@ def many(
     wide = np.ascontiguousarray(np.moveaxis(weights.reshape(-1, n, d), 0, 1).reshape(n, -1))
     total = targets.shape[1]
     out = np.empty((wide.shape[1] // d, total, d)) if room is None else room
-    size = min(ROWS, max(16, PAIRS // max(1, n)))
+    size = min(ROWS, max(64, PAIRS // max(1, n)))
 
     def fill(part: slice) -> None:
         for first in range(part.start, part.stop, size):
