@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen_fit import BADLY_CONDITIONED
 from slideviz.design.frozen_step import FrozenStep, State
+from slideviz.design.given import given_input
 from slideviz.design.loops import farthest, to_points
 from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.errors import CaseError, ConditionWarning, DeformError, ToleranceWarning, UnsoundError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
+from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
@@ -31,31 +32,6 @@ TOGETHER = 128
 """Designs that are deformed together, and share the radial functions."""
 
 Tell = Callable[[Progress], None]
-
-
-@dataclass(frozen=True, eq=False)
-class _Input:
-    """How the displacement of known nodes follows from what is given at the moving nodes.
-
-    Attributes
-    ----------
-    points : (s, d) float64
-        The nodes that give theirs to all their images, undeformed.
-    rows, turn : (s,) int64, (s, d, d) float64 or None
-        Whose displacement each has, by the place among the moving nodes, and how it is turned.
-    known, source : (a,) int64
-        Known nodes that move, by their place, and the one of ``points`` that each follows.
-    others, followed : (o,) int64
-        Moving nodes, by their place, that must move as one of ``points``, and that one.
-    """
-
-    points: FloatArray
-    rows: IntArray
-    turn: FloatArray | None
-    known: IntArray
-    source: IntArray
-    others: IntArray
-    followed: IntArray
 
 
 class Deformer:
@@ -164,7 +140,7 @@ class Deformer:
                 "no displacement is given by which control nodes could be chosen: all are zero; "
                 "give `displacements` as large as the designs to come, or use DATA_REDUCTION= NO"
             )
-        self._setup, self._input = setup, _input(mesh, setup, asked)
+        self._setup, self._input = setup, given_input(mesh, setup, asked)
         self._size = largest_coordinate(mesh.points)
         self._least = max(float(sizes.max()), _usual_edge(setup))
         self.warnings = (*case.warnings, *setup.warnings)
@@ -463,38 +439,3 @@ def _require_derivative(case: Case) -> None:
         raise DeformError(
             "METHOD= elastic has no exact derivatives; use METHOD= rbf or idw, or `sv.deform`"
         )
-
-
-def _input(mesh: Mesh, setup: Setup, asked: Displacements) -> _Input:
-    """Return how the displacement of known nodes follows from that of the moving nodes."""
-    moved = displaced(asked, mesh)
-    _, source = spread(np.zeros(mesh.points.shape), moved.nodes, setup.classes.stands, 0.0)
-    of_known = source[setup.known]
-    known = np.flatnonzero(of_known >= 0)
-    nodes, place = np.unique(of_known[known], return_inverse=True)
-    given, turn = nodes.copy(), None
-    if mesh.halo is not None:
-        turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
-        row = np.full(len(mesh.points), -1)
-        row[mesh.halo.receivers] = np.arange(len(mesh.halo.receivers))
-        copies = row[nodes] >= 0
-        given[copies] = mesh.halo.donors[row[nodes[copies]]]
-        turn[copies] = mesh.halo.rotations[row[nodes[copies]]]
-    rows = np.searchsorted(asked.nodes, given)
-    inside = np.isin(given, asked.nodes)
-    if not inside.all():
-        raise CaseError(
-            f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
-            "is on no moving marker; give both the same role"
-        )
-    lead = source[moved.nodes]
-    others = np.flatnonzero(lead != moved.nodes)
-    return _Input(
-        frozen_array(mesh.points[nodes], np.float64),
-        rows,
-        turn,
-        known,
-        place,
-        np.searchsorted(asked.nodes, moved.nodes[others]) if mesh.halo is None else others[:0],
-        np.searchsorted(nodes, lead[others]) if mesh.halo is None else others[:0],
-    )

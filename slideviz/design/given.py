@@ -1,0 +1,74 @@
+"""How the displacement of all known nodes follows from what a deformer is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.case.displacement import Displacements
+from slideviz.deformation.prescribed import displaced
+from slideviz.deformation.setup import Setup
+from slideviz.errors import CaseError
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.rbf.images import spread
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """How the displacement of known nodes follows from what is given at the moving nodes.
+
+    Attributes
+    ----------
+    points : (s, d) float64
+        The nodes that give theirs to all their images, undeformed.
+    rows, turn : (s,) int64, (s, d, d) float64 or None
+        Whose displacement each has, by the place among the moving nodes, and how it is turned.
+    known, source : (a,) int64
+        Known nodes that move, by their place, and the one of ``points`` that each follows.
+    others, followed : (o,) int64
+        Moving nodes, by their place, that must move as one of ``points``, and that one.
+    """
+
+    points: FloatArray
+    rows: IntArray
+    turn: FloatArray | None
+    known: IntArray
+    source: IntArray
+    others: IntArray
+    followed: IntArray
+
+
+def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
+    """Return how the displacement of known nodes follows from that of the moving nodes."""
+    moved = displaced(asked, mesh)
+    _, source = spread(np.zeros(mesh.points.shape), moved.nodes, setup.classes.stands, 0.0)
+    of_known = source[setup.known]
+    known = np.flatnonzero(of_known >= 0)
+    nodes, place = np.unique(of_known[known], return_inverse=True)
+    given, turn = nodes.copy(), None
+    if mesh.halo is not None:
+        turn = np.tile(np.eye(mesh.dim), (len(nodes), 1, 1))
+        row = np.full(len(mesh.points), -1)
+        row[mesh.halo.receivers] = np.arange(len(mesh.halo.receivers))
+        copies = row[nodes] >= 0
+        given[copies] = mesh.halo.donors[row[nodes[copies]]]
+        turn[copies] = mesh.halo.rotations[row[nodes[copies]]]
+    rows = np.searchsorted(asked.nodes, given)
+    inside = np.isin(given, asked.nodes)
+    if not inside.all():
+        raise CaseError(
+            f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
+            "is on no moving marker; give both the same role"
+        )
+    lead = source[moved.nodes]
+    others = np.flatnonzero(lead != moved.nodes)
+    return Input(
+        frozen_array(mesh.points[nodes], np.float64),
+        rows,
+        turn,
+        known,
+        place,
+        np.searchsorted(asked.nodes, moved.nodes[others]) if mesh.halo is None else others[:0],
+        np.searchsorted(nodes, lead[others]) if mesh.halo is None else others[:0],
+    )
