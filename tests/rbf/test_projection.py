@@ -35,7 +35,7 @@ def test_the_closest_point_of_a_segment(seed, dim):
     rng = np.random.default_rng(seed)
     ends, x = rng.normal(size=(2, dim)), rng.normal(size=dim) * 2
     found = ClosestPoints(ends[None]).query(x[None])[0]
-    np.testing.assert_allclose(found, geometry.closest_on_segment(x, ends), atol=1e-7)
+    np.testing.assert_allclose(found, geometry.closest_on_segment(x, ends), atol=1e-6)
 
 
 @settings(max_examples=25, deadline=None)
