@@ -21,9 +21,8 @@ from slideviz.case.model import Case
 from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
 from slideviz.mesh.io.su2b.elements import element_block
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import Partial, partial_copy
-from slideviz.mesh.io.su2b.read import chosen_zone
 from slideviz.mesh.ranks import Alone
 from slideviz.rbf.problem import Watch
 from slideviz.terms import Metric
@@ -65,7 +64,7 @@ class Output:
         self._resume, self._replaces = resume, replaces
         self._mesh_file = case.mesh_file
         source = Source(case.mesh_file, stack.enter_context(case.mesh_file.open("rb")))
-        self._place = chosen_zone(case.mesh_file, find_zones(source), case.zone)
+        self._place = find_zone(source, case.zone)
         self.files = PointFiles(source, source, self._place)
         self._partial: Partial | None = None
         self._rating: Rating | None = None
@@ -215,4 +214,4 @@ def measuring(
 
 def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[Source, ZonePlace]:
     source = Source(path, file)
-    return source, chosen_zone(path, find_zones(source), zone)
+    return source, find_zone(source, zone)

@@ -12,8 +12,7 @@ import numpy as np
 from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, require_one_way
 from slideviz.errors import MeshError
 from slideviz.mesh.io.su2b.elements import Block, element_blocks
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
-from slideviz.mesh.io.su2b.read import chosen_zone
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.skin import index_of
@@ -187,7 +186,7 @@ def rated_whole(
 
 def _opened(stack: ExitStack, zone: Zone) -> tuple[Source, ZonePlace]:
     source = Source(zone[0], stack.enter_context(zone[0].open("rb")))
-    return source, chosen_zone(zone[0], find_zones(source), zone[1])
+    return source, find_zone(source, zone[1])
 
 
 def _blocks(source: Source, place: ZonePlace) -> Iterator[Block]:

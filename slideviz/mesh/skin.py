@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
 from slideviz.mesh.io.su2b.elements import BLOCK, Block, element_block, require_used, taken
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zones
-from slideviz.mesh.io.su2b.read import chosen_zone, point_block, read_elements
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.read import point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 from slideviz.mesh.ranks import ALONE, Alone
 
@@ -43,8 +43,7 @@ def read_skin(
     """
     with path.open("rb") as file:
         source = Source(path, file)
-        zones = find_zones(source)
-        place = chosen_zone(path, zones, zone)
+        place = find_zone(source, zone)
         markers = [
             Marker(
                 m.name, read_elements(source, place, m.elements, place.dim - 1, lambda _: None)[0]
@@ -77,7 +76,7 @@ def read_skin(
         tuple(Marker(m.name, _renumbered(m.cells, numbers)) for m in markers),
         name=printable(path.name),
         zone=place.number,
-        zones=len(zones),
+        zones=source.zones,
         source=path.resolve(),
         part=Part(
             frozen_array(numbers, np.int64),
@@ -122,7 +121,7 @@ def _cells_near(
     """Return what reads the cells at a boundary (nodes, (k,)), a block at a time."""
     with path.open("rb") as file:
         source = Source(path, file)
-        place = chosen_zone(path, find_zones(source), zone)
+        place = find_zone(source, zone)
         on = np.zeros(place.n_points, bool)
         on[boundary] = True
 
@@ -208,7 +207,7 @@ def _points_near(
     """Return what reads a block of points: those of some nodes (k,) in it, and the outermost."""
     with path.open("rb") as file:
         source = Source(path, file)
-        place = chosen_zone(path, find_zones(source), zone)
+        place = find_zone(source, zone)
 
         def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
             first, nodes = task

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from slideviz.deformation.solver import free_memory
 from slideviz.deformation.streaming import NEEDED
-from slideviz.mesh.io.su2b.layout import Source, find_zones
-from slideviz.mesh.io.su2b.read import chosen_zone, is_su2b
+from slideviz.mesh.io.su2b.layout import Source, find_zone
+from slideviz.mesh.io.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.skin import read_skin
@@ -34,7 +34,7 @@ def is_large(path: Path, zone: int | None) -> bool:
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
     with path.open("rb") as file:
-        place = chosen_zone(path, find_zones(Source(path, file)), zone)
+        place = find_zone(Source(path, file), zone)
     if place.dim == 2:  # all of its cells are what is drawn
         return False
     cells = place.cells.count

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from slideviz.deformation.measuring import PointFiles
 from slideviz.mesh.io.su2b.elements import SIZES, Block, element_at, element_blocks
-from slideviz.mesh.io.su2b.layout import Source, find_zones
-from slideviz.mesh.io.su2b.read import chosen_zone
+from slideviz.mesh.io.su2b.layout import Source, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
 from slideviz.session.results import Frame
@@ -177,7 +176,7 @@ def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tal
 def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> PointFiles:
     """Return the points of a mesh in its file and in that of the deformed one, both opened."""
     before, after = (Source(one, stack.enter_context(one.open("rb"))) for one in (path, moved))
-    return PointFiles(before, after, chosen_zone(path, find_zones(before), zone))
+    return PointFiles(before, after, find_zone(before, zone))
 
 
 def worst_frame(path: Path, zone: int | None, moved: Path, ids: IntArray, metric: Metric) -> Frame:

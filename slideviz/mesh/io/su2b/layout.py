@@ -194,6 +194,23 @@ def find_zones(source: Source) -> tuple[ZonePlace, ...]:
     return tuple(zones)
 
 
+def find_zone(source: Source, number: int | None) -> ZonePlace:
+    """Return where the zone of that number stands, the first where it is None.
+
+    Raises
+    ------
+    MeshError
+        There is none, or the file has a mistake.
+    """
+    zones, chosen = find_zones(source), 1 if number is None else number
+    if not 1 <= chosen <= len(zones):
+        has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"
+        raise MeshError(
+            f"{source.name}: there is no zone {chosen}, for the file has {has}; choose one of these"
+        )
+    return zones[chosen - 1]
+
+
 def _zone(source: Source, begin: int, number: int) -> ZonePlace:
     given = source.whole(begin, f"the number of zone {number}")
     if given != number:

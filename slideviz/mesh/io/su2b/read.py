@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from slideviz.mesh.check import first_fault, path_error, printable
+from slideviz.mesh.check import first_fault, printable
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks, taken
-from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zones
+from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
 
 
@@ -67,8 +67,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
     """
     with path.open("rb") as file:
         source = Source(path, file)
-        zones = find_zones(source)
-        place = chosen_zone(path, zones, zone)
+        place = find_zone(source, zone)
         whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
         done = 0
 
@@ -102,27 +101,10 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
         markers=markers,
         name=printable(path.name),
         zone=place.number,
-        zones=len(zones),
+        zones=source.zones,
         source=path.resolve(),
         binary=form,
     )
-
-
-def chosen_zone(path: Path, zones: tuple[ZonePlace, ...], number: int | None) -> ZonePlace:
-    """Return the zone of that number, the first where it is None.
-
-    Raises
-    ------
-    MeshError
-        There is none.
-    """
-    chosen = 1 if number is None else number
-    if not 1 <= chosen <= len(zones):
-        has = "one zone" if len(zones) == 1 else f"the zones 1 to {len(zones)}"
-        raise path_error(
-            path, f"there is no zone {chosen}, for the file has {has}; choose one of these"
-        )
-    return zones[chosen - 1]
 
 
 def point_blocks(
