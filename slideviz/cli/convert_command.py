@@ -33,7 +33,7 @@ def convert(arguments: argparse.Namespace) -> int:
     binary = arguments.output.suffix.lower() == ".su2b"
     # Without --zone no zone is lost.
     tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
-    if not arguments.zone and mesh.document is not None and binary:
+    if not arguments.zone and mesh.origin.ending == ".su2" and binary:
         for zone in range(2, mesh.zones + 1):
             other = read(arguments.mesh, zone=zone)
             tell_lost(arguments.output, replace(other, zones=1, name=f"{mesh.name}, zone {zone}"))

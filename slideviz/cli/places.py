@@ -167,8 +167,8 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
 
         require_cgns(output, mesh)
     if kind != "su2b":
-        if mesh.zones > 1 and (kind != "su2" or mesh.document is None):
-            ending = ".su2" if mesh.document is not None else ".su2b"
+        ending = mesh.origin.ending
+        if mesh.zones > 1 and f".{kind}" != ending:
             words = f"{output} will have zone {mesh.zone} alone, not the others of {mesh.name}"
             remedy = f"write a {ending} file to keep them"
             print(f"slideviz: warning: {words}; {remedy}", file=sys.stderr, flush=True)

@@ -17,7 +17,7 @@ from slideviz.design.sweep_row import Row
 from slideviz.design.sweep_worker import Answer, Packed, Task, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.io.files import read, usual_ending
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Mesh, Origin
 
 LOST = 3
 """How often a design may lose its worker, before it is a row that says so."""
@@ -158,7 +158,7 @@ class _Tasks:
         self._folder = None if folder is None else Path(folder).absolute()
         boxes = any(isinstance(m, Ffd) for design in designs for m in design.case.motions)
         # The text of the file, which has boxes besides what writing keeps, is much of a mesh.
-        lean = replace(mesh, document=None, binary=None, cgns=None)
+        lean = replace(mesh, origin=Origin())
         self.packed: Packed = packed(mesh if boxes or folder is not None else lean)
         self._mesh, self._width = mesh, len(str(len(designs)))
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from slideviz.errors import CaseError, MeshError
 from slideviz.ffd.box import Box, Index, plane_corners, regular_box
+from slideviz.mesh.io.su2.read import Document
 from slideviz.mesh.io.su2.sections import is_ffd
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -78,16 +79,18 @@ def with_boxes(mesh: Mesh, boxes: Sequence[Box], *, anew: bool = False) -> Mesh:
     for box in by_name.values():
         lines += _written(box, mesh.dim)
     text = "".join(lines).encode("utf-8", "surrogateescape")
-    return replace(mesh, ffd=text if text.endswith(b"\n") else text + b"\n")
+    text = text if text.endswith(b"\n") else text + b"\n"
+    return replace(mesh, origin=replace(mesh.origin, ffd=text))
 
 
 def _lines(mesh: Mesh) -> list[str]:
     """Return the lines of the section, with their ends."""
-    if mesh.ffd is not None:
-        text = mesh.ffd
-    elif mesh.document is not None:
-        raw = mesh.document.raw
-        text = b"".join(part for part in (raw[a:b] for a, b in mesh.document.kept) if is_ffd(part))
+    origin = mesh.origin
+    if origin.ffd is not None:
+        text = origin.ffd
+    elif isinstance(origin, Document):
+        parts = (origin.raw[a:b] for a, b in origin.kept)
+        text = b"".join(part for part in parts if is_ffd(part))
     else:
         text = b""
     return [line.decode("utf-8", "surrogateescape") for line in text.splitlines(keepends=True)]

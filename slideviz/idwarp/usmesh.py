@@ -11,6 +11,7 @@ import numpy as np
 
 from slideviz.errors import CaseError
 from slideviz.idwarp.surface import Surface, surface_at
+from slideviz.mesh.io.cgns.read import CgnsForm
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 if TYPE_CHECKING:
@@ -81,7 +82,9 @@ class USMesh:
         self._surface = Surface(mesh, nodes, nodes)
         # The nodes of a CGNS file: those where its blocks meet are in it several times.
         self._order: IntArray = (
-            np.concatenate(mesh.cgns.numbers) if mesh.cgns else np.arange(len(mesh.points))
+            np.concatenate(mesh.origin.numbers)
+            if isinstance(mesh.origin, CgnsForm)
+            else np.arange(len(mesh.points))
         )
         self._indices: IntArray = np.arange(self._order.size * mesh.dim)
         self._displacement = np.zeros((len(nodes), mesh.dim))

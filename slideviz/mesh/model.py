@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,6 @@ from slideviz.mesh.elements import ELEMENTS
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
-    from slideviz.mesh.io.cgns.read import CgnsForm
-    from slideviz.mesh.io.su2.read import Document
-    from slideviz.mesh.io.su2b.read import BinaryForm
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -167,6 +164,24 @@ class Part:
     n_cells: int
 
 
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """What a mesh keeps of its file besides points, cells and boundaries, for writing it again.
+
+    Each format that keeps something has a class of its own.
+
+    Attributes
+    ----------
+    ending : str
+        Of the files whose format it is; "" where nothing is kept.
+    ffd : bytes or None
+        The boxes for free-form deformation that an SU2 file gets in place of those it had.
+    """
+
+    ending: ClassVar[str] = ""
+    ffd: bytes | None = field(default=None, kw_only=True)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """Points, cells and boundaries of one zone.
@@ -179,8 +194,8 @@ class Mesh:
         The volume elements (3D) or faces (2D).
     markers : tuple of Marker
         The named boundaries, in file order.
-    document : Document or None
-        What an SU2 file held besides, kept for writing.
+    origin : Origin
+        What is kept of the file it was read from.
     name : str
         Where it came from, for messages.
     zone, zones : int
@@ -191,30 +206,21 @@ class Mesh:
         Copies of cells beyond the periodic sides, which only follow the cells they copy.
     remarks : tuple of str
         What was found odd when reading, a sentence each.
-    binary : BinaryForm or None
-        How an SU2 binary file held it, kept for writing.
     part : Part or None
         Of which mesh it is a part: only what is needed of one that is larger than memory.
-    cgns : CgnsForm or None
-        Where a CGNS file has the coordinates, for writing.
-    ffd : bytes or None
-        The boxes for free-form deformation that an SU2 file gets in place of those it had.
     """
 
     points: FloatArray
     cells: Cells
     markers: tuple[Marker, ...] = ()
-    document: Document | None = None
+    origin: Origin = Origin()
     name: str = "mesh"
     zone: int = 1
     zones: int = 1
     source: Path | None = None
     halo: Halo | None = None
     remarks: tuple[str, ...] = ()
-    binary: BinaryForm | None = None
     part: Part | None = None
-    cgns: CgnsForm | None = None
-    ffd: bytes | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen_array(self.points, np.float64))

@@ -47,7 +47,7 @@ def formats_for(mesh: Mesh) -> dict[str, MeshFormat]:
     return {
         end: row
         for end, row in MESH_FORMATS.items()
-        if mesh.dim in row.dims and (end != ".cgns" or mesh.cgns is not None)
+        if mesh.dim in row.dims and (end != ".cgns" or mesh.origin.ending == ".cgns")
     }
 
 
@@ -71,7 +71,7 @@ def left_out(path: Path, mesh: Mesh) -> str:
             lost.append("the quality of the cells")
         if mesh.source is not None and mesh.source.suffix.lower() == ".su2":
             lost.append("what else was in the SU2 file, such as FFD boxes and other zones")
-    if mesh.cgns is not None:
+    if mesh.origin.ending == ".cgns":
         lost.append("what else was in the CGNS file, such as its zones and solutions")
     if not lost:
         return ""

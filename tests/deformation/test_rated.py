@@ -135,8 +135,8 @@ def test_another_order_of_the_reference_is_told(small):
     mesh = sv.read(source)
     assert rated.has_cells_of((source, None), (Path("moved.su2b"), None))
     order = np.arange(len(mesh.cells))[::-1].copy()
-    form = replace(mesh.binary, order=order)
-    sv.write("turned.su2b", replace(mesh, binary=form))
+    form = replace(mesh.origin, order=order)
+    sv.write("turned.su2b", replace(mesh, origin=form))
     again = sv.read("turned.su2b")
     assert again.cells.same_as(mesh.cells)
     with pytest.raises(MeshError, match="has its cells in another order than"):

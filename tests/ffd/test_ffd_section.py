@@ -150,7 +150,7 @@ def test_box_is_added_to_others_or_takes_their_place(tmp_path):
 def test_boxes_of_other_cells_and_of_one_zone_stay_in_place(tmp_path):
     mesh = sv.read(written(tmp_path))
     new = regular_box("NEW", plane_corners(CORNERS[:4, :2] * 1.0), (1, 1, 1), None)
-    fewer = sv.Mesh(mesh.points, mesh.cells, mesh.markers[:2], document=mesh.document)
+    fewer = sv.Mesh(mesh.points, mesh.cells, mesh.markers[:2], origin=mesh.origin)
     sv.write(tmp_path / "fewer.su2", with_boxes(fewer, [new], anew=True))
     text = (tmp_path / "fewer.su2").read_text()
     assert text.count("FFD_NBOX") == 1

@@ -134,7 +134,7 @@ def test_points_and_cells_are_those_of_vtk(tmp_path, real, whole):
         ("blk-2",),
     ]
     theirs = []
-    for data, number in zip(seen.values(), mesh.cgns.numbers, strict=True):
+    for data, number in zip(seen.values(), mesh.origin.numbers, strict=True):
         assert bits(points_of(data)) == bits(mesh.points[number])
         theirs += [sorted(number[nodes].tolist()) for _, nodes in cells_of(data)]
     ends = mesh.cells.offsets

@@ -18,7 +18,7 @@ from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.meshio.bridge import read_with_meshio
-from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 
 GMSH_22 = """\
 $MeshFormat
@@ -552,7 +552,7 @@ def test_vtu_is_what_vtk_reads(tmp_path):
     # In VTK the first triangle of a prism looks outward.
     assert grid.get_cell(2).point_ids == [1, 2, 9, 5, 6, 10]
     grid.save(tmp_path / "again.vtu")
-    assert_same(read(tmp_path / "again.vtu"), replace(mesh, document=None))
+    assert_same(read(tmp_path / "again.vtu"), replace(mesh, origin=Origin()))
 
 
 def test_cell_data_through_meshio(tmp_path):

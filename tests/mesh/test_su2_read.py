@@ -61,7 +61,7 @@ def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, name, block):
     monkeypatch.setattr("slideviz.mesh.io.su2.scan.BLOCK_BYTES", block)
     small = read(path)
     assert_same(small, whole)
-    assert len(small.document.rows) > len(whole.document.rows)
+    assert len(small.origin.rows) > len(whole.origin.rows)
     moved = whole.points.copy()
     moved[::2] /= 3
     texts = [b"".join(su2_blocks(mesh.with_points(moved))) for mesh in (small, whole)]

@@ -23,7 +23,7 @@ from su2_samples import (
 
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import read, write
-from slideviz.mesh.model import Cells, Marker, Mesh
+from slideviz.mesh.model import Cells, Marker, Mesh, Origin
 
 
 @pytest.fixture(scope="module")
@@ -66,8 +66,8 @@ def test_moved_points_change_only_their_coordinates(folder, data, name):
 
 def _coordinates(mesh: Mesh) -> tuple[list[bytes], list[bytes]]:
     """Return the text between the coordinates of the file read, and the coordinates."""
-    raw, between, words = mesh.document.raw[:], [b""], []
-    at, left = raw.lower().index(b"npoin", mesh.document.zone[0]), len(mesh.points)
+    raw, between, words = mesh.origin.raw[:], [b""], []
+    at, left = raw.lower().index(b"npoin", mesh.origin.zone[0]), len(mesh.points)
     between[0] = raw[:at]
     for line in raw[at:].splitlines(keepends=True):
         ink = line.partition(b"%")[0]
@@ -113,7 +113,7 @@ def test_size_of_the_blocks_does_not_matter(tmp_path, monkeypatch, block):
 
 
 def _anew(mesh: Mesh) -> Mesh:
-    return replace(mesh, document=None)
+    return replace(mesh, origin=Origin())
 
 
 @settings(max_examples=80, deadline=None)

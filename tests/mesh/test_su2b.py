@@ -204,9 +204,9 @@ def test_text_and_binary_hold_the_same_bits(tmp_path_factory, mesh, width, order
     assert (folder / "a.su2").read_bytes() == (folder / "b.su2").read_bytes()
     found = read(folder / "a.su2b")
     assert same(found, mesh)
-    form = replace(found.binary, width=width, byte_order=order)
+    form = replace(found.origin, width=width, byte_order=order)
     form = replace(form, before=struct.pack(order + "ii", width, 1))
-    other = b"".join(su2b_blocks(replace(found, binary=form)))
+    other = b"".join(su2b_blocks(replace(found, origin=form)))
     assert same(read(stored(folder, other, "c.su2b")), mesh)
 
 
@@ -380,4 +380,4 @@ def test_four_bytes_hold_only_so_many(monkeypatch):
     form = su2b.BinaryForm(4, "<", b"", b"", None, (), found.cells)
     monkeypatch.setattr(su2b_write, "_LARGEST_4", 10)
     with pytest.raises(MeshError, match="more cells than a file with counts of 4 bytes can hold"):
-        b"".join(su2b_blocks(replace(found, binary=form)))
+        b"".join(su2b_blocks(replace(found, origin=form)))

@@ -11,7 +11,7 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.su2.write import su2_blocks
 from slideviz.mesh.io.su2b.write import su2b_blocks
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Mesh, Origin
 
 _ZONED = {".su2": "su2", ".su2b": "su2b"}
 
@@ -47,12 +47,11 @@ def convert(
     source, target = Path(source), Path(target)
     mesh = read(source, zone) if first is None else first
     kind = _ZONED.get(target.suffix.lower())
-    same = mesh.document is not None if kind == "su2" else mesh.binary is not None
-    if mesh.zones == 1 or (zone is None and kind is not None and same):
+    if mesh.zones == 1 or (zone is None and mesh.origin.ending == f".{kind}"):
         write(target, mesh)  # which keeps what else the file has
         return mesh
     if zone is not None:
-        write(target, replace(mesh, zone=1, zones=1, document=None, binary=None))
+        write(target, replace(mesh, zone=1, zones=1, origin=Origin()))
         return mesh
     if kind is None:
         raise path_error(
@@ -75,4 +74,4 @@ def _zones(kind: str, *meshes: Mesh) -> Iterator[bytes]:
     yield f"NZONE= {len(meshes)}\n".encode()
     for number, mesh in enumerate(meshes, 1):
         yield f"IZONE= {number}\n".encode()
-        yield from su2_blocks(replace(mesh, document=None))
+        yield from su2_blocks(mesh)

@@ -102,9 +102,7 @@ def format_of(path: Path, given: FileFormat | None) -> FileFormat | None:
 
 def usual_ending(mesh: Mesh) -> str:
     """Return the ending that a mesh is offered to be saved with."""
-    if mesh.cgns is not None:
-        return ".cgns"
-    return ".su2" if mesh.binary is None else ".su2b"
+    return mesh.origin.ending or ".su2"
 
 
 def write(

@@ -24,7 +24,7 @@ from slideviz.mesh.io.cgns.read import CgnsForm, read_cgns
 from slideviz.mesh.io.cleanup import ended
 from slideviz.mesh.io.meshio.bridge import read_with_meshio
 from slideviz.mesh.io.su2.scan import Progress
-from slideviz.mesh.model import Cells, Marker, Mesh, frozen_array
+from slideviz.mesh.model import Cells, Marker, Mesh, Origin, frozen_array
 
 CGNS = ".cgns"
 
@@ -127,7 +127,7 @@ def _unpacked(path: Path, answer: bytes, code: int) -> Mesh:
         name=name,
         source=path.resolve(),
         remarks=remarks,
-        cgns=None if form is None else CgnsForm(form[0], form[1], points),
+        origin=Origin() if form is None else CgnsForm(form[0], form[1], points),
     )
 
 
@@ -159,8 +159,9 @@ def main() -> None:
         else:
             markers = [(m.name, (m.cells.types, m.cells.connectivity)) for m in mesh.markers]
             cells = (mesh.cells.types, mesh.cells.connectivity)
-            form = (mesh.cgns.datasets, mesh.cgns.numbers) if mesh.cgns else None
-            content = (mesh.points, cells, markers, mesh.name, mesh.remarks, form)
+            form = mesh.origin
+            kept = (form.datasets, form.numbers) if isinstance(form, CgnsForm) else None
+            content = (mesh.points, cells, markers, mesh.name, mesh.remarks, kept)
             pickle.dump(content, channel)
 
 

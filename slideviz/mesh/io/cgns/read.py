@@ -22,12 +22,12 @@ from slideviz.mesh.io.cgns.tree import Node, cgns_file
 from slideviz.mesh.io.cgns.zone import Zone, conditions, facets_of, read_zone, region_of
 from slideviz.mesh.io.meshio.bridge import flattened, require_own
 from slideviz.mesh.io.meshio.markers import in_node_sets
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 from slideviz.mesh.unique_rows import row_groups
 
 
 @dataclass(frozen=True, eq=False)
-class CgnsForm:
+class CgnsForm(Origin):
     """Where the coordinates of a mesh are in the CGNS file it was read from.
 
     Attributes
@@ -40,6 +40,7 @@ class CgnsForm:
         The points as read.
     """
 
+    ending = ".cgns"
     datasets: tuple[tuple[str, ...], ...]
     numbers: tuple[IntArray, ...]
     points: FloatArray
@@ -98,7 +99,7 @@ def _mesh(path: Path, base: Node, zones: Sequence[Zone], joined: Joined) -> Mesh
     form = CgnsForm(
         tuple(zone.datasets[:dim] for zone in zones), joined.numbers, frozen_array(points, float)
     )
-    mesh = Mesh(form.points, cells, name=printable(path.name), source=path.resolve(), cgns=form)
+    mesh = Mesh(form.points, cells, name=printable(path.name), source=path.resolve(), origin=form)
     check_mesh(mesh)
     markers, remarks = _markers(mesh, base, zones, joined)
     mesh = replace(mesh, markers=markers, remarks=remarks)

@@ -48,8 +48,8 @@ def require_cgns(path: Path, mesh: Mesh) -> tuple[CgnsForm, Path]:
     MeshError
         It was read from no CGNS file, so it cannot be written as one.
     """
-    form, source = mesh.cgns, mesh.source
-    if form is None or source is None or len(mesh.points) != len(form.points):
+    form, source = mesh.origin, mesh.source
+    if not (isinstance(form, CgnsForm) and source and len(mesh.points) == len(form.points)):
         raise path_error(
             path,
             "a CGNS file is written as a copy of the one that the mesh was read from, with other "

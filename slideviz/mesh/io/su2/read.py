@@ -13,14 +13,14 @@ from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.sections import find_bounds, find_sections
 from slideviz.mesh.io.su2.zone import find_zone
-from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
+from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
 
 _SCANNED = 0.2
 """Fraction of the time for reading that finding the lines takes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Document:
+class Document(Origin):
     """An SU2 file as it was read, with the places of the coordinates in it.
 
     Attributes
@@ -41,6 +41,7 @@ class Document:
         First byte and end of each ``SEND_RECEIVE`` marker, and of each unknown section.
     """
 
+    ending = ".su2"
     raw: Source
     rows: Rows
     points: FloatArray
@@ -99,7 +100,7 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         points=points,
         cells=cells,
         markers=markers,
-        document=document,
+        origin=document,
         name=printable(raw.path.name),
         zone=found.bounds.number,
         zones=found.bounds.zones,

@@ -38,18 +38,18 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     MeshError
         The mesh cannot be used, or a marker's name cannot stand in an SU2 file.
     """
-    document = mesh.document
-    if document is not None and _only_points_differ(mesh, document):
+    document, boxes = mesh.origin, mesh.origin.ffd
+    if isinstance(document, Document) and _only_points_differ(mesh, document):
         check_points(mesh)
-        yield from _patched(document, mesh.points, mesh.ffd)
+        yield from _patched(document, mesh.points)
         return
     check_mesh(mesh)
     for marker in mesh.markers:
         _check_name(mesh, marker.name)
-    if document is None:
+    if not isinstance(document, Document):
         yield from _zone(mesh)
         yield from _markers(mesh.markers, 0)
-        yield mesh.ffd or b""
+        yield boxes or b""
         return
     raw, (begin, end) = document.raw, document.zone
     raw.require_same()
@@ -57,8 +57,8 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
     yield from _zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
     kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
-    yield from (text for text in kept if mesh.ffd is None or not is_ffd(text))
-    yield mesh.ffd or b""
+    yield from (text for text in kept if boxes is None or not is_ffd(text))
+    yield boxes or b""
     yield from (raw[a:b] for a, b in _ranges(end, raw.size))
     raw.require_same()
 
@@ -74,11 +74,11 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
     )
 
 
-def _patched(document: Document, points: FloatArray, ffd: bytes | None) -> Iterator[bytes]:
+def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
     """Yield the file with every coordinate that changed, in any bit, and other boxes in place."""
     raw = document.raw
     raw.require_same()
-    edits = [] if ffd is None else _edits(document, ffd)
+    edits = [] if document.ffd is None else _edits(document, document.ffd)
     done = 0
     tasks: list[tuple[int, int] | Piece | bytes] = []
     for piece in document.rows:

@@ -16,11 +16,11 @@ from slideviz.mesh.check import first_fault, printable
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks, taken
 from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zone
-from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, frozen_array
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
-class BinaryForm:
+class BinaryForm(Origin):
     """How a ``.su2b`` file held a mesh, so that it can be written the same way.
 
     Attributes
@@ -39,6 +39,7 @@ class BinaryForm:
         The cells as read.
     """
 
+    ending = ".su2b"
     width: int
     byte_order: Literal["<", ">"]
     before: bytes
@@ -103,7 +104,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
         zone=place.number,
         zones=source.zones,
         source=path.resolve(),
-        binary=form,
+        origin=form,
     )
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
+from slideviz.mesh.io.su2.read import Document
 from slideviz.mesh.io.su2b.elements import BLOCK, SIZES, taken
 from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.io.su2b.read import BinaryForm
@@ -68,8 +69,8 @@ def su2b_blocks(*meshes: Mesh) -> Iterator[bytes]:
     for mesh in meshes:
         check_mesh(mesh)
         require_binary(mesh)
-    form = meshes[0].binary if len(meshes) == 1 else None
-    if form is None:
+    form = meshes[0].origin
+    if len(meshes) > 1 or not isinstance(form, BinaryForm):
         yield from file_head(len(meshes))
         for number, mesh in enumerate(meshes, 1):
             yield from zone_blocks(_zone(mesh, _by_type(mesh.cells)), number)
@@ -91,7 +92,7 @@ def require_binary(mesh: Mesh) -> None:
     MeshError
         It has a halo, or a boundary has a name that cannot stand in such a file.
     """
-    if mesh.halo is not None or (mesh.document is not None and mesh.document.sends):
+    if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
         raise MeshError(
             f"{mesh.name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot "
             "hold; write a .su2 file, or make the mesh without its halo"
@@ -108,9 +109,9 @@ def require_binary(mesh: Mesh) -> None:
 
 def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
     """Return what an SU2 binary file does not keep of the text file of a mesh, in words."""
-    document = mesh.document
-    boxes = ("its FFD boxes",) if mesh.ffd else ()
-    if document is None:
+    document = mesh.origin
+    boxes = ("its FFD boxes",) if document.ffd else ()
+    if not isinstance(document, Document):
         return boxes
     keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
     named = ", ".join(dict.fromkeys(key.upper() for key in keys))
