@@ -50,7 +50,7 @@ def unsoundness(
     least : float
         A distance up to which any motion may carry nodes, however small it is.
     """
-    largest = part * float(np.linalg.norm(setup.target, axis=1).max(initial=0.0))
+    largest = part * setup.largest
     if solution.lost > HOPELESS * largest:
         return (
             f"the interpolation misses its own control nodes by {solution.lost:.3g}, where the "
@@ -85,15 +85,21 @@ def unsoundness(
 
 
 def overshoot_of_rest(
-    setup: Setup, mesh: Mesh, moved: FloatArray, part: float, length: float
+    setup: Setup, mesh: Mesh, after: FloatArray, part: float, length: float
 ) -> str | None:
     """Return in words that a node that is no boundary goes too far: ``length``, in the frame.
 
-    Parameters as of ``unsoundness``, of the skin of a mesh that such nodes are not in.
+    Parameters
+    ----------
+    mesh, after
+        The skin of a mesh that such nodes are not in, and its points (n, d) after the step.
+    part : float
+        Of the whole displacement, 0 to 1.
     """
-    largest = part * float(np.linalg.norm(setup.target, axis=1).max(initial=0.0))
+    largest = part * setup.largest
     if length <= GROWTH * largest:
         return None
+    moved = setup.frame.coords(after)
     shift = moved - setup.coords
     if length <= GROWTH * _reach(setup, shift, largest, ("moving", "fixed", "sliding")):
         return None
@@ -134,7 +140,7 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     apart = np.linalg.norm(shift - shift[others], axis=1)
     steep = np.divide(apart, gaps, out=np.zeros_like(apart), where=gaps > 0)
     k = int(np.argmax(steep))
-    usual = float(np.linalg.norm(setup.target, axis=1).max()) / mesh.extent
+    usual = setup.largest / mesh.extent
     if steep[k] < STEEP * usual:
         return (
             f"{setup.basis.kernel} is too smooth for nodes so close to each other; use a less "

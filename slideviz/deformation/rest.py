@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -79,6 +80,12 @@ class Rest:
         at = np.flatnonzero(numbers[np.minimum(where, len(numbers) - 1)] == nodes)
         return at, where[at]
 
+    @cached_property
+    def _sector(self) -> tuple[float, float]:
+        """Return the least and the largest second coordinate of the skin: an angle as a length."""
+        angles = self.setup.coords[:, 1]
+        return float(angles.min()), float(angles.max())
+
     def _require_enclosed(
         self, nodes: IntArray, points: FloatArray, start: FloatArray, inner: np.ndarray
     ) -> None:
@@ -86,10 +93,10 @@ class Rest:
 
         The frame of the whole mesh would be another one then.
         """
-        frame, own = self.setup.frame, self.setup.coords
+        frame = self.setup.frame
         if not frame.cylindrical:
             return
-        low, high = own[:, 1].min(), own[:, 1].max()
+        low, high = self._sector
         out = (start[:, 0] > frame.radius) | (start[:, 1] < low) | (start[:, 1] > high)
         out &= inner
         if out.any():
@@ -106,9 +113,8 @@ class Rest:
     ) -> None:
         length = np.linalg.norm(shift, axis=1)
         k = int(np.argmax(length))
-        moved = self.setup.frame.coords(step.mesh.points)
-        far = float(length[k])
-        message = overshoot_of_rest(self.setup, self.skin, moved, step.part, far)
+        far, after = float(length[k]), step.mesh.points
+        message = overshoot_of_rest(self.setup, self.skin, after, step.part, far)
         if message:
             where = ", ".join(f"{value:.6g}" for value in points[k])
             raise UnsoundError(f"step {step.index}: node {nodes[k]} at ({where}) {message}")

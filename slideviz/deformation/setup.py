@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -105,6 +105,11 @@ class Setup:
     solve: Callable[[Problem, Watch], Solution]
     halo: Halo | None
     warnings: tuple[str, ...]
+
+    @cached_property
+    def largest(self) -> float:
+        """Return the largest displacement that is asked for, in the frame."""
+        return float(np.linalg.norm(self.target, axis=1).max(initial=0.0))
 
     def once(self, nodes: IntArray) -> np.ndarray:
         """Tell which nodes stand for themselves and all their periodic images."""
