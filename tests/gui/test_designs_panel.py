@@ -33,9 +33,9 @@ def passage(window, driver, tmp_path, monkeypatch):
 
 
 def fill(panel, column, values):
-    panel.column.setCurrentIndex(panel.column.findData(column))
-    panel.values.setText(values)
-    QTest.mouseClick(panel.add, LEFT)
+    panel.rows.column.setCurrentIndex(panel.rows.column.findData(column))
+    panel.rows.values.setText(values)
+    QTest.mouseClick(panel.rows.add, LEFT)
 
 
 def run(panel, qtbot):
@@ -49,18 +49,18 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
     assert window.docks["designs"].isVisible()
     fill(panel, "airfoil.rotate.angle_deg", "-6 to 0 in 3")
     fill(panel, "STEPS", "2")
-    assert panel.model.rowCount() == 3
+    assert panel.rows.model.rowCount() == 3
     assert panel.run.text() == "Run 3 designs"
     run(panel, qtbot)
     assert panel.said.text().startswith("3 designs done")
     assert set(panel.table.results) == {1, 2, 3}
-    columns = [panel.model.headerData(k, Qt.Orientation.Horizontal) for k in range(4)]
+    columns = [panel.rows.model.headerData(k, Qt.Orientation.Horizontal) for k in range(4)]
     assert columns == ["airfoil.rotate\nangle_deg", "STEPS", "min", "mean"]
     row = panel.table.results[3]
-    assert panel.model.index(2, 2).data() == format(row.min, ".4f")
+    assert panel.rows.model.index(2, 2).data() == format(row.min, ".4f")
     # A click on the point of the second design in the plot.
-    qtbot.waitUntil(lambda: not panel.canvas.busy and bool(panel.canvas.figure.axes))
-    axes, canvas = panel.canvas.figure.axes[0], panel.canvas
+    qtbot.waitUntil(lambda: not panel.plot.canvas.busy and bool(panel.plot.canvas.figure.axes))
+    axes, canvas = panel.plot.canvas.figure.axes[0], panel.plot.canvas
     second = panel.table.results[2]
     x, y = axes.transData.transform((-3.0, second.min))
     wide, high = canvas._scale
@@ -78,8 +78,8 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
     assert np.array_equal(shown.last.mesh.points, last.mesh.points)
     # A click on a row; and once more on the first, whose run is there already.
     for number in (3, 2):
-        where = panel.view.visualRect(panel.model.index(number - 1, 0)).center()
-        QTest.mouseClick(panel.view.viewport(), LEFT, Qt.KeyboardModifier.NoModifier, where)
+        where = panel.rows.view.visualRect(panel.rows.model.index(number - 1, 0)).center()
+        QTest.mouseClick(panel.rows.view.viewport(), LEFT, Qt.KeyboardModifier.NoModifier, where)
         driver.settle()
         assert window.store.session.run_shown.name == f"design {number}"
     assert len(window.store.session.runs) == 2
@@ -109,7 +109,7 @@ def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     fill(panel, "SLIDING_MODE", "ps, none")
     run(panel, qtbot)
     assert "1 failed: PERIODIC_MODE= moving needs" in panel.said.text()
-    assert [panel.model.index(k, 1).data() for k in (0, 1)][1] == "failed"
+    assert [panel.rows.model.index(k, 1).data() for k in (0, 1)][1] == "failed"
     panel.show_design(2)
     assert panel.said.text().startswith("Design 2: PERIODIC_MODE= moving needs")
     assert panel.shown is None
@@ -120,11 +120,11 @@ def test_mistakes_are_told_and_change_nothing(passage):
     fill(panel, "STEPS", "1, many")
     assert "whole number" in panel.said.text()
     fill(panel, "airfoil.translate.y", "0 to 1 in")
-    assert panel.model.rowCount() == 0
+    assert panel.rows.model.rowCount() == 0
     fill(panel, "STEPS", "1, 2")
-    panel.model.setData(panel.model.index(0, 0), "x")
+    panel.rows.model.setData(panel.rows.model.index(0, 0), "x")
     assert panel.table.rows == (("1",), ("2",))
-    panel.model.setData(panel.model.index(0, 0), "3")
+    panel.rows.model.setData(panel.rows.model.index(0, 0), "3")
     assert panel.table.rows == (("3",), ("2",))
 
 
@@ -135,7 +135,7 @@ def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
     answers("ask_table", file)
     QTest.mouseClick(panel.load, LEFT)
     assert panel.table.rows == (("0.05",), ("0.1",))
-    panel.view.selectRow(0)
+    panel.rows.view.selectRow(0)
     QTest.mouseClick(panel.remove, LEFT)
     assert panel.table.rows == (("0.1",),)
     answers("ask_save", tmp_path / "out.csv")
@@ -164,8 +164,8 @@ def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread):
 def test_another_mesh_has_other_designs(window, passage, driver, passage_file):
     fill(passage, "STEPS", "1, 2")
     driver.open(passage_file)
-    assert passage.model.rowCount() == 0
-    assert passage.column.findData("airfoil.rotate.angle_deg") < 0
+    assert passage.rows.model.rowCount() == 0
+    assert passage.rows.column.findData("airfoil.rotate.angle_deg") < 0
 
 
 def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):

@@ -199,6 +199,6 @@ def test_designs_are_not_swept_of_its_boundary_alone(stator):
     stator.window.actions_.by_name["designs"].trigger()
     panel = stator.window.docks["designs"].findChild(DesignsPanel)
     assert "sweep it with `slideviz sweep`" in panel.said.text()
-    assert not any(widget.isEnabled() for widget in (panel.add, panel.load, panel.run))
+    assert not any(widget.isEnabled() for widget in (panel.rows.add, panel.load, panel.run))
     panel.start()
     assert not panel.runner.busy

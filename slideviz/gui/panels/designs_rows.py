@@ -1,0 +1,95 @@
+"""The rows of a table of designs, and the fields that fill it."""
+
+from __future__ import annotations
+
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QLineEdit,
+    QStackedWidget,
+    QTableView,
+    QWidget,
+)
+
+from slideviz.case.model import Case
+from slideviz.gui.panels.designs_model import DesignsModel
+from slideviz.gui.widgets.build import Do, hint_label, in_column, in_row, push_button
+from slideviz.gui.widgets.fields import Choice
+from slideviz.session.design_table import DesignTable, column_choices
+
+ABOUT = (
+    "Each row is a design: a run with other numbers of the motions, or other settings. Choose a "
+    "number, give its values, and add them; another number is combined with all that there are. "
+    "A click on a design that was run, here or in the plot, shows its mesh."
+)
+RANGE = "-8 to 0 in 9, or 1, 2, 5"
+
+
+class DesignRows(QWidget):
+    """The rows, and above them what varies, its values, and the button that adds them.
+
+    Parameters
+    ----------
+    add : callable
+        What the button does.
+    """
+
+    def __init__(self, add: Do) -> None:
+        super().__init__()
+        self.column = Choice({}, "What varies: a number of a motion, or a setting.", "column")
+        self.values = QLineEdit()
+        self.values.setObjectName("values")
+        self.values.setPlaceholderText(RANGE)
+        self.values.setToolTip("A range, as -8 to 0 in 9, or values with commas between them.")
+        self.column.chosen.connect(lambda _: self.values.clear())
+        self.values.returnPressed.connect(add)
+        self.add = push_button("Add", "Give each design there is each of these values.", add)
+        self.add.setMaximumWidth(64)
+        self.model = DesignsModel()
+        self.view = self._make_view()
+        self.hint = hint_label(ABOUT, Qt.AlignmentFlag.AlignTop)
+        self.hint.setMargin(6)
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self.hint)
+        self._stack.addWidget(self.view)
+        fill = in_row(
+            self.column, self.values, self.add, wide=[self.column, self.values], spacing=4
+        )
+        in_column(fill, self._stack, wide=[self._stack], spacing=4, on=self)
+
+    def _make_view(self) -> QTableView:
+        view = QTableView()
+        view.setObjectName("designs_table")
+        view.setModel(self.model)
+        view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        view.setAlternatingRowColors(True)
+        view.setWordWrap(False)
+        view.setShowGrid(False)
+        view.setTabKeyNavigation(False)
+        view.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + 6)
+        heads = view.horizontalHeader()
+        heads.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        heads.setResizeContentsPrecision(50)
+        return view
+
+    def show_columns(self, case: Case | None) -> None:
+        """Offer what can vary in a case."""
+        chosen = self.column.currentData()
+        self.column.clear()
+        if case is not None:
+            for name, value in column_choices(case).items():
+                self.column.addItem(f"{name}   (now {value})", name)
+        self.column.show_value(chosen)
+
+    def show_table(self, table: DesignTable, editable: bool) -> None:
+        """Show a table, or where it has no rows what they are good for."""
+        if table is not self.model.table:
+            self.model.show(table)
+        self.model.editable = editable
+        self._stack.setCurrentWidget(self.view if table.rows else self.hint)
+
+    @property
+    def selected(self) -> set[int]:
+        """Return the places of the selected rows."""
+        return {index.row() for index in self.view.selectionModel().selectedRows()}
