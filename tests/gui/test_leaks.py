@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from qtpy.QtCore import QCoreApplication, QEvent
+from qtpy.QtWidgets import QApplication
 
 from slideviz.gui.widgets.plot_image import THREAD
 from slideviz.gui.window import MainWindow
@@ -75,9 +76,10 @@ def case_file(sample_folder):
 
 
 def test_five_windows_leave_nothing(qtbot, settings, case_file, monkeypatch):
-    threads = threading.active_count()
+    threads, widgets = threading.active_count(), set(QApplication.allWidgets())
     windows(qtbot, settings, case_file, monkeypatch, 5)
     assert threading.active_count() <= threads
+    assert set(QApplication.allWidgets()) <= widgets
 
 
 @pytest.mark.slow

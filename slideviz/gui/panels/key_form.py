@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QFormLayout, QLabel
+from qtpy.QtWidgets import QComboBox, QFormLayout, QLabel
 
 from slideviz.case.key import Form, Key
 from slideviz.case.keys import BY_WEIGHT
@@ -38,7 +38,7 @@ def _number_box(kind: Kind) -> NumberBox:
     field = NumberBox()
     field.setRange(*kind.span)
     field.setSpecialValueText(kind.words.get(kind.span[0], ""))
-    field.setMinimumHeight(Choice({}).sizeHint().height())
+    field.setMinimumHeight(QComboBox().sizeHint().height())
     return field
 
 
