@@ -18,7 +18,7 @@ INTERSECTION_COLOUR = "#e8112d"
 
 
 @dataclass(frozen=True)
-class Look:
+class ColorScheme:
     """A color scheme: colours of a view that belong together.
 
     Attributes
@@ -39,6 +39,6 @@ class Look:
     ghost: str
 
 
-LIGHT = Look("light", "#ffffff", "#e9edf2", "#20262e", "#5b6672", "#e3e8ee", "#4a5562")
-DARK = Look("dark", "#1b1e23", "#2c323a", "#e6eaf0", "#8b96a3", "#3c444e", "#aab4c0")
-PAPER = Look("paper", "#ffffff", "#ffffff", "#000000", "#3a3a3a", "#e3e8ee", "#777777")
+LIGHT = ColorScheme("light", "#ffffff", "#e9edf2", "#20262e", "#5b6672", "#e3e8ee", "#4a5562")
+DARK = ColorScheme("dark", "#1b1e23", "#2c323a", "#e6eaf0", "#8b96a3", "#3c444e", "#aab4c0")
+PAPER = ColorScheme("paper", "#ffffff", "#ffffff", "#000000", "#3a3a3a", "#e3e8ee", "#777777")

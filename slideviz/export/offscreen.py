@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.scene.color_legend import set_letters
 
@@ -69,7 +69,7 @@ def font_scale(size: tuple[int, int]) -> float:
     return max(size[1] / _NORMAL_HEIGHT, 0.6)
 
 
-def write_title(plotter: Any, words: str, look: Look, letters: float, room: float) -> None:
+def write_title(plotter: Any, words: str, scheme: ColorScheme, letters: float, room: float) -> None:
     """Write a line or two along the upper edge, in the middle of so many pixels of height.
 
     They begin at the left, so that those of a film do not tremble when a digit more comes, and
@@ -78,10 +78,10 @@ def write_title(plotter: Any, words: str, look: Look, letters: float, room: floa
     import pyvista as pv
 
     title = pv.Text(words)
-    set_letters(title.prop, look, letters)
+    set_letters(title.prop, scheme, letters)
     title.prop.SetLineSpacing(1.25)
     # The mesh of a view that was zoomed into may lie behind.
-    title.prop.SetBackgroundColor(*pv.Color(look.background_top).float_rgb)
+    title.prop.SetBackgroundColor(*pv.Color(scheme.background_top).float_rgb)
     title.prop.SetBackgroundOpacity(0.7)
     title.prop.SetVerticalJustificationToCentered()
     title.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()

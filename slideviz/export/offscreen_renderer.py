@@ -249,7 +249,7 @@ class OffscreenRenderer:
             room = options.title_room * options.scale
             # Those of a film are smaller than its other letters: it has more to say.
             letters = TITLE * size * options.scale / (LETTERS if options.film else 1.0)
-            write_title(plotter, words, self._scene.look, letters, room)
+            write_title(plotter, words, self._scene.scheme, letters, room)
         name_mark(plotter, self._scene, options.scale)
         return image_of(plotter, options.background == "transparent")
 
@@ -276,7 +276,7 @@ class OffscreenRenderer:
         scene, camera, like = self._scene, self._plotter.camera, self.like
         if len(self.shown(session, options)) == 2:
             options = panes(options, options.gap)[0]
-        scene.set_look(PAPER if like is None or options.background != "shown" else like.look)
+        scene.set_scheme(PAPER if like is None or options.background != "shown" else like.scheme)
         self._prepare(session, options)
         if like is not None:
             scene.take_camera(like)

@@ -209,8 +209,8 @@ def name_mark(plotter: Any, scene: Scene, scale: float) -> None:
     if not ((seen >= 0.0) & (seen <= 1.0)).all():
         return
     text = pv.Text(words)
-    set_letters(text.prop, scene.look, 13.0 * scale)
-    text.prop.SetBackgroundColor(*pv.Color(scene.look.background_top).float_rgb)
+    set_letters(text.prop, scene.scheme, 13.0 * scale)
+    text.prop.SetBackgroundColor(*pv.Color(scene.scheme.background_top).float_rgb)
     text.prop.SetBackgroundOpacity(0.7)
     text.prop.SetVerticalJustificationToCentered()
     # Towards the middle, where there is room for it.

@@ -16,7 +16,7 @@ from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
 
 from slideviz.case.model import Case
 from slideviz.case.motion_words import mesh_words
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
 from slideviz.gui.dialogs.exporter import Exports
@@ -86,7 +86,7 @@ class MainWindow(Services):
         self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
         # Before there are widgets, each of which a style sheet that comes later would polish anew.
-        look = self._choose_theme(str(self.settings.value("theme", "system")))
+        scheme = self._choose_theme(str(self.settings.value("theme", "system")))
         self.store = Store()
         self.banner = Banner()
         self.offer = Banner()
@@ -106,7 +106,7 @@ class MainWindow(Services):
         self._make_status()
         self.actions_ = Actions(self)
         self._connect()
-        self._take_look(look)
+        self._take_scheme(scheme)
         self.docks_.restore(self.settings)
         self.store.listen(self.viewing.sync)
         self.store.listen(lambda *_: self.sync_actions())
@@ -310,22 +310,22 @@ class MainWindow(Services):
 
     def set_theme(self, name: str) -> None:
         """Change to the light or dark theme, or to that of the desktop."""
-        self._take_look(self._choose_theme(name))
+        self._take_scheme(self._choose_theme(name))
 
-    def _choose_theme(self, name: str) -> Look:
+    def _choose_theme(self, name: str) -> ColorScheme:
         name = name if name in theme.THEMES else "system"
         self.settings.setValue("theme", name)
         return theme.apply(name)
 
-    def _take_look(self, look: Look) -> None:
+    def _take_scheme(self, scheme: ColorScheme) -> None:
         redraw_icons(self)
         self.sync_actions()
         # Words about inverted cells have the theme's red.
         self.player.sync(self.store.session)
         for panel in self.findChildren(Panel):
-            panel.take_theme(look)
-        self.section_views.set_look(look)
-        self.viewing.set_look(look)
+            panel.take_theme(scheme)
+        self.section_views.set_scheme(scheme)
+        self.viewing.set_scheme(scheme)
 
     # Qt --------------------------------------------------------------------------------
 

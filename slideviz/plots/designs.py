@@ -121,8 +121,8 @@ def against_designs(
             ring |= {"markerfacecolor": "none", "markeredgecolor": SELECTED_COLOUR}
             axes.plot(curve.places[k], curve.values[k], "o", gid="shown", clip_on=False, **ring)
     if what == "quality":
-        for word, face in (("minimum", style.look.text), ("mean", style.look.background)):
-            dot: dict[str, Any] = {"markerfacecolor": face, "color": style.look.text}
+        for word, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
+            dot: dict[str, Any] = {"markerfacecolor": face, "color": style.scheme.text}
             axes.plot([], [], "o", markersize=5, label=word, **dot)
     words = curves[0].words if curves else ()
     if words:
@@ -136,7 +136,7 @@ def against_designs(
         add_legend(axes, style, title=title, title_fontsize=style.size, **beside)
         legend = axes.get_legend()
         if legend is not None:
-            legend.get_title().set_color(style.look.text)
+            legend.get_title().set_color(style.scheme.text)
 
 
 def _draw_curve(
@@ -156,7 +156,7 @@ def _draw_curve(
     label = curve.label if series is not None and curve.label else None
     axes.plot(curve.places, sound, label=label, gid=f"curve:{curve.label}", **line)
     if mean:
-        hollow = line | {"markerfacecolor": style.look.background}
+        hollow = line | {"markerfacecolor": style.scheme.background}
         axes.plot(curve.places, curve.mean, gid=f"mean:{curve.label}", **hollow)
     if curve.inverted.any():
         places, values = curve.places[curve.inverted], curve.values[curve.inverted]

@@ -57,15 +57,15 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
         # Of many steps some markers do, those of each run at other steps.
         every = max(1, len(run.steps) // 6)
         look["markevery"] = (index % every, every)
-        hollow = {**look, "markerfacecolor": style.look.background}
+        hollow = {**look, "markerfacecolor": style.scheme.background}
         axes.plot(run.steps, run.minimum, label=run.label, gid=f"minimum:{run.label}", **look)
         axes.plot(run.steps, run.mean, gid=f"mean:{run.label}", **hollow)
-    for what, face in (("minimum", style.look.text), ("mean", style.look.background)):
+    for what, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
         dot: dict[str, Any] = {
             "marker": "o",
             "markersize": 5,
             "linestyle": "",
-            "color": style.look.text,
+            "color": style.scheme.text,
         }
         axes.plot([], [], label=what, markerfacecolor=face, **dot)
     _quality_limits(axes, [v for run in runs for v in (*run.minimum, *run.mean)])
@@ -95,7 +95,9 @@ def convergence(
         axes.plot(run.control_nodes[shown], run.error[shown], label=run.label, **line)
         if run.tolerance and run.tolerance not in tolerances:
             tolerances.add(run.tolerance)
-            axes.axhline(run.tolerance, color=style.look.text, linewidth=0.9, linestyle=(0, (4, 3)))
+            axes.axhline(
+                run.tolerance, color=style.scheme.text, linewidth=0.9, linestyle=(0, (4, 3))
+            )
             axes.annotate(
                 f"tolerance {run.tolerance:g}",
                 (0.0, run.tolerance),
@@ -105,7 +107,7 @@ def convergence(
                 ha="left",
                 va="top",
                 fontsize=style.size,
-                color=style.look.text,
+                color=style.scheme.text,
             )
     axes.set_xlim(left=0)
     if tolerances:  # room for the words below the lowest line

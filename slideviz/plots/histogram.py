@@ -112,7 +112,7 @@ def draw_distribution(
 def _look(outline: Outline, style: Style) -> dict[str, Any]:
     """Return how an outline is drawn."""
     if outline.series is None:
-        return {"color": style.look.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
+        return {"color": style.scheme.ghost, "linestyle": (0, (1, 2.2)), "linewidth": 1.2}
     look = style.series(outline.series)
     return {"color": look.colour, "linestyle": look.dash, "linewidth": style.width}
 
@@ -135,7 +135,7 @@ def _fill(axes: Axes, bars: Bars, paler: bool, foot: float, style: Style) -> Non
         one.counts,
         one.edges,
         baseline=None,
-        color=style.look.text,
+        color=style.scheme.text,
         linewidth=width,
         gid="outline",
     )
@@ -148,7 +148,7 @@ def _colours(bars: Bars, paler: bool, style: Style) -> list[tuple[float, ...]]:
     given = bars.colours if bars.colours is not None else [style.series(0).colour]
     own = np.array([to_rgb(colour) for colour in given])
     if paler:
-        own += _PALER * (np.array(to_rgb(style.look.background)) - own)
+        own += _PALER * (np.array(to_rgb(style.scheme.background)) - own)
     count = len(bars.distribution.counts)
     return [tuple(rgb) for rgb in np.broadcast_to(own, (count, 3))]
 
@@ -213,14 +213,14 @@ def _entries(axes: Axes, bars: Bars | None, paler: bool, style: Style) -> dict[s
     handles, labels = axes.get_legend_handles_labels()
     if bars is None:
         return {"handles": handles, "labels": labels}
-    key = Patch(edgecolor=style.look.text)
+    key = Patch(edgecolor=style.scheme.text)
     colours, there = _colours(bars, paler, style), np.flatnonzero(bars.distribution.counts)
     first, last = (there[0], there[-1]) if len(there) else (0, len(colours) - 1)
     some = [colours[at] for at in np.linspace(first, last, _SWATCH).astype(int)]
     return {
         "handles": [key, *handles],
         "labels": [bars.label, *labels],
-        "handler_map": {key: _swatch(some, style.look.text)},
+        "handler_map": {key: _swatch(some, style.scheme.text)},
     }
 
 

@@ -106,7 +106,7 @@ def draw_histogram(
     if left_out and legend is not None:
         legend.set_title(f"without {left_out} other run{'s' if left_out > 1 else ''}")
         legend.get_title().set_fontsize(style.size)
-        legend.get_title().set_color(style.look.text)
+        legend.get_title().set_color(style.scheme.text)
 
 
 def compared(session: Session) -> tuple[list[Run], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, Look
+from slideviz.color_scheme import DARK, INVERTED_COLOUR, LIGHT, PAPER, ColorScheme
 from slideviz.plots.written import SMALLEST
 from slideviz.terms import PALETTE
 
@@ -56,7 +56,7 @@ class Style:
 
     Attributes
     ----------
-    look : Look
+    scheme : ColorScheme
         Background and letters; series have lighter colours on a dark one.
     size : float
         Height of letters in points, 8 or more at the printed size.
@@ -66,7 +66,7 @@ class Style:
         Whether the axes get a legend of their own (when there is more than one series).
     """
 
-    look: Look = PAPER
+    scheme: ColorScheme = PAPER
     size: float = SMALLEST + 0.5
     width: float = 1.4
     legend: bool = True
@@ -74,7 +74,7 @@ class Style:
     @property
     def dark(self) -> bool:
         """Tell whether letters are lighter than the background."""
-        return _brightness(self.look.text) > _brightness(self.look.background)
+        return _brightness(self.scheme.text) > _brightness(self.scheme.background)
 
     def series(self, index: int) -> Series:
         """Return the series of that number, from 0; 49 of them differ."""
@@ -109,18 +109,18 @@ ON_DARK = Style(DARK)
 
 def dress(axes: Axes, style: Style, x_label: str, y_label: str) -> None:
     """Give axes their labels, colours, letters and a quiet grid."""
-    text, size = style.look.text, max(style.size, SMALLEST)
-    axes.set_facecolor(style.look.background)
+    text, size = style.scheme.text, max(style.size, SMALLEST)
+    axes.set_facecolor(style.scheme.background)
     figure = axes.get_figure()
     if figure is not None:
-        figure.set_facecolor(style.look.background)
+        figure.set_facecolor(style.scheme.background)
     axes.set_xlabel(x_label, fontsize=size, color=text)
     axes.set_ylabel(y_label, fontsize=size, color=text)
-    axes.tick_params(which="both", colors=text, labelsize=size, color=style.look.edge)
+    axes.tick_params(which="both", colors=text, labelsize=size, color=style.scheme.edge)
     for name, spine in axes.spines.items():
         spine.set_visible(name in ("left", "bottom"))
-        spine.set_color(style.look.edge)
-    axes.grid(True, color=style.look.edge, alpha=0.22, linewidth=0.6)
+        spine.set_color(style.scheme.edge)
+    axes.grid(True, color=style.scheme.edge, alpha=0.22, linewidth=0.6)
     axes.set_axisbelow(True)
     for letters in (axes.xaxis.get_offset_text(), axes.yaxis.get_offset_text()):
         letters.set_fontsize(size)
@@ -134,8 +134,8 @@ def add_legend(axes: Axes, style: Style, **options: Any) -> None:
         return
     axes.legend(
         fontsize=max(style.size, SMALLEST),
-        labelcolor=style.look.text,
-        facecolor=style.look.background,
+        labelcolor=style.scheme.text,
+        facecolor=style.scheme.background,
         edgecolor="none",
         framealpha=0.8,
         handlelength=3.2,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.plots.ticks import bar_ticks
 from slideviz.terms import ROLES, ColourByTerm, Role
@@ -33,14 +33,14 @@ class Plate:
     plotter : pyvista.BasePlotter
     name : str
         Of the actor. What is drawn after it lies above it.
-    look : Look
+    scheme : ColorScheme
     """
 
-    def __init__(self, plotter: Any, name: str, look: Look) -> None:
+    def __init__(self, plotter: Any, name: str, scheme: ColorScheme) -> None:
         from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
         self.plotter = plotter
-        self._look = look
+        self._scheme = scheme
         self._shape = pv.PolyData(np.zeros((4, 3)), faces=[4, 0, 1, 2, 3])
         mapper, actor = vtkPolyDataMapper2D(), vtkActor2D()
         mapper.SetInputData(self._shape)
@@ -65,7 +65,7 @@ class Plate:
         """Return red, green, blue and opacity at a part of the view's height."""
         below, above = (
             np.array(pv.Color(name).int_rgb, float)
-            for name in (self._look.background, self._look.background_top)
+            for name in (self._scheme.background, self._scheme.background_top)
         )
         mixed: FloatArray = below + np.clip(height, 0.0, 1.0) * (above - below)
         return (*(int(part) for part in mixed.round()), round(255 * OPACITY))
@@ -91,14 +91,14 @@ def _font_file() -> str:
     return str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 
-def set_letters(text: Any, look: Look, size: float) -> None:
+def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
     """Give a vtkTextProperty the font, the color scheme's colour, and a size in pixels."""
     import pyvista as pv
 
     text.SetFontFamily(_VTK_FONT_FILE)
     text.SetFontFile(_font_file())
     text.SetFontSize(round(size))
-    text.SetColor(*pv.Color(look.text).float_rgb)
+    text.SetColor(*pv.Color(scheme.text).float_rgb)
     text.SetBold(False)
     text.SetItalic(False)
     text.SetShadow(False)
@@ -136,13 +136,13 @@ def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> No
     corner.SetValue(1.0, 1.0)
     for what, shade, edge, letters in (
         (sign, colour, STRIP - 8, 1.4 * size),
-        (word, stage.look.text, right, size),
+        (word, stage.scheme.text, right, size),
     ):
         text = pv.Text(what)
         text.GetPositionCoordinate().SetReferenceCoordinate(corner)
         text.GetPositionCoordinate().SetCoordinateSystemToViewport()
         text.GetPositionCoordinate().SetValue(-edge * stage.font_scale, -down * stage.font_scale)
-        set_letters(text.prop, stage.look, letters * stage.font_scale)
+        set_letters(text.prop, stage.scheme, letters * stage.font_scale)
         text.prop.color = shade
         text.prop.SetVerticalJustificationToCentered()
         name = f"{prefix}{word}:{what}"
@@ -160,22 +160,22 @@ def clear_legend(plotter: Any) -> None:
 
 def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool) -> None:
     """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
-    look, font_scale, title, unit = stage.look, stage.font_scale, what.label, what.unit
+    scheme, font_scale, title, unit = stage.scheme, stage.font_scale, what.label, what.unit
     bar = stage.plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
         vertical=True,
         interactive=False,
-        color=look.text,
+        color=scheme.text,
         render=False,
     )
     bar.SetUnconstrainedFontSize(True)
     bar.SetTitle(f"{title}\n{unit}" if unit else title)
     # Longer words would be cut off at the edge of the view.
     size = (14 if len(title) < _LONG else 13) if not unit else 12
-    set_letters(bar.GetTitleTextProperty(), look, size * font_scale)
-    set_letters(bar.GetLabelTextProperty(), look, 13 * font_scale)
-    set_letters(bar.GetAnnotationTextProperty(), look, 12 * font_scale)
+    set_letters(bar.GetTitleTextProperty(), scheme, size * font_scale)
+    set_letters(bar.GetLabelTextProperty(), scheme, 13 * font_scale)
+    set_letters(bar.GetAnnotationTextProperty(), scheme, 12 * font_scale)
     bar.SetVerticalTitleSeparation(round(8 * font_scale))
     bar.SetTextPad(round(_GAP * font_scale))
     bar.SetUseCustomLabels(True)

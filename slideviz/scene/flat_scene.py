@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import LIGHT, SELECTED_COLOUR, Look
+from slideviz.color_scheme import LIGHT, SELECTED_COLOUR, ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
@@ -40,7 +40,7 @@ class FlatScene:
         Where to draw.
     cuts : Cuts
         Shared with the view in space.
-    look : Look
+    scheme : ColorScheme
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class FlatScene:
         Another scene with the same camera: both are seen whole.
     """
 
-    def __init__(self, plotter: Any, cuts: Cuts, look: Look = LIGHT) -> None:
-        self.stage = Stage(plotter, look)
+    def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:
+        self.stage = Stage(plotter, scheme)
         self.cuts = cuts
         self.beside: FlatScene | None = None
         self.section: Section | None = None
@@ -69,7 +69,7 @@ class FlatScene:
         self._made_of: tuple[object, ...] = ()
         self._level: tuple[tuple[object, ...], float | None] = (), None
         self.session = Session()
-        self.set_look(look)
+        self.set_scheme(scheme)
 
     @property
     def labels(self) -> tuple[Label, Label]:
@@ -133,7 +133,7 @@ class FlatScene:
 
     def _style(self, section: Section) -> None:
         prop = self._shown.actor.prop
-        prop.color = plain_colour(self.stage.look)
+        prop.color = plain_colour(self.stage.scheme)
         prop.lighting = section.whole
         prop.ambient, prop.diffuse = (0.6, 0.4) if section.whole else (1.0, 0.0)
         prop.line_width = 1.0
@@ -204,9 +204,9 @@ class FlatScene:
 
     # Camera ----------------------------------------------------------------------------
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Take the colours of another color scheme for background and edges."""
-        self.stage.look = look
+        self.stage.scheme = scheme
         self.stage.set_background()
         if self.section is not None and self.session.frame is not None:
             self.update(self.session, self.section)

@@ -95,7 +95,7 @@ class GhostLayer(Layer):
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:
         """Return a colour that is seen on that of the boundary itself."""
-        own, text = (np.array(pv.Color(one).float_rgb) for one in (colour, self.stage.look.text))
+        own, text = (np.array(pv.Color(one).float_rgb) for one in (colour, self.stage.scheme.text))
         red, green, blue = (0.5 * (own + text)).tolist()
         return red, green, blue
 
@@ -109,7 +109,7 @@ class GhostLayer(Layer):
                 continue
             moves = session.role(name) != "fixed"
             for actor, _ in self._parts(key, surface, 0.45):
-                actor.prop.color = self.stage.look.ghost
+                actor.prop.color = self.stage.scheme.ghost
                 actor.visibility = shown and moves and name not in view.hidden
 
     def _parts(

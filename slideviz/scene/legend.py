@@ -59,7 +59,7 @@ class LegendLayer(Layer):
         assert mesh is not None
         self._placed = ()
         # First: what comes after it lies above it.
-        self._plate = Plate(stage.plotter, PLATE, stage.look) if stage.has_plate else None
+        self._plate = Plate(stage.plotter, PLATE, stage.scheme) if stage.has_plate else None
         if what == "role":
             used = {session.role(name) for name in mesh.marker_names}
             roles = [role for role in ROLES if role in used]
@@ -92,7 +92,7 @@ class LegendLayer(Layer):
         names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         colours = (view.colour_by, view.colour_map, session.colour_range)
-        points, style = self.stage.point_words, (self.stage.look, self.stage.font_scale)
+        points, style = self.stage.point_words, (self.stage.scheme, self.stage.font_scale)
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
         return (id(mesh), shown, colours, said, points, style)
 
@@ -128,7 +128,7 @@ class TriadLayer(Layer):
         plotter = self.stage.plotter
         shown = "triad" in new.view.drawn and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
-        style = (self.stage.look, self.stage.font_scale, self.stage.has_plate)
+        style = (self.stage.scheme, self.stage.font_scale, self.stage.has_plate)
         key = (shown, flat, style, tuple(plotter.window_size))
         if key == self._drawn or not (shown or self._axes):
             return
@@ -139,9 +139,9 @@ class TriadLayer(Layer):
         self._axes.SetZAxisLabelText("" if flat else "z")
         for caption in self._captions(self._axes):
             letters = caption.GetCaptionTextProperty()
-            set_letters(letters, self.stage.look, 13 * self.stage.font_scale)
+            set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
             # The mesh of a view that was zoomed into may lie behind.
-            letters.SetBackgroundColor(*pv.Color(self.stage.look.background).float_rgb)
+            letters.SetBackgroundColor(*pv.Color(self.stage.scheme.background).float_rgb)
             letters.SetBackgroundOpacity(OPACITY if self.stage.has_plate else 0.0)
         width, height = plotter.window_size
         size = SIZE * self.stage.font_scale

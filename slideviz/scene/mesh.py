@@ -97,7 +97,7 @@ class CellLayer(Layer):
                 values = self.stage.values(new)
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
-        self.actor.prop.color = self.stage.look.cell
+        self.actor.prop.color = self.stage.scheme.cell
         inside = looks_inside(new)
         if new.mesh.dim == 3:
             see_through(self.actor, 0.12 if inside else 1.0)

@@ -179,7 +179,7 @@ class PassageLayer(Layer):
     def _style(self) -> None:
         """Give the passages the colours of the mesh itself, paler."""
         self._pale_table()
-        plain = np.array(pv.Color(self.stage.look.cell).float_rgb)
+        plain = np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
             mapper, prop = self._mappers[name], self._props[name]
             if mapper.dataset is not shape:  # other cells are chosen
@@ -196,11 +196,11 @@ class PassageLayer(Layer):
     def _pale_table(self) -> None:
         """Give the passages the colours of the values, paler, over the same range."""
         own = self.stage.table
-        key = (own.cmap.name, tuple(own.scalar_range), self.stage.look)
+        key = (own.cmap.name, tuple(own.scalar_range), self.stage.scheme)
         if key == self._table_key:
             return
         self._table_key = key
-        plain = 255.0 * np.array(pv.Color(self.stage.look.cell).float_rgb)
+        plain = 255.0 * np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         values = np.asarray(own.values, float).copy()
         values[:, :3] += PALER * (plain - values[:, :3])
         self._table.values = values.round().astype(np.uint8)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.mesh.model import FloatArray
 from slideviz.scene.actors import VALUES
 from slideviz.scene.stage import Stage
@@ -58,9 +58,9 @@ class PolygonActor:
         self.mapper.scalar_visibility = values is not None
 
 
-def plain_colour(look: Look) -> tuple[float, float, float]:
+def plain_colour(scheme: ColorScheme) -> tuple[float, float, float]:
     """Return the colour of polygons without values, seen on any background."""
-    cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (look.cell, look.ghost))
+    cell, ghost = (np.array(pv.Color(name).float_rgb) for name in (scheme.cell, scheme.ghost))
     red, green, blue = (0.7 * cell + 0.3 * ghost).tolist()
     return red, green, blue
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import LIGHT, Look
+from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
@@ -44,14 +44,14 @@ class Scene:
     ----------
     plotter : pyvista.BasePlotter
         Where to draw.
-    look : Look
+    scheme : ColorScheme
         Colours of background, text and edges.
     font_scale : float
         Enlarges the letters, for pictures of many pixels.
     """
 
-    def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
-        self.stage = Stage(plotter, look, font_scale)
+    def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
+        self.stage = Stage(plotter, scheme, font_scale)
         self._cells = CellLayer(self.stage)
         self._boundaries = BoundaryLayer(self.stage)
         self._chosen = ThresholdLayer(self.stage, self._cells)
@@ -73,7 +73,7 @@ class Scene:
         )
         self.camera = Camera(self.stage, self._shapes)
         self.session = Session()
-        self.set_look(look)
+        self.set_scheme(scheme)
 
     @property
     def plotter(self) -> Any:
@@ -81,9 +81,9 @@ class Scene:
         return self.stage.plotter
 
     @property
-    def look(self) -> Look:
+    def scheme(self) -> ColorScheme:
         """Return the color scheme."""
-        return self.stage.look
+        return self.stage.scheme
 
     @property
     def drawn(self) -> dict[str, Drawn]:
@@ -138,9 +138,9 @@ class Scene:
         if "perspective" in old.view.drawn ^ session.view.drawn:
             self.plotter.camera.parallel_projection = self._parallel()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Take another color scheme for background, letters and edges."""
-        self.stage.look = look
+        self.stage.scheme = scheme
         self.stage.set_background()
         self._again()
 

@@ -126,7 +126,7 @@ class SectionLayer(Layer):
         """Draw the section lines of a 2D mesh across all that is drawn of the mesh."""
         assert session.frame is not None
         mesh, sections = session.frame.mesh, dict(shown_sections(session))
-        key = (mesh, sections, tuple(neighbours), self.stage.look)
+        key = (mesh, sections, tuple(neighbours), self.stage.scheme)
         if key == self._lines_of:
             return
         self._lines_of = key
@@ -189,8 +189,8 @@ class SectionLayer(Layer):
         self._style(kind, one.shown, section, session)
 
     def _style(self, kind: str, shown: PolygonActor, section: Section, session: Session) -> None:
-        prop, look = shown.actor.prop, self.stage.look
-        prop.color = look.text if kind == RIM else plain_colour(look)
+        prop, scheme = shown.actor.prop, self.stage.scheme
+        prop.color = scheme.text if kind == RIM else plain_colour(scheme)
         solid = session.mesh is not None and session.mesh.dim == 3 and section.whole
         # A cut has the very colours of the bar; whole cells need shades that set them apart.
         prop.lighting = solid
@@ -266,7 +266,7 @@ class CutLines:
             actor.mapper.dataset = shape
         if actor is not None:
             actor.visibility = bool(parts)
-            actor.prop.color = self.stage.look.text
+            actor.prop.color = self.stage.scheme.text
 
 
 def polylines(parts: list[FloatArray], lift: float = 0.0) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slideviz.color_scheme import LIGHT, VALUE_EDGE, Look
+from slideviz.color_scheme import LIGHT, VALUE_EDGE, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
@@ -43,7 +43,7 @@ class Stage:
     Attributes
     ----------
     plotter : pyvista.BasePlotter
-    look : Look
+    scheme : ColorScheme
         Colours of background, text and edges.
     font_scale : float
         Enlarges the letters, for pictures of many pixels.
@@ -57,9 +57,9 @@ class Stage:
         Whether the legend has a half-transparent plate; not where the background is left out.
     """
 
-    def __init__(self, plotter: Any, look: Look = LIGHT, font_scale: float = 1.0) -> None:
+    def __init__(self, plotter: Any, scheme: ColorScheme = LIGHT, font_scale: float = 1.0) -> None:
         self.plotter = plotter
-        self.look = look
+        self.scheme = scheme
         self.font_scale = font_scale
         self.table = lookup_table()
         self.point_words: tuple[tuple[str, str], ...] = ()
@@ -97,7 +97,7 @@ class Stage:
     def edges(self, prop: Any, shown: bool, plain: bool = False) -> None:
         """Draw the edges of an actor's cells, or not; plain ones in the color scheme's colour."""
         prop.show_edges = shown
-        prop.edge_color = self.look.edge if plain else VALUE_EDGE
+        prop.edge_color = self.scheme.edge if plain else VALUE_EDGE
         prop.edge_opacity = 0.45
 
     def lift(self, mesh: Mesh) -> float:
@@ -160,6 +160,6 @@ class Stage:
 
     def set_background(self) -> None:
         """Give the plotter the background of the color scheme."""
-        look = self.look
-        top = None if look.background == look.background_top else look.background_top
-        self.plotter.set_background(look.background, top=top)
+        scheme = self.scheme
+        top = None if scheme.background == scheme.background_top else scheme.background_top
+        self.plotter.set_background(scheme.background, top=top)

@@ -57,9 +57,9 @@ def told(monkeypatch):
     words = []
     write = module.write_title
 
-    def tell(plotter, text, look, letters, room):
+    def tell(plotter, text, scheme, letters, room):
         words.append((text, letters))
-        write(plotter, text, look, letters, room)
+        write(plotter, text, scheme, letters, room)
 
     monkeypatch.setattr(module, "write_title", tell)
     return words

@@ -21,9 +21,9 @@ def window_size():
     return SIZE
 
 
-def opened(plotter, mesh, look, **view):
-    scene = Scene(plotter, look)
-    scene.set_look(look)
+def opened(plotter, mesh, scheme, **view):
+    scene = Scene(plotter, scheme)
+    scene.set_scheme(scheme)
     session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
     session = changes.set_view(session, edges=False, triad=False, **view)
     scene.open(session, find_surfaces(mesh))
@@ -35,19 +35,19 @@ def image(scene):
     return np.asarray(scene.plotter.screenshot(return_img=True)).astype(float)
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK])
-def test_beside_the_mesh_no_plate_is_seen(plotter, square, look):
-    scene, session = opened(plotter, square, look, colour_by="size-skew")
+@pytest.mark.parametrize("scheme", [LIGHT, DARK])
+def test_beside_the_mesh_no_plate_is_seen(plotter, square, scheme):
+    scene, session = opened(plotter, square, scheme, colour_by="size-skew")
     with_plate = image(scene)
     scene.stage.has_plate = False
     scene.update(session)
     assert np.abs(image(scene) - with_plate).max() <= 3
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK])
+@pytest.mark.parametrize("scheme", [LIGHT, DARK])
 @pytest.mark.parametrize("by", ["size-skew", "role"])
-def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, look, by):
-    scene, session = opened(plotter, square, look, colour_by=by)
+def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, square, scheme, by):
+    scene, session = opened(plotter, square, scheme, colour_by=by)
     scene.camera.aim((2.0, 2.0, 0.0), 0.3)
     covered = image(scene)
     scene.stage.has_plate = False
@@ -55,7 +55,7 @@ def test_over_the_mesh_the_letters_lie_on_the_colour_of_the_background(plotter, 
     bare = image(scene)
     # Most of the strip is neither bar nor letter.
     right = np.s_[90:300, -STRIP + 2 : -2] if by == "size-skew" else np.s_[4:50, -STRIP + 2 : -2]
-    colour = look.background if by == "size-skew" else look.background_top
+    colour = scheme.background if by == "size-skew" else scheme.background_top
     background = np.array(pv.Color(colour).int_rgb, float)
 
     def away(picture):

@@ -526,7 +526,7 @@ def test_a_click_in_the_second_view_selects(ran):
 def test_the_theme_reaches_both(ran):
     viewing = compare(ran)
     ran.window.set_theme("dark")
-    assert [scene.look for scene in viewing._scenes()] == [DARK, DARK]
+    assert [scene.scheme for scene in viewing._scenes()] == [DARK, DARK]
     assert viewing.second.snapshot()[-3, 3].max() < 60
 
 

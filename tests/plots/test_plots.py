@@ -161,7 +161,7 @@ def test_every_value_has_its_label_and_a_fitting_scale(axes, what, label, scale)
 @pytest.mark.parametrize("style", [PRINT, ON_LIGHT, ON_DARK])
 def test_letters_are_large_enough_and_stand_out(axes, style):
     histogram(axes, two_qualities(), style=style)
-    background = np.array(to_rgb(style.look.background))
+    background = np.array(to_rgb(style.scheme.background))
     for text in letters(axes):
         assert text.get_fontsize() >= 8
         assert np.abs(np.array(to_rgb(text.get_color())) - background).max() > 0.4

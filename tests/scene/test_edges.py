@@ -34,10 +34,10 @@ def light_of(stage, cells, values, width=1.0):
     return image @ (0.30, 0.59, 0.11), actor
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK])
+@pytest.mark.parametrize("scheme", [LIGHT, DARK])
 @pytest.mark.parametrize("value", [0.0, 0.2, 0.3, 0.35, 0.4, 0.5, 0.75, 1.0])
-def test_edges_are_dark_on_low_and_on_high_values(value, look, stage):
-    stage.look = look
+def test_edges_are_dark_on_low_and_on_high_values(value, scheme, stage):
+    stage.scheme = scheme
     light, _ = light_of(stage, (4, 4), np.full(16, value), 3.0)
     # Between the lines, and on the one in the middle.
     face, line = light[SIZE // 2 + 36, SIZE // 2 + 36], light[SIZE // 2 + 36, SIZE // 2]
@@ -58,11 +58,11 @@ def test_edges_fade_where_cells_are_hardly_wider_than_lines(stage):
     assert actor.prop.show_edges
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK])
-def test_cells_without_values_have_the_lines_of_the_look(look, stage):
-    stage.look = look
+@pytest.mark.parametrize("scheme", [LIGHT, DARK])
+def test_cells_without_values_have_the_lines_of_the_scheme(scheme, stage):
+    stage.scheme = scheme
     _, actor = light_of(stage, (2, 2), np.full(4, 0.5))
     stage.edges(actor.prop, True, plain=True)
-    assert actor.prop.edge_color == pv.Color(look.edge)
+    assert actor.prop.edge_color == pv.Color(scheme.edge)
     stage.edges(actor.prop, True)
     assert actor.prop.edge_color == pv.Color(VALUE_EDGE)

@@ -258,10 +258,10 @@ def test_periodic_boundaries_that_do_not_match_have_no_neighbours(row):
 # Axes -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("look", [LIGHT, DARK], ids=["light", "dark"])
-def test_the_axes_are_in_the_lower_left_corner(scene, stator, look):
+@pytest.mark.parametrize("scheme", [LIGHT, DARK], ids=["light", "dark"])
+def test_the_axes_are_in_the_lower_left_corner(scene, stator, scheme):
     session = opened(scene, stator)
-    scene.set_look(look)
+    scene.set_scheme(scheme)
 
     def differs(a, b):
         return np.abs(a - b).max(axis=2) > 20

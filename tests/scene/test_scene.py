@@ -243,7 +243,7 @@ def test_another_mesh_replaces_all_actors(scene, session, cube):
 
 def test_the_look_changes_the_background(scene, session):
     opened(scene, session)
-    scene.set_look(DARK)
+    scene.set_scheme(DARK)
     assert image(scene)[-3, 3].max() < 60
 
 
@@ -299,7 +299,7 @@ def test_the_legend_is_made_anew_only_when_it_says_something_else(scene, session
         scene.update(session)
         assert len(made) == wanted
     made.clear()
-    scene.set_look(DARK)
+    scene.set_scheme(DARK)
     assert len(made) == 1, "its letters have another colour"
 
 

@@ -14,7 +14,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QMouseEvent
 from qtpy.QtWidgets import QHBoxLayout, QWidget
 
-from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.fields import Choice
@@ -141,9 +141,9 @@ class CurvesPanel(Panel):
             )
         return ""
 
-    def take_theme(self, look: Look) -> None:
+    def take_theme(self, scheme: ColorScheme) -> None:
         """Draw the plot in the colours of another theme."""
-        self.canvas.set_look(look)
+        self.canvas.set_scheme(scheme)
 
     # Drawing ---------------------------------------------------------------------------
 
@@ -209,7 +209,7 @@ def draw_greedy(session: Session, figure: Figure, style: Style) -> None:
     axes, run = figure.add_subplot(), curves.greedy_run(session)
     assert run is not None
     convergence(axes, [run], style=style)
-    axes.set_title(run.label, fontsize=style.size, color=style.look.text)
+    axes.set_title(run.label, fontsize=style.size, color=style.scheme.text)
 
 
 def draw_span(
@@ -228,7 +228,7 @@ def draw_span(
         axes.set_axis_off()
         figure.text(
             0.5, 0.5, str(error), ha="center", va="center", wrap=True,
-            fontsize=style.size, color=style.look.text,
+            fontsize=style.size, color=style.scheme.text,
         )  # fmt: skip
         return
     spanwise(axes, found, what, style=style)

@@ -7,7 +7,7 @@ import html
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QLabel, QPushButton, QSizePolicy
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
 from slideviz.gui.widgets.command import Command
@@ -129,7 +129,7 @@ class RunPanel(Panel):
         else:
             self.place_wanted.emit(self._missing[0])
 
-    def take_theme(self, _look: Look) -> None:
+    def take_theme(self, _scheme: ColorScheme) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
         text = self.text.text()
         self.text.clear()

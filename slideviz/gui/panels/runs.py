@@ -6,7 +6,7 @@ from qtpy.QtCore import QPoint, QSignalBlocker, Qt
 from qtpy.QtGui import QIcon
 from qtpy.QtWidgets import QMenu, QTreeWidgetItem
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.runs_actions import RunActions
 from slideviz.gui.panels.runs_tree import MIN, NAME, NUMBER, RUN, WORDS, RunTree
 from slideviz.gui.widgets.build import hint_label, in_column
@@ -47,7 +47,7 @@ class RunsPanel(Panel):
         )
         self.tree.customContextMenuRequested.connect(self._menu_wanted)
 
-    def take_theme(self, _look: Look) -> None:
+    def take_theme(self, _scheme: ColorScheme) -> None:
         """Draw the icons of the rows in the colours of another theme."""
         self._drawn = ()
         if self.store.session.runs:

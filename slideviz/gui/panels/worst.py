@@ -12,7 +12,7 @@ from qtpy.QtCore import QModelIndex, Qt, QTimer
 from qtpy.QtGui import QGuiApplication, QKeySequence, QPaintEvent, QShortcut
 from qtpy.QtWidgets import QLabel, QStackedWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.worst_table import WorstModel, WorstTable
 from slideviz.gui.responsiveness.settings import REST_MS
 from slideviz.gui.responsiveness.timers import later
@@ -100,7 +100,7 @@ class WorstPanel(Panel):
 
     # State to widgets ------------------------------------------------------------------
 
-    def take_theme(self, _look: Look) -> None:
+    def take_theme(self, _scheme: ColorScheme) -> None:
         """Tell of the marked cell in the colours of another theme."""
         self._told = ()
         self._sync_mark(self.store.session)

@@ -11,7 +11,7 @@ from qtpy.QtCore import QPoint
 from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
-from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.mouse_handle import (
     EDGE_PX,
@@ -51,10 +51,10 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         """Return the renderer: before each drawing the camera or the view's size may differ."""
         return self.view.renderer, "StartEvent"
 
-    def show(self, section: Section, patch: Patch, look: Look) -> None:
+    def show(self, section: Section, patch: Patch, scheme: ColorScheme) -> None:
         """Show the handle of a section, around a part of it."""
         self.section, self._patch = section, patch
-        self._drawn.colour(look, self._part is not None)
+        self._drawn.colour(scheme, self._part is not None)
         self._drawn.draw_frame(frame_of(section, patch))
         self.put()
 
@@ -159,10 +159,10 @@ class HandleActors:
         for name in (FRAME, RIM, BALL):
             self.view.remove_actor(name, reset_camera=False, render=False)  # type: ignore[arg-type]
 
-    def colour(self, look: Look, held: bool) -> None:
+    def colour(self, scheme: ColorScheme, held: bool) -> None:
         """Set the colours of a color scheme, and that of a held ball."""
-        self._text = look.text
-        self._actors[RIM].GetProperty().SetColor(*pv.Color(look.text).float_rgb)
+        self._text = scheme.text
+        self._actors[RIM].GetProperty().SetColor(*pv.Color(scheme.text).float_rgb)
         self.highlight(held)
 
     def highlight(self, held: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QHBoxLayout, QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.section_curve import CurveView
 from slideviz.gui.viewport.unrolled import FlatView
 from slideviz.gui.viewport.viewing import Viewing
@@ -25,7 +25,7 @@ class Flats(QWidget):
     ----------
     viewing : Viewing
         The views, with what they have cut already.
-    look : Look
+    scheme : ColorScheme
     multi_samples : int
 
     Attributes
@@ -36,10 +36,10 @@ class Flats(QWidget):
 
     closed = Signal()
 
-    def __init__(self, viewing: Viewing, look: Look, multi_samples: int) -> None:
+    def __init__(self, viewing: Viewing, scheme: ColorScheme, multi_samples: int) -> None:
         super().__init__()
         self.setObjectName("flats")
-        self.viewing, self.look = viewing, look
+        self.viewing, self.scheme = viewing, scheme
         self._multi_samples = multi_samples
         self.first: FlatView | CurveView | None = None
         self.second: FlatView | None = None
@@ -83,13 +83,13 @@ class Flats(QWidget):
 
     def _show_curve(self, shown: list, section: Section) -> None:
         if not isinstance(self.first, CurveView):
-            self.first = CurveView(self.viewing.store, self.look)
+            self.first = CurveView(self.viewing.store, self.scheme)
             self.first.closed.connect(self.closed)
             self._row.addWidget(self.first, 1)
         self.first.show_section(shown, section)
 
     def _make(self, cuts: Cuts) -> FlatView:
-        view = FlatView(self.viewing.store, cuts, self.look, self._multi_samples)
+        view = FlatView(self.viewing.store, cuts, self.scheme, self._multi_samples)
         view.closed.connect(self.closed)
         self._row.addWidget(view, 1)
         view.show()
@@ -105,12 +105,12 @@ class Flats(QWidget):
             second.setParent(None)
             second.deleteLater()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
-        self.look = look
+        self.scheme = scheme
         for view in (self.first, self.second):
             if view is not None:
-                view.set_look(look)
+                view.set_scheme(scheme)
 
     def close_views(self) -> None:
         """Release the graphics."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.axis_handle import RoundHandle
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.line_handle import FlatHandle
@@ -47,7 +47,11 @@ class Handles:
         return bool(self._of)
 
     def show(
-        self, views: list[tuple[View3D, Scene, Mesh]], section: Section, mesh: Mesh, look: Look
+        self,
+        views: list[tuple[View3D, Scene, Mesh]],
+        section: Section,
+        mesh: Mesh,
+        scheme: ColorScheme,
     ) -> None:
         """Show a handle of a section in every view.
 
@@ -58,7 +62,7 @@ class Handles:
         section : Section
         mesh : Mesh
             As it was opened.
-        look : Look
+        scheme : ColorScheme
         """
         self._section = section
         for view, scene, shown in views:
@@ -70,11 +74,11 @@ class Handles:
             if handle is None:
                 handle = self._of[view] = self._make(wanted, view, scene)
             if isinstance(handle, FlatHandle):
-                handle.show(section, scene.stage.lift(mesh), look)
+                handle.show(section, scene.stage.lift(mesh), scheme)
             elif isinstance(handle, RoundHandle):
-                handle.show(section, patch_in(section, shown, scene.sections.cuts), look)
+                handle.show(section, patch_in(section, shown, scene.sections.cuts), scheme)
             else:
-                handle.show(section, _around(mesh), look)
+                handle.show(section, _around(mesh), scheme)
             view.render_soon()
 
     def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:

@@ -10,7 +10,7 @@ import pyvista as pv
 from qtpy.QtCore import QPoint
 from vtkmodules.vtkCommonCore import vtkObject
 
-from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.mouse_handle import (
     EDGE_PX,
@@ -40,7 +40,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
 
     def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
         super().__init__(view, *others)
-        self._look: Look | None = None
+        self._scheme: ColorScheme | None = None
         self._lift = 0.0
         self._handle_parts: HandleParts | None = None
         self._placed: tuple[object, ...] = ()
@@ -49,9 +49,9 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         """Return the camera: the handle stays in the part of the plane that it shows."""
         return self.view.camera, "ModifiedEvent"
 
-    def show(self, section: Section, lift: float, look: Look) -> None:
+    def show(self, section: Section, lift: float, scheme: ColorScheme) -> None:
         """Show the handle of a section, lifted above the mesh."""
-        self.section, self._lift, self._look = section, lift, look
+        self.section, self._lift, self._scheme = section, lift, scheme
         self.put()
 
     def close(self) -> None:
@@ -77,7 +77,7 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
             return
         seen = self.seen()
         # To draw moves the near and far planes of the camera, too.
-        key = (self.section, self._lift, self._look, self._part, *seen[0], *seen[1])
+        key = (self.section, self._lift, self._scheme, self._part, *seen[0], *seen[1])
         if key == self._placed:
             return
         self._placed = key
@@ -86,11 +86,11 @@ class FlatHandle(MouseHandle[tuple[Section, Box]]):
         if parts is not None:
             points = np.concatenate([parts.middle, parts.ends])
             held = {"middle": parts.middle, "end": parts.ends}.get(self._part or "", held)
-        look = self._look
-        assert look is not None
+        scheme = self._scheme
+        assert scheme is not None
         # Points are balls to VTK: one above another must be more than its radius higher.
         ball = RIM_PX * float((seen[1] - seen[0]).max()) / max(self.view.window_size)
-        self._draw(NAMES[0], points, ball, colour=look.text, size=RIM_PX)
+        self._draw(NAMES[0], points, ball, colour=scheme.text, size=RIM_PX)
         self._draw(NAMES[1], points, 2.0 * ball, colour=HANDLE_COLOUR, size=POINT_PX)
         self._draw(NAMES[2], held, 3.0 * ball, colour=SELECTED_COLOUR, size=POINT_PX)
 

@@ -11,7 +11,7 @@ from vtkmodules.vtkInteractionWidgets import (
     vtkImplicitPlaneWidget2,
 )
 
-from slideviz.color_scheme import SELECTED_COLOUR, Look
+from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.mouse_handle import HANDLE_COLOUR
@@ -63,9 +63,9 @@ class PlaneHandle:
         ):
             self.widget.AddObserver(event, call)  # type: ignore[arg-type]  # a name is taken, too
 
-    def show(self, section: Section, bounds: Bounds, look: Look) -> None:
+    def show(self, section: Section, bounds: Bounds, scheme: ColorScheme) -> None:
         """Show the handle of a section; while it is dragged, only its colours change."""
-        self._colour(look)
+        self._colour(scheme)
         if bounds != self._bounds:
             self._bounds = bounds
             self.shape.PlaceWidget(list(bounds))
@@ -103,8 +103,8 @@ class PlaneHandle:
             self.tell()
         self._held(dragging)
 
-    def _colour(self, look: Look) -> None:
-        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, look.text))
+    def _colour(self, scheme: ColorScheme) -> None:
+        strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, scheme.text))
         shape = self.shape
         shape.SetForegroundColor(*plain)
         shape.SetEdgeColor(*plain)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.panels.curves import CurveCanvas
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.widgets.build import in_column
@@ -34,12 +34,12 @@ class CurveView(QWidget):
     Parameters
     ----------
     store : Store
-    look : Look
+    scheme : ColorScheme
     """
 
     closed = Signal()
 
-    def __init__(self, store: Store, look: Look) -> None:
+    def __init__(self, store: Store, scheme: ColorScheme) -> None:
         super().__init__()
         self.setObjectName("curve_view")
         self.store = store
@@ -59,7 +59,7 @@ class CurveView(QWidget):
         self._made = CurveRows()
         self.rows: tuple[CurveRow, ...] = ()
         self._labels, self._colours = ("", ""), Colours()
-        self.set_look(look)
+        self.set_scheme(scheme)
 
     def show_section(self, shown: Sequence[tuple[Session, Cuts]], section: Section) -> None:
         """Show a section of the meshes in the views, that of the first view first."""
@@ -80,9 +80,9 @@ class CurveView(QWidget):
         """Return the function that draws the present curves."""
         return partial(_draw, self.rows, self._labels, self._colours)
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
-        self.area.canvas.set_look(look)
+        self.area.canvas.set_scheme(scheme)
 
     def close_view(self) -> None:
         """Forget the curves."""

@@ -6,7 +6,7 @@ import numpy as np
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QSplitter, QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.flats import FRAME_PX, Flats, beside
 from slideviz.gui.viewport.handles import Handles
@@ -38,7 +38,7 @@ class SectionViews(QSplitter):
         Of the section, one in each view while they are wanted.
     flats
         None while nobody wants them.
-    look : Look
+    scheme : ColorScheme
         Their colours.
     """
 
@@ -52,7 +52,7 @@ class SectionViews(QSplitter):
         self.flats: Flats | None = None
         self._closed = False
         self._kind: tuple[object, ...] = ()
-        self.look = viewing.scene.look
+        self.scheme = viewing.scene.scheme
         self.store.listen(self._session_changed)
         viewing.second_made.connect(lambda: self._sync_handles(self.store.session))
         viewing.second_leaves.connect(self._second_leaves)
@@ -123,7 +123,7 @@ class SectionViews(QSplitter):
         wanted = session.view.handle and session.frame is not None and not self._closed
         usable = section is not None and section.shown and can_cut(mesh, section)
         if wanted and usable and section is not None and mesh is not None:
-            self.handles.show(self._shown(session), section, mesh, self.look)
+            self.handles.show(self._shown(session), section, mesh, self.scheme)
         else:
             self.handles.clear()
 
@@ -146,7 +146,7 @@ class SectionViews(QSplitter):
             return
         made = self.flats is None
         if self.flats is None:
-            self.flats = Flats(self.viewing, self.look, self._multi_samples)
+            self.flats = Flats(self.viewing, self.scheme, self._multi_samples)
             self.flats.closed.connect(lambda: self.want_flat(False))
         whole = self.viewing.scene.sees_all()
         if made:
@@ -182,11 +182,11 @@ class SectionViews(QSplitter):
         if whole:
             self.viewing.fit()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
-        self.look = look
+        self.scheme = scheme
         if self.flats is not None:
-            self.flats.set_look(look)
+            self.flats.set_scheme(scheme)
         self._sync()
 
     def close_views(self) -> None:

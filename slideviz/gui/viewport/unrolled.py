@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtCore import QPoint, Signal
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.viewport.beside import TitleBar
 from slideviz.gui.viewport.canvas import View3D
@@ -28,13 +28,15 @@ class FlatView(QWidget):
     store : Store
     cuts : Cuts
         Those of the 3D view.
-    look : Look
+    scheme : ColorScheme
     multi_samples : int
     """
 
     closed = Signal()
 
-    def __init__(self, store: Store, cuts: Cuts, look: Look, multi_samples: int = 4) -> None:
+    def __init__(
+        self, store: Store, cuts: Cuts, scheme: ColorScheme, multi_samples: int = 4
+    ) -> None:
         super().__init__()
         self.setObjectName("flat_view")
         self.title = TitleBar("flat_title", "Close the flat view")
@@ -47,14 +49,14 @@ class FlatView(QWidget):
         self.view.setMinimumSize(120, 80)
         self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.view.set_flat(True)
-        self.scene = FlatScene(self.view, cuts, look)
+        self.scene = FlatScene(self.view, cuts, scheme)
         self.across, self.upright = Ruler(False), Ruler(True)
         self._partner: FlatView | None = None
         self._fitted: tuple[object, ...] = ()
         self._ranges: tuple[object, ...] = ()
         self._place()
         self._connect(store)
-        self.set_look(look)
+        self.set_scheme(scheme)
 
     def _place(self) -> None:
         grid = QGridLayout()
@@ -125,9 +127,9 @@ class FlatView(QWidget):
             partner.scene.take_camera(self.scene)
             partner.view.render_soon()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
-        self.scene.set_look(look)
+        self.scene.set_scheme(scheme)
         self.view.render()
 
     def close_view(self) -> None:

@@ -8,7 +8,7 @@ from qtpy.QtCore import QPoint, Signal
 from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.gui.viewport.beside import CameraLink, TitleBar
 from slideviz.gui.viewport.canvas import View3D
 from slideviz.gui.viewport.coarse_moving import CoarseWhileMoving
@@ -101,7 +101,7 @@ class Viewing(QWidget):
         self.second = self._make_view()
         self._place(session.view.swapped)
         self.second.setVisible(True)
-        self.second_scene = Scene(self.second, self.scene.look)
+        self.second_scene = Scene(self.second, self.scene.scheme)
         self.second_scene.sections.cuts = self.second_cuts
         self._connect(self.second, self.second_scene)
         self.second.spare_software()
@@ -309,10 +309,10 @@ class Viewing(QWidget):
         self._leader.look_from(side)
         self.render()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
         for scene in self._scenes():
-            scene.set_look(look)
+            scene.set_scheme(scheme)
         self.render()
 
     def close_views(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from qtpy.QtWidgets import QWidget
 
-from slideviz.color_scheme import Look
+from slideviz.color_scheme import ColorScheme
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -40,7 +40,7 @@ class Panel(QWidget):
         """Show the session."""
         raise NotImplementedError
 
-    def take_theme(self, look: Look) -> None:
+    def take_theme(self, scheme: ColorScheme) -> None:
         """Draw what palette and icons do not reach in the colours of another theme."""
 
     def lead_to(self, missing: Requirement) -> None:

@@ -15,7 +15,7 @@ from qtpy.QtCore import Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QImage, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QLabel, QSizePolicy, QStackedWidget, QWidget
 
-from slideviz.color_scheme import LIGHT, Look
+from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.gui.responsiveness.settings import LOOK_MS, MOST_REST, REST_MS, REST_TIMES
 from slideviz.gui.responsiveness.timers import later
@@ -55,7 +55,7 @@ class PlotCanvas(QWidget):
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__()
         self.drawing = drawing
-        self.look = LIGHT
+        self.scheme = LIGHT
         self._stale = True
         self.wiped = False
         self._last = 0.0
@@ -74,7 +74,7 @@ class PlotCanvas(QWidget):
     @property
     def style_(self) -> Style:
         """Return the style of the plot in the window."""
-        return Style(self.look, size=8.0, width=1.3)
+        return Style(self.scheme, size=8.0, width=1.3)
 
     @property
     def figure(self) -> Figure:
@@ -130,9 +130,9 @@ class PlotCanvas(QWidget):
         if self._stale:
             self.ask()
 
-    def set_look(self, look: Look) -> None:
+    def set_scheme(self, scheme: ColorScheme) -> None:
         """Draw in another color scheme."""
-        self.look = look
+        self.scheme = scheme
         self.ask()
 
     # Places ----------------------------------------------------------------------------
@@ -171,14 +171,14 @@ class PlotCanvas(QWidget):
         pixels = self._picture.pixels
         high, wide = pixels.shape[:2]
         if self.wiped:
-            painter.fillRect(self.rect(), QColor(self.look.background))
-            painter.setPen(QColor(self.look.text))
+            painter.fillRect(self.rect(), QColor(self.scheme.background))
+            painter.setPen(QColor(self.scheme.text))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "Drawing…")
         elif wide > 1:
             image = QImage(pixels.data, wide, high, 4 * wide, QImage.Format.Format_RGBA8888)
             painter.drawImage(self.rect(), image)
         else:
-            painter.fillRect(self.rect(), QColor(self.look.background))
+            painter.fillRect(self.rect(), QColor(self.scheme.background))
         painter.end()
         if self._stale:
             self.ask()

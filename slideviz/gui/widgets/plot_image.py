@@ -70,7 +70,7 @@ def picture(draw_on: Draw, paper: Paper, place: Place) -> Picture:
     figure = Figure((paper.width / dpi, paper.height / dpi), dpi=dpi)
     canvas = FigureCanvasAgg(figure)
     figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
-    figure.set_facecolor(paper.style.look.background)
+    figure.set_facecolor(paper.style.scheme.background)
     draw_on(figure, paper.style)
     place = _arrange(figure, place)
     canvas.draw()

@@ -8,7 +8,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QPalette
 from qtpy.QtWidgets import QApplication, QToolTip
 
-from slideviz.color_scheme import DARK, LIGHT, Look
+from slideviz.color_scheme import DARK, LIGHT, ColorScheme
 
 THEMES = ("system", "light", "dark")
 
@@ -119,7 +119,7 @@ def _app() -> QApplication:
     return app
 
 
-def apply(theme: str) -> Look:
+def apply(theme: str) -> ColorScheme:
     """Give the application a theme, and return the color scheme of the view."""
     name = resolved(theme)
     dark = name == "dark"
