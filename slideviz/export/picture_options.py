@@ -121,8 +121,8 @@ class PictureOptions:
         if view.colour_by != "role":
             drawn["motion_ghost"] = False  # of a result, it would hide what is to be seen
         view = view.with_drawn(drawn)
-        marked = view.marked if self.marked else None
-        return replace(session, view=replace(view, selected=(), marked=marked))
+        marked = view.marked_cell if self.marked else None
+        return replace(session, view=replace(view, selected=(), marked_cell=marked))
 
 
 def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOptions]:

@@ -173,7 +173,7 @@ _AWAY = 9.0
 
 def mark_words(session: Session) -> str:
     """Return the number of the selected cell, and its value; nothing where none is selected."""
-    cell, frame = session.view.marked, session.frame
+    cell, frame = session.view.marked_cell, session.frame
     if cell is None or frame is None or not 0 <= cell < len(frame.mesh.cells):
         return ""
     words = f"cell {cell:,}"
@@ -258,6 +258,6 @@ def draw_mark(axes: Any, session: Session, point: float) -> None:
 def _corners(session: Session) -> FloatArray:
     """Return the nodes of the selected cell, (k, d)."""
     assert session.frame is not None
-    assert session.view.marked is not None
+    assert session.view.marked_cell is not None
     mesh = session.frame.mesh
-    return np.asarray(mesh.points[nodes_of(mesh, session.view.marked)])
+    return np.asarray(mesh.points[nodes_of(mesh, session.view.marked_cell)])

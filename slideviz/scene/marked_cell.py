@@ -47,7 +47,7 @@ class MarkLayer(Layer):
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""
-        cell, frame = new.view.marked, new.frame
+        cell, frame = new.view.marked_cell, new.frame
         if cell is None or frame is None or not frame.has(cell):
             for name in self._drawn:
                 self.stage.remove(name)

@@ -192,7 +192,7 @@ class BoundaryLayer(Layer):
 
     def _hides_mark(self, session: Session) -> bool:
         """Tell whether the marked cell of a 3D mesh is beside none of the boundaries shown."""
-        cell, mesh, hidden = session.view.marked, session.mesh, session.view.hidden
+        cell, mesh, hidden = session.view.marked_cell, session.mesh, session.view.hidden
         if mesh is None or mesh.dim == 2 or session.frame is None or not session.frame.has(cell):
             return False
         shown = (one for name, one in self.drawn.items() if name not in hidden)

@@ -144,9 +144,9 @@ def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) 
     return min(index - (index > first), len(new) - 1)
 
 
-def mark(session: Session, cell: int | None) -> Session:
-    """Return the session with a cell selected, or none."""
-    return set_view(session, marked=cell)
+def mark_cell(session: Session, cell: int | None) -> Session:
+    """Return the session with that cell marked; None: none."""
+    return set_view(session, marked_cell=cell)
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:

@@ -50,7 +50,7 @@ class ViewState:
         Boundaries that are highlighted.
     frame : int
         Which frame is shown, 0 is the undeformed mesh.
-    marked : int or None
+    marked_cell : int or None
         The cell that is marked, by its number in the mesh.
     beside : int or None
         The number of a run shown in a second view beside the first; 0 is the undeformed mesh.
@@ -75,7 +75,7 @@ class ViewState:
     hidden: frozenset[str] = frozenset()
     selected: tuple[str, ...] = ()
     frame: int = 0
-    marked: int | None = None
+    marked_cell: int | None = None
     beside: int | None = None
     swapped: bool = False
     ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
@@ -85,7 +85,18 @@ class ViewState:
     @property
     def style(self) -> ViewState:
         """Return the view without what passes: step, selections, second view."""
-        return replace(self, selected=(), frame=0, marked=None, beside=None, swapped=False)
+        return ViewState().in_style(self)
+
+    def in_style(self, style: ViewState) -> ViewState:
+        """Return another view with what passes of this one: step, selections, second view."""
+        return replace(
+            style,
+            selected=self.selected,
+            frame=self.frame,
+            marked_cell=self.marked_cell,
+            beside=self.beside,
+            swapped=self.swapped,
+        )
 
     def with_drawn(self, drawn: Mapping[Shown, bool]) -> ViewState:
         """Return the view with some things drawn, or not."""

@@ -74,21 +74,14 @@ class Memento:
     def put_into(self, session: Session) -> Session:
         """Return the session with the memento's values; the step that is shown stays."""
         session = self._put_runs(session)
-        view, style = session.view, self.style
+        view = session.view.in_style(self.style)
         # Where the case was saved to does not come back: it is on disk, undone or not.
         case = self.case.change(
             source=session.case.source,
             mesh_out=session.case.mesh_out,
             warnings=session.case.warnings,
         )
-        names = ("selected", "frame", "marked", "beside", "swapped")
-        passing = {name: getattr(view, name) for name in names}
-        return replace(
-            session,
-            case=case,
-            guesses=self.guesses,
-            view=replace(style, **passing),
-        )
+        return replace(session, case=case, guesses=self.guesses, view=view)
 
     def _put_runs(self, session: Session) -> Session:
         """Return the session with the runs back that were there, and without removed ones."""

@@ -214,7 +214,7 @@ def test_titles_that_are_too_long_get_smaller_then_shorter():
 
 
 def test_a_marked_cell_is_named_in_both_views_or_left_out(session, renderer):
-    renderer.session = changes.mark(two_runs(session, sliding="ds"), 5)
+    renderer.session = changes.mark_cell(two_runs(session, sliding="ds"), 5)
     colour = np.array(to_rgb(SELECTED_COLOUR)) * 255
 
     def orange(figure):

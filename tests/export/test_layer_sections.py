@@ -546,14 +546,14 @@ def test_the_marked_cell_has_a_rim_in_the_flat_view(scene, flat_plotter, cube):
     session = opened(scene, cube, sections=(MIDDLE,))
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     cell = int(crossing(cube, 2, 0.46)[7])
-    flat.update(changes.mark(session, cell), MIDDLE)
+    flat.update(changes.mark_cell(session, cell), MIDDLE)
     mark = flat_plotter.actors["marked"]
     assert mark.visibility
     drawn = flat.polygons.points[
         flat.polygons.take(np.flatnonzero(flat.polygons.cells == cell)).connectivity
     ]
     assert mark.bounds[:2] == pytest.approx((drawn[:, 0].min(), drawn[:, 0].max()))
-    flat.update(changes.mark(session, 0), MIDDLE)
+    flat.update(changes.mark_cell(session, 0), MIDDLE)
     assert mark.visibility == (0 in crossing(cube, 2, 0.46))
 
 

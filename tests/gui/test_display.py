@@ -202,7 +202,7 @@ def test_steps_and_selection_leave_the_panel_alone(shown, monkeypatch):
     synced = []
     monkeypatch.setattr(panel(shown), "_sync", lambda session: synced.append(session))
     shown.window.store.change(changes.select, ("airfoil",))
-    shown.window.store.change(changes.mark, 3)
+    shown.window.store.change(changes.mark_cell, 3)
     shown.window.store.change(changes.start_run)
     assert not synced
     shown.window.store.change(changes.set_view, edges=False)

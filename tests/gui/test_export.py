@@ -631,18 +631,18 @@ def test_about_and_details_for_a_report(opened):
 
 
 def test_a_marked_cell_is_in_pictures_unless_it_is_switched_off_and_in_films_if_wanted(ran):
-    ran.window.store.change(changes.mark, 3)
+    ran.window.store.change(changes.mark_cell, 3)
     with ran.window.exports._renderer() as renderer:
         dialog = PictureDialog(ran.window, renderer)
-        assert dialog.picture_options.showing(renderer.session).view.marked == 3
+        assert dialog.picture_options.showing(renderer.session).view.marked_cell == 3
         dialog.options["marked"].setChecked(False)
-        assert dialog.picture_options.showing(renderer.session).view.marked is None
+        assert dialog.picture_options.showing(renderer.session).view.marked_cell is None
         assert dialog._form.isRowVisible(dialog.options["marked"])
         form = FilmForm(renderer)
         assert form.layout().isRowVisible(form.mark)
-        assert form.picture_options.showing(renderer.session).view.marked is None
+        assert form.picture_options.showing(renderer.session).view.marked_cell is None
         form.mark.setChecked(True)
-        assert form.picture_options.showing(renderer.session).view.marked == 3
+        assert form.picture_options.showing(renderer.session).view.marked_cell == 3
 
 
 def test_without_a_marked_cell_nothing_is_asked_about_it(ran):

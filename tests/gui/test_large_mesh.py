@@ -109,7 +109,7 @@ def test_worst_cells_are_listed_and_marked(stator, folder):
     assert shown == worst.tolist()
     for row in range(3):
         panel._go(row)
-        assert stator.session.view.marked == panel.model.cell(row)
+        assert stator.session.view.marked_cell == panel.model.cell(row)
         assert f"Cell {worst[row]}" in panel.info.text()
         assert any(name.startswith("mark") for name in window.scene.plotter.renderer.actors)
 

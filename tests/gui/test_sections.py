@@ -376,7 +376,7 @@ def test_a_cell_of_the_flat_view_is_marked(window, driver, panel):
     x = (corner[0] - left) / (right - left) * flat.view.width()
     y = (above - corner[1]) / (above - below) * flat.view.height()
     QTest.mouseDClick(flat.view, Qt.MouseButton.LeftButton, pos=QPoint(round(x), round(y)))
-    assert window.store.session.view.marked == polygons.cells[3]
+    assert window.store.session.view.marked_cell == polygons.cells[3]
 
 
 def test_the_handle_moves_the_plane_and_leaves_nothing(window, driver, panel):
@@ -509,7 +509,7 @@ def test_the_curve_of_a_line_follows_step_run_and_line(window, driver, flat_pane
     assert drawn == {"along:undeformed", "along:run 1"}
     cell = int(view.rows[-1].curve.cells[3])
     view.area.canvas.picked(float(view.rows[-1].curve.ends[3].mean()))
-    assert window.store.session.view.marked == cell
+    assert window.store.session.view.marked_cell == cell
     drag(flat_panel.editor.slider, 0.1)
     assert cell not in view.rows[-1].curve.cells
     driver.type(flat_panel.editor.number, "77")

@@ -137,24 +137,24 @@ def test_it_can_be_sorted_both_ways(full, by):
 
 
 def test_sorting_keeps_the_marked_cell_the_current_row(full):
-    full.store.change(changes.mark, cells(full)[5])
+    full.store.change(changes.mark_cell, cells(full)[5])
     full.table.sortByColumn(CELL, Qt.SortOrder.DescendingOrder)
-    assert full.model.cell(full.table.currentIndex().row()) == full.store.session.view.marked
+    assert full.model.cell(full.table.currentIndex().row()) == full.store.session.view.marked_cell
 
 
 def test_a_click_marks_and_flies_and_a_second_one_takes_the_mark_away(full, flown):
     cell = cells(full)[3]
     click(full, 3)
-    assert full.store.session.view.marked == cell
+    assert full.store.session.view.marked_cell == cell
     assert flown == [cell]
     assert full.info.isVisible()
     assert f"Cell {cell}" in full.info.text()
     click(full, 3)
-    assert full.store.session.view.marked is None
+    assert full.store.session.view.marked_cell is None
     assert not full.info.isVisible()
     assert not full.table.currentIndex().isValid()
     click(full, 3)
-    assert full.store.session.view.marked == cell
+    assert full.store.session.view.marked_cell == cell
     assert flown == [cell, cell]
 
 
@@ -162,28 +162,28 @@ def test_keys_go_from_cell_to_cell_and_escape_takes_the_mark_away(full, flown):
     click(full, 0)
     for _ in range(2):
         QTest.keyClick(full.table, Qt.Key.Key_Down)
-    assert full.store.session.view.marked == cells(full)[2]
+    assert full.store.session.view.marked_cell == cells(full)[2]
     assert flown == cells(full)[:3]
     QTest.keyClick(full.table, Qt.Key.Key_Escape)
-    assert full.store.session.view.marked is None
+    assert full.store.session.view.marked_cell is None
 
 
 def test_a_mark_made_elsewhere_is_shown_without_flying(full, flown):
-    full.store.change(changes.mark, cells(full)[7])
+    full.store.change(changes.mark_cell, cells(full)[7])
     assert full.table.currentIndex().row() == 7
     full.store.change(changes.show_frame, 0)
-    inside = full.model.row_of(full.store.session.view.marked)
+    inside = full.model.row_of(full.store.session.view.marked_cell)
     assert full.table.currentIndex().row() == inside
-    full.store.change(changes.mark, None)
+    full.store.change(changes.mark_cell, None)
     assert not full.table.currentIndex().isValid()
     assert flown == []
 
 
 def test_back_returns_and_the_mark_stays(full, flown):
     click(full, 1)
-    cell = full.store.session.view.marked
+    cell = full.store.session.view.marked_cell
     QTest.mouseClick(full.back, Qt.MouseButton.LeftButton)
-    assert full.store.session.view.marked == cell is not None
+    assert full.store.session.view.marked_cell == cell is not None
     assert flown[-1] == "back"
 
 
@@ -259,7 +259,7 @@ def test_a_click_in_the_list_brings_the_cell_into_the_middle_and_back(opened):
     opened.qtbot.waitUntil(lambda: panel.model.rowCount() > 0 and panel.isVisible())
     before = window.scene.camera.place
     click(panel, 2)
-    cell = opened.session.view.marked
+    cell = opened.session.view.marked_cell
     assert cell == panel.model.cell(2)
     assert np.allclose(window.scene.plotter.camera.focal_point[:2], middle(opened, cell))
     QTest.mouseClick(panel.back, Qt.MouseButton.LeftButton)
@@ -291,13 +291,13 @@ def double_click(driver, point):
 def test_a_double_click_marks_a_cell_and_escape_takes_that_away(opened):
     cell = 40
     double_click(opened, middle(opened, cell))
-    marked = opened.session.view.marked
+    marked = opened.session.view.marked_cell
     assert marked is not None
     # Cells overlap where some are inverted; the worst of those that are there is meant.
     values = opened.session.frame.quality.values
     assert marked == cell or values[marked] <= values[cell]
     QTest.keyClick(opened.window.view, Qt.Key.Key_Escape)
-    assert opened.session.view.marked is None
+    assert opened.session.view.marked_cell is None
     opened.window.store.change(changes.set_view, threshold=(0.0, 0.5))
     QTest.keyClick(opened.window.view, Qt.Key.Key_Escape)
     assert opened.session.view.threshold is None
@@ -308,7 +308,7 @@ def test_a_click_with_alt_marks_a_cell_and_selects_no_boundary(opened):
     opened.window.store.change(changes.select, (opened.session.mesh.marker_names[0],))
     selected = opened.session.view.selected
     opened.click_view(middle(opened, 40), modifier=Qt.KeyboardModifier.AltModifier)
-    assert opened.session.view.marked == 40
+    assert opened.session.view.marked_cell == 40
     assert opened.session.view.selected == selected
 
 

@@ -230,7 +230,7 @@ def test_a_marked_cell_is_outlined_and_followed(scene, session):
     )
     session = opened(scene, session)
     assert count(image(scene), SELECTED_COLOUR) == 0
-    marked = changes.mark(session, 10)
+    marked = changes.mark_cell(session, 10)
     scene.update(marked)
     assert count(image(scene), SELECTED_COLOUR) > 150
     for frame in (1, 0):
@@ -250,7 +250,7 @@ def test_a_marked_cell_inside_a_3d_mesh_is_seen_through_its_boundaries(scene, be
     session = opened(scene, bent)
     beside = np.concatenate([one.surface.owner for one in scene.drawn.values()])
     inner = next(cell for cell in range(len(session.mesh.cells)) if cell not in beside)
-    marked = changes.mark(session, inner)
+    marked = changes.mark_cell(session, inner)
     scene.update(marked)
     assert all(one.actor.prop.opacity < 0.5 for one in scene.drawn.values())
     assert count(image(scene), SELECTED_COLOUR) > 60
@@ -258,7 +258,7 @@ def test_a_marked_cell_inside_a_3d_mesh_is_seen_through_its_boundaries(scene, be
     assert drawn(faces) == outside(session.mesh, [inner])
     assert set(faces.cell_data[VALUES]) == {session.frame.quality.values[inner]}
     # One beside a boundary needs no such thing; its outline is in front even from behind.
-    scene.update(changes.mark(session, int(beside[0])))
+    scene.update(changes.mark_cell(session, int(beside[0])))
     assert all(one.actor.prop.opacity == 1.0 for one in scene.drawn.values())
     for side in ("+x", "-x"):
         scene.look_from(side)

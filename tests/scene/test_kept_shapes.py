@@ -45,7 +45,7 @@ def test_a_ghost_moves_after_garbage_was_collected(plotter, stator):
 
 def test_a_marked_cell_moves_after_garbage_was_collected(plotter, stator):
     scene, session, _ = opened(plotter, stator)
-    marked = changes.mark(session, 17)
+    marked = changes.mark_cell(session, 17)
     scene.update(marked)
     gc.collect()
     mesh = stator.mesh.with_points(stator.mesh.points + 0.01)

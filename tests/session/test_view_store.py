@@ -87,12 +87,12 @@ def test_what_passes_is_not_undone(store, clock):
     store.change(changes.set_view, edges=False)
     clock.now += 10
     store.change(changes.select, ("left",))
-    store.change(changes.mark, 3)
+    store.change(changes.mark_cell, 3)
     assert store.can_undo == "mesh edges"
     store.undo()
     assert "edges" in store.session.view.drawn
     assert store.session.view.selected == ("left",)
-    assert store.session.view.marked == 3
+    assert store.session.view.marked_cell == 3
 
 
 def test_saving_is_not_undone(store, clock, tmp_path):
@@ -137,7 +137,7 @@ def test_each_change_that_can_be_undone_has_words():
 
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
-    passing = {"selected", "frame", "marked", "beside", "swapped", "ranges"}
+    passing = {"selected", "frame", "marked_cell", "beside", "swapped", "ranges"}
     other_changes = {"chosen", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
@@ -237,7 +237,7 @@ intents = st.one_of(
     st.tuples(st.just("show"), names.map(tuple), st.booleans()),
     st.tuples(st.just("isolate"), names.map(tuple)),
     st.tuples(st.just("select"), names.map(tuple)),
-    st.tuples(st.just("mark"), st.none() | st.integers(0, 15)),
+    st.tuples(st.just("mark_cell"), st.none() | st.integers(0, 15)),
     st.tuples(st.just("show_frame"), st.integers(-2, 9)),
     st.tuples(st.just("steps"), st.integers(0, 9)),
     st.tuples(st.just("colour"), st.sampled_from(list(COLOUR_BY))),

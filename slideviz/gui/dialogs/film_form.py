@@ -68,7 +68,7 @@ class FilmForm(QWidget):
         for option in (self.white, self.fill, self.mark):
             option.toggled.connect(self._changed)
             form.addRow("", option)
-        form.setRowVisible(self.mark, renderer.session.view.marked is not None)
+        form.setRowVisible(self.mark, renderer.session.view.marked_cell is not None)
         self._kind_chosen(self.kind.currentData())
 
     def _make_size(self) -> None:

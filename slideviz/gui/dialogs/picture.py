@@ -155,7 +155,7 @@ class PictureDialog(QDialog):
             self.options[name] = check_box(text, tip, self._changed)
             self._form.addRow("", self.options[name])
         self._form.setRowVisible(self.options["both"], self.renderer.beside is not None)
-        marked = self.renderer.session.view.marked is not None
+        marked = self.renderer.session.view.marked_cell is not None
         self._form.setRowVisible(self.options["marked"], marked)
 
     def _make_buttons(self) -> QDialogButtonBox:

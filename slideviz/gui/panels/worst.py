@@ -148,7 +148,7 @@ class WorstPanel(Panel):
 
     def _sync_mark(self, session: Session) -> None:
         """Make the marked cell the current row, and tell of it."""
-        cell = session.view.marked
+        cell = session.view.marked_cell
         row = self.model.row_of(cell)
         current = self.table.currentIndex()
         if row != (current.row() if current.isValid() else -1):
@@ -180,19 +180,19 @@ class WorstPanel(Panel):
 
     def _go(self, row: int) -> None:
         cell = self.model.cell(row)
-        self.store.change(changes.mark, cell)
+        self.store.change(changes.mark_cell, cell)
         self._fly_to(cell)
 
     def _clicked(self, index: QModelIndex) -> None:
-        if self.model.cell(index.row()) == self.store.session.view.marked:
+        if self.model.cell(index.row()) == self.store.session.view.marked_cell:
             self.unmark()
         else:
             self._go(index.row())
 
     def unmark(self) -> None:
         """Take the mark away."""
-        if self.store.session.view.marked is not None:
-            self.store.change(changes.mark, None)
+        if self.store.session.view.marked_cell is not None:
+            self.store.change(changes.mark_cell, None)
 
     def copy_rows(self) -> None:
         """Copy the selected rows, or all, to the clipboard, with a line of names."""

@@ -91,7 +91,7 @@ class CurveView(QWidget):
     def _picked(self, position: float) -> None:
         """Mark the cell at a position of the curve that is looked at; beside it: none."""
         if self.rows and not self.area.empty:
-            self.store.change(changes.mark, self.rows[-1].curve.cell_at(position))
+            self.store.change(changes.mark_cell, self.rows[-1].curve.cell_at(position))
 
     def _save(self) -> None:
         ask_and_write_plot(self, "Save curve", "along_section", self.drawing())

@@ -53,14 +53,14 @@ class CellMouse(QObject):
     def mark(self, where: QPoint) -> None:
         """Mark the cell at a place of the view; none beside the mesh, or if it is marked."""
         cell = self.scene.pick_cell(*self.view.to_pixels(where))
-        marked = self.store.session.view.marked
-        self.store.change(changes.mark, None if cell == marked else cell)
+        marked = self.store.session.view.marked_cell
+        self.store.change(changes.mark_cell, None if cell == marked else cell)
 
     def _escape(self) -> bool:
         """Take away the mark, then the choice of cells; tell whether there was any."""
         view = self.store.session.view
-        if view.marked is not None:
-            self.store.change(changes.mark, None)
+        if view.marked_cell is not None:
+            self.store.change(changes.mark_cell, None)
         elif view.threshold is not None:
             self.store.change(changes.set_view, threshold=None)
         else:
