@@ -103,7 +103,7 @@ def _shown(session: Session, name: str, section: Section) -> Shown:
     painted = replace(painted, colour_map=session.view.colour_map)
     if by != "role":
         painted = painted.within(*session.colour_range)
-    around = matrices(session, Period().of(session) if session.view.copies else None)
+    around = matrices(session, Period().of(session) if session.view.passages else None)
     every = {0: np.eye(4)} | around
     cutter, points = Cutter.of(frame.mesh), frame.mesh.points
     only = _choice(session, section)

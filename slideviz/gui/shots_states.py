@@ -132,7 +132,7 @@ def quality(window: MainWindow, place: Path) -> None:
     _open(window, _stator(place))
     _run(window, **SLIDING)
     window.store.change(changes.show, OUTER, False)
-    window.store.change(changes.set_view, copies=1)
+    window.store.change(changes.set_view, passages=1)
     _look(window, 30.0, 0.0)
 
 
@@ -142,7 +142,7 @@ def section(window: MainWindow, place: Path) -> None:
     _run(window, **SLIDING)
     window.docks_.lead_to("sections")
     window.docks_.panel(SectionsPanel).add["cylinder"].click()
-    window.store.change(changes.set_view, copies=1)
+    window.store.change(changes.set_view, passages=1)
     window.section_views.want_flat(True)
     window.store.change(changes.show, OUTER, False)
     settle(window)
@@ -173,7 +173,7 @@ def dark(window: MainWindow, place: Path) -> None:
     case.change(motions=FAR).write(place / "passage" / "passage.cfg")
     _open(window, place / "passage" / "passage.cfg")
     _run(window)
-    window.store.change(changes.set_view, copies=1)
+    window.store.change(changes.set_view, passages=1)
     window.docks_.lead_to("curves")
 
 

@@ -142,7 +142,7 @@ class FlatScene:
 
     def _draw_neighbours(self, section: Section) -> None:
         found: dict[int, FloatArray] = {}
-        if self.session.view.copies:
+        if self.session.view.passages:
             pair = self._period.of(self.session)
             for number, matrix in matrices(self.session, pair).items():
                 if pair is not None and keeps(section, matrix):

@@ -54,7 +54,7 @@ class Period:
 
 def matrices(session: Session, pair: Pair | None) -> dict[int, FloatArray]:
     """Return the transformation (4, 4) of each neighbouring passage shown, by its number."""
-    count = session.view.copies
+    count = session.view.passages
     if pair is None or count == 0:
         return {}
     whole = passages_around(pair) is not None
@@ -125,9 +125,9 @@ class PassageLayer(Layer):
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session; points and values are those of the mesh itself."""
-        pair = self._period.of(new) if new.view.copies else None
+        pair = self._period.of(new) if new.view.passages else None
         # Chosen cells have no actor before some are chosen for the first time.
-        key = (pair, new.view.copies, self._chosen.actor)
+        key = (pair, new.view.passages, self._chosen.actor)
         if key != self._key:
             self._key = key
             self._redraw(matrices(new, pair))

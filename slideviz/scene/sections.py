@@ -144,7 +144,7 @@ class SectionLayer(Layer):
         return low, np.max([box[1] for box in boxes], axis=0)
 
     def _neighbours(self, session: Session) -> dict[int, FloatArray]:
-        return matrices(session, self._period.of(session) if session.view.copies else None)
+        return matrices(session, self._period.of(session) if session.view.passages else None)
 
     def _wanted(self, session: Session) -> dict[str, tuple[Section, int, FloatArray | None]]:
         """Return section and passage of each cut, with the passage's matrix, by name."""

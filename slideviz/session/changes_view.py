@@ -22,7 +22,7 @@ UNDO_WORDS: dict[str, str] = {
     "threshold": "range of cells",
     "points": "points",
     "sections": "sections",
-    "copies": "neighbours",
+    "passages": "neighbours",
     "hidden": "hidden boundaries",
     **{name: term.name.lower() for name, term in SHOWN.items()},
 }

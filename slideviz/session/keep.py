@@ -48,7 +48,7 @@ def kept_view(case: Case, view: ViewState, names: tuple[str, ...]) -> ViewState:
         ("VIEW_MAP", "colour_map"),
         ("VIEW_THRESHOLD", "threshold"),
         ("VIEW_POINTS", "points"),
-        ("VIEW_COPIES", "copies"),
+        ("VIEW_COPIES", "passages"),
     ):
         if key in kept:
             values[field] = kept[key]
@@ -79,7 +79,7 @@ def _plain(view: ViewState) -> dict[str, Any]:
         "VIEW_MAP": view.colour_map,
         "VIEW_POINTS": view.points,
         "VIEW_SHOW": tuple(hyphened(name) for name in SHOWN if name in view.drawn),
-        "VIEW_COPIES": view.copies,
+        "VIEW_COPIES": view.passages,
     }
 
 

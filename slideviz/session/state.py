@@ -42,7 +42,7 @@ class ViewState:
         What is drawn of that which can be left out.
     sections : tuple of Section
         What cuts the mesh.
-    copies : int
+    passages : int
         Passages drawn on each side of a periodic mesh; -1 draws all there are.
     hidden : frozenset of str
         Boundaries that are not drawn.
@@ -71,7 +71,7 @@ class ViewState:
     points: PointsShown = "none"
     drawn: frozenset[Shown] = frozenset(name for name, term in SHOWN.items() if term.at_first)
     sections: tuple[Section, ...] = ()
-    copies: int = 0
+    passages: int = 0
     hidden: frozenset[str] = frozenset()
     selected: tuple[str, ...] = ()
     frame: int = 0

@@ -161,11 +161,11 @@ def test_a_section_beside_the_mesh_shows_nothing(scene, cube):
     assert scene.plotter.actors["section:0"].visibility
 
 
-@pytest.mark.parametrize("copies", [0, 1])
-def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, copies):
+@pytest.mark.parametrize("passages", [0, 1])
+def test_glass_in_front_of_a_cut_does_not_tint_it(scene, stator, passages):
     """The shell is seen beside it, and is what it was when the section is gone."""
     mesh, section = stator.mesh, Section("cylinder", radius=0.27)
-    view = {"colour_by": "size-skew", "edges": False, "copies": copies}
+    view = {"colour_by": "size-skew", "edges": False, "passages": passages}
     session = opened(scene, mesh, stator.case, **view)
     before = colours(scene.plotter)
     scene.update(changes.add_section(session, section))
@@ -203,19 +203,19 @@ def areas(polygons):
 def test_neighbours_have_the_edges_of_the_mesh_itself(scene, stator):
     """Actors with one mapper have one shader, that of the one drawn first."""
     section = Section("cylinder", radius=0.27)
-    opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    opened(scene, stator.mesh, stator.case, sections=(section,), passages=1)
     own = scene.plotter.actors
     twins = [actor for name, actor in own.items() if name.startswith("section:0:")]
     assert len(twins) == 2
     shader = own["section:0"].GetShaderProperty()
     assert all(twin.GetShaderProperty() is shader for twin in twins)
-    copies = {
+    passages = {
         actor.name: actor
         for actor in scene.plotter.renderer.GetActors()
         if getattr(actor, "name", "").startswith("copy:1:")
     }
-    assert copies
-    for name, copy in copies.items():
+    assert passages
+    for name, copy in passages.items():
         base = own[f"marker:{name.split(':', 2)[2]}"]
         assert copy.GetShaderProperty() is base.GetShaderProperty()
         assert copy.GetForceOpaque() == base.GetForceOpaque() == 1
@@ -272,7 +272,7 @@ def test_a_click_on_a_section_is_none_on_the_glass_before_it(scene, cube):
 
 def test_a_click_on_a_section_of_a_neighbour_is_none_on_glass(scene, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, copies=1, colour_by="size-skew")
+    session = opened(scene, stator.mesh, stator.case, passages=1, colour_by="size-skew")
     scene.update(changes.add_section(session, section))
     twin = scene.plotter.actors["section:0:1"]
     points = moved(middles(scene.sections.drawn["section:0"].polygons), np.array(twin.user_matrix))
@@ -360,7 +360,7 @@ def test_neighbours_show_the_section_too(scene, stator):
     cylinder = Section("cylinder", radius=0.27)
     plane = Section("plane", (0.27, 0.0, 0.0), (1.0, 0.2, 0.0))
     session = opened(
-        scene, stator.mesh, stator.case, sections=(cylinder, plane), copies=1, colour_by="size"
+        scene, stator.mesh, stator.case, sections=(cylinder, plane), passages=1, colour_by="size"
     )
     base, twin = scene.sections.drawn["section:0"].shown, scene.plotter.actors["section:0:1"]
     assert twin.GetMapper() is base.mapper
@@ -373,7 +373,7 @@ def test_neighbours_show_the_section_too(scene, stator):
     assert "section:1:1" in scene.sections.drawn
     assert set(cells_of(scene, "section:1:1")) != set(cells_of(scene, "section:1"))
     assert len(scene.sections.pickable()) == 2
-    scene.update(changes.set_view(session, copies=0))
+    scene.update(changes.set_view(session, passages=0))
     assert {"section:0", "section:1"} == {
         name for name in scene.plotter.actors if name.startswith("section:")
     }
@@ -511,7 +511,7 @@ def test_a_flat_section_has_the_cells_of_the_range_and_says_so(scene, flat_plott
 
 def test_flat_neighbours_can_be_picked(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), passages=1)
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     flat.fit()
@@ -523,7 +523,7 @@ def test_flat_neighbours_can_be_picked(scene, flat_plotter, stator):
 
 def test_flat_neighbours_lie_one_period_on(scene, flat_plotter, stator):
     section = Section("cylinder", radius=0.27)
-    session = opened(scene, stator.mesh, stator.case, sections=(section,), copies=1)
+    session = opened(scene, stator.mesh, stator.case, sections=(section,), passages=1)
     flat = FlatScene(flat_plotter, scene.sections.cuts)
     flat.update(session, section)
     one = flat.polygons.points
@@ -577,13 +577,13 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
 
 def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
     session = changes.open_mesh(Frame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
-    session = changes.set_view(session, copies=1, colour_by="skew", colour_range=(0.2, 0.9))
+    session = changes.set_view(session, passages=1, colour_by="skew", colour_range=(0.2, 0.9))
     section = Section("cylinder", radius=0.27)
     told = []
     one, three = tmp_path / "one.svg", tmp_path / "three.svg"
     going = (Paper((1600, 1000)), told.append, lambda: False)
     assert save_section(three, session, section, *going) == three
-    save_section(one, changes.set_view(session, copies=0), section, *going)
+    save_section(one, changes.set_view(session, passages=0), section, *going)
     assert three.stat().st_size > 2 * one.stat().st_size
     assert [type(each).__name__ for each in told] == ["Doing"] * 4
     with pytest.raises(CaseError, match="no mesh is open"):

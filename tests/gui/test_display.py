@@ -8,7 +8,7 @@ from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 
-from slideviz.gui.panels.display import MOST_COPIES, NOT_PERIODIC, ROLES_ONLY, SHOWN, Copies
+from slideviz.gui.panels.display import MOST_PASSAGES, NOT_PERIODIC, ROLES_ONLY, SHOWN, PassagesBox
 from slideviz.samples.table import write_sample
 from slideviz.scene.passages import PassageLayer
 from slideviz.scene.pick import to_display
@@ -109,40 +109,40 @@ def stator(tmp_path_factory):
 
 def test_neighbours_of_a_row_and_of_a_wheel(shown, stator):
     box = panel(shown)
-    assert box.copies.isEnabled()
-    assert box.copies.text() == "0"
-    assert box.copies.maximum() == MOST_COPIES
-    QTest.keyClick(box.copies, Qt.Key.Key_Up)
-    assert view(shown).copies == 1
-    assert box.copies.text() == "1 on each side"
+    assert box.passages.isEnabled()
+    assert box.passages.text() == "0"
+    assert box.passages.maximum() == MOST_PASSAGES
+    QTest.keyClick(box.passages, Qt.Key.Key_Up)
+    assert view(shown).passages == 1
+    assert box.passages.text() == "1 on each side"
     scene = shown.window.scene
-    copies = next(layer for layer in scene.layers if isinstance(layer, PassageLayer))
-    seen = to_display(scene.plotter, np.concatenate([one.points for one in copies.shapes()]))
+    passages = next(layer for layer in scene.layers if isinstance(layer, PassageLayer))
+    seen = to_display(scene.plotter, np.concatenate([one.points for one in passages.shapes()]))
     assert seen.min() >= 0, "the view fits them"
     assert (seen.max(axis=0) <= scene.plotter.window_size).all()
     shown.open(stator)
-    assert box.copies.text() == "0"
-    assert "41" not in box.copies.toolTip()
-    assert "8.78049° about z" in box.copies.toolTip()
-    box.copies.setValue(box.copies.maximum())
-    assert box.copies.text() == "all 41 around"
-    assert view(shown).copies == -1
+    assert box.passages.text() == "0"
+    assert "41" not in box.passages.toolTip()
+    assert "8.78049° about z" in box.passages.toolTip()
+    box.passages.setValue(box.passages.maximum())
+    assert box.passages.text() == "all 41 around"
+    assert view(shown).passages == -1
     assert len([n for n in shown.window.view.actors if n.startswith("copy:")]) == 40 * 7
     shown.window.actions_.by_name["undo"].trigger()
-    assert view(shown).copies == 0
-    assert box.copies.value() == 0
+    assert view(shown).passages == 0
+    assert box.passages.value() == 0
 
 
 def test_a_mesh_that_does_not_repeat_says_why_there_are_no_neighbours(shown):
     session = shown.session
     lonely = changes.set_role(session, session.case.markers_with("periodic"), "fixed")
     shown.window.store.put(replace(lonely, pairs=()))
-    assert not panel(shown).copies.isEnabled()
-    assert NOT_PERIODIC in panel(shown).copies.toolTip()
+    assert not panel(shown).passages.isEnabled()
+    assert NOT_PERIODIC in panel(shown).passages.toolTip()
 
 
 def test_a_number_of_neighbours_can_be_typed(qtbot):
-    box = Copies()
+    box = PassagesBox()
     qtbot.addWidget(box)
     box.set_around(41)
     assert box.maximum() == 20
@@ -157,7 +157,7 @@ def test_a_number_of_neighbours_can_be_typed(qtbot):
         box.interpretText()
         assert box.value() == wanted, text
     box.set_around(None)
-    assert box.value() <= MOST_COPIES
+    assert box.value() <= MOST_PASSAGES
     box.set_around(2)
     box.setValue(1)
     assert box.text() == "all 2 around"
@@ -192,7 +192,7 @@ def test_the_panel_fits_its_dock_and_is_off_without_a_mesh(driver, passage_file)
     driver.window.docks["display"].raise_()
     QApplication.processEvents()
     box = panel(driver)
-    for widget in (box.colour_by, box.threshold, box.copies, *box.shown.values()):
+    for widget in (box.colour_by, box.threshold, box.passages, *box.shown.values()):
         right = widget.mapTo(box, widget.rect().topRight()).x()
         assert right < box.width(), widget.objectName()
         assert widget.width() >= widget.minimumSizeHint().width(), widget.objectName()

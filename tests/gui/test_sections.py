@@ -282,7 +282,7 @@ def test_a_cone_is_added_slid_typed_unrolled_and_kept(window, driver, wheel, tmp
     driver.type(editor.number, "9.5")
     driver.type(editor.centre.fields[2], "-1.6")
     assert sections(window)[0].describe() == "cone 9.5° about z from apex (0, 0, -1.6)"
-    window.store.change(changes.set_view, copies=1)
+    window.store.change(changes.set_view, passages=1)
     panel.flat.click()
     flat = window.section_views.flat
     driver.qtbot.waitUntil(lambda: flat.view.isVisible() and flat.across.high > 0.01)

@@ -46,7 +46,7 @@ def test_quality_shows_the_last_step_with_neighbours(window, tmp_path):
     assert session.run_shown.end == "done"
     assert session.view.frame == 5
     assert session.frame.quality.inverted == 0
-    assert session.view.copies == 1
+    assert session.view.passages == 1
     assert session.view.colour_by == "size-skew"
 
 

@@ -131,7 +131,7 @@ def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
     pitch = Period().of(changes.open_mesh(Frame(row.mesh, quality(row.mesh)), None)).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
-    session = opened(scene, row, copies=1, edges=False, triad=False)
+    session = opened(scene, row, passages=1, edges=False, triad=False)
     orange = np.array(pv.Color(ROLES["moving"].colour).int_rgb)
     plain = np.array(pv.Color(LIGHT.cell).int_rgb)
     paler = pv.Color((orange + PALER * (plain - orange)).astype(int).tolist())
@@ -140,13 +140,13 @@ def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
         assert has(near(scene, at + side * pitch), paler, 20), side
         assert not has(near(scene, at + side * pitch), ROLES["moving"].colour, 20), "not paler"
     assert scene.pick(*to_display(scene.plotter, [[*(at + pitch), 0.0]])[0]) != "BLADE"
-    scene.update(changes.set_view(session, copies=0))
+    scene.update(changes.set_view(session, passages=0))
     assert not has(near(scene, at + pitch), paler, 20)
     assert not [name for name in scene.plotter.actors if name.startswith("copy:")]
 
 
 def test_neighbours_of_a_stator_are_turned(scene, stator):
-    session = opened(scene, stator, copies=1)
+    session = opened(scene, stator, passages=1)
     copies = {
         name: actor for name, actor in scene.plotter.actors.items() if name.startswith("copy:")
     }
@@ -169,7 +169,7 @@ def test_neighbours_of_a_stator_are_turned(scene, stator):
 def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
     session = opened(scene, stator)
     near_scale = scene.plotter.camera.parallel_scale
-    scene.update(changes.set_view(session, copies=-1))
+    scene.update(changes.set_view(session, passages=-1))
     names = {name for name in scene.plotter.actors if name.endswith(":BLADE") and "copy" in name}
     assert len(names) == 40
     scene.fit()
@@ -182,7 +182,7 @@ def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
 
 
 def test_neighbours_follow_the_step_and_the_colours(scene, row):
-    session = opened(scene, row, copies=1, edges=False, triad=False)
+    session = opened(scene, row, passages=1, edges=False, triad=False)
     pitch = Period().of(session).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
@@ -200,7 +200,7 @@ def test_neighbours_follow_the_step_and_the_colours(scene, row):
 
 
 def test_neighbours_show_the_chosen_cells_only(scene, row):
-    session = opened(scene, row, copies=1, edges=False, triad=False, colour_by="skew")
+    session = opened(scene, row, passages=1, edges=False, triad=False, colour_by="skew")
     half = float(np.median(session.frame.values("skew")))
     at = middles(row.mesh, np.arange(len(row.mesh.cells)))
     shifted = at + Period().of(session).vector
@@ -225,7 +225,7 @@ def test_neighbours_show_the_chosen_cells_only(scene, row):
 
 
 def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
-    session = opened(scene, stator, copies=1, colour_by="size-skew")
+    session = opened(scene, stator, passages=1, colour_by="size-skew")
     chosen = next(layer for layer in scene.layers if isinstance(layer, ThresholdLayer))
     for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
         scene.update(changes.set_view(session, threshold=threshold))
@@ -242,7 +242,7 @@ def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
 
 def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
     period = Period()
-    lonely = changes.set_view(session, copies=2)
+    lonely = changes.set_view(session, passages=2)
     assert period.of(lonely) is None
     scene.open(lonely, find_surfaces(lonely.mesh))
     assert not [name for name in scene.plotter.actors if name.startswith("copy:")]

@@ -144,7 +144,7 @@ def test_each_field_of_the_view_that_can_be_undone_has_a_word():
 
 
 def test_undo_says_what_of_the_view_it_brings_back(store, clock):
-    for values in ({"colour_by": "skew"}, {"colour_range": (0.5, 1.0)}, {"copies": 1}):
+    for values in ({"colour_by": "skew"}, {"colour_range": (0.5, 1.0)}, {"passages": 1}):
         store.change(changes.set_view, **values)
         clock.now += 10
     said = []

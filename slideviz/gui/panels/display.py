@@ -37,27 +37,27 @@ ROLES_ONLY = "Roles have colours of their own: colour by a value first."
 NOT_PERIODIC = "No boundary of this mesh repeats another, so it has no neighbouring passages."
 
 
-MOST_COPIES = 9
+MOST_PASSAGES = 9
 """Neighbours on each side that can be chosen where a row has no end."""
 
 ONLY = "Draw only the cells whose value is within these two numbers."
 
 
-class Copies(NumberBox):
+class PassagesBox(NumberBox):
     """The number of neighbouring passages, in words; the last value is all of a wheel."""
 
     letters = "al"  # of "all"
 
     def __init__(self) -> None:
         super().__init__()
-        self.setObjectName("copies")
+        self.setObjectName("passages")
         self.around: int | None = None
         self.set_around(None)
 
     def set_around(self, around: int | None) -> None:
         """Set the number of passages of the whole wheel; None for a row without an end."""
         self.around = around
-        self.setRange(0, MOST_COPIES if around is None else max(around // 2, 1))
+        self.setRange(0, MOST_PASSAGES if around is None else max(around // 2, 1))
 
     def textFromValue(self, value: int) -> str:
         """Return the words for a number of neighbours."""
@@ -169,12 +169,12 @@ class DisplayPanel(Panel):
             )
         )
         self.form.addRow("Points", self.points)
-        self.copies = Copies()
+        self.passages = PassagesBox()
         # Arrows as large as those of the fields above it.
-        self.copies.setMinimumHeight(self.points.sizeHint().height())
-        self.copies.valueChanged.connect(self._copies)
-        self.copies_label = QLabel("Neighbours")
-        self.form.addRow(self.copies_label, self.copies)
+        self.passages.setMinimumHeight(self.points.sizeHint().height())
+        self.passages.valueChanged.connect(self._passages)
+        self.passages_label = QLabel("Neighbours")
+        self.form.addRow(self.passages_label, self.passages)
         grid = QGridLayout()
         grid.setVerticalSpacing(3)
         self.shown: dict[Shown, QCheckBox] = {}
@@ -207,7 +207,7 @@ class DisplayPanel(Panel):
         if key == self._key:
             return
         self._key = key
-        with QSignalBlocker(self.only), QSignalBlocker(self.copies):
+        with QSignalBlocker(self.only), QSignalBlocker(self.passages):
             self._sync(session)
 
     def _sync(self, session: Session) -> None:
@@ -235,24 +235,24 @@ class DisplayPanel(Panel):
         self.threshold.setEnabled(view.threshold is not None)
         self.threshold.show_values(view.threshold or _worse_half(session))
         self.points.show_value(view.points)
-        self._sync_copies(session, self._period.of(session) if opened else None)
+        self._sync_passages(session, self._period.of(session) if opened else None)
         for name, box in self.shown.items():
             box.setChecked(name in view.drawn)
             able, term = COMMANDS[name].enabled(Now(session)), SHOWN[name]
             box.setEnabled(able)
             box.setToolTip(wrapped(term.not_in_2d if opened and not able else term.tip))
 
-    def _sync_copies(self, session: Session, pair: Pair | None) -> None:
+    def _sync_passages(self, session: Session, pair: Pair | None) -> None:
         tip, count = NOT_PERIODIC, 0
         if pair is not None:
-            self.copies.set_around(passages_around(pair))
-            count = session.view.copies
+            self.passages.set_around(passages_around(pair))
+            count = session.view.passages
             tip = (
                 f"Neighbouring passages drawn beside the mesh: {pair.first} and {pair.second} "
                 f"repeat by {pair.describe()}."
             )
-        self.copies.setValue(self.copies.maximum() if count < 0 else count)
-        for widget in (self.copies, self.copies_label):
+        self.passages.setValue(self.passages.maximum() if count < 0 else count)
+        for widget in (self.passages, self.passages_label):
             widget.setEnabled(pair is not None)
             widget.setToolTip(wrapped(tip))
 
@@ -264,9 +264,9 @@ class DisplayPanel(Panel):
     def _only(self, on: bool) -> None:
         self._set(threshold=_worse_half(self.store.session) if on else None)
 
-    def _copies(self, value: int) -> None:
-        whole = self.copies.around is not None and value == self.copies.maximum()
-        self._set(copies=-1 if whole else value)
+    def _passages(self, value: int) -> None:
+        whole = self.passages.around is not None and value == self.passages.maximum()
+        self._set(passages=-1 if whole else value)
 
 
 def _worse_half(session: Session) -> tuple[float, float]:

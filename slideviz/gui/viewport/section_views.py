@@ -154,7 +154,7 @@ class SectionViews(QSplitter):
         self.flats.show_section(session, section)
         # Another radius may not make the views change places.
         compared = beside(session) is not None
-        kind = (session.mesh, compared, section.kind, section.direction, session.view.copies)
+        kind = (session.mesh, compared, section.kind, section.direction, session.view.passages)
         if made or kind != self._kind:
             self._kind = kind
             self._arrange(self.flats.extent, compared)

@@ -91,7 +91,7 @@ class FlatView(QWidget):
         self.facts.setText(self.scene.summary)
         self.facts.setToolTip(self.scene.summary)
         about = section.origin if section.shape.terms.point else ()
-        kind = (session.mesh, section.kind, section.direction, about, session.view.copies)
+        kind = (session.mesh, section.kind, section.direction, about, session.view.passages)
         if kind != self._fitted:
             self._fitted = kind
             self._refit.start()

@@ -225,7 +225,7 @@ class Viewing(QWidget):
             # What can be drawn is drawn.
             self.view.render_soon()
             self._sync_beside(new)
-        if old.view.copies != new.view.copies:
+        if old.view.passages != new.view.passages:
             # Neighbours that were asked for should be seen, and the mesh again when they go.
             self.fit()
 
