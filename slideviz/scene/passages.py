@@ -26,8 +26,8 @@ DIRECTIONS = 200
 UNENDING = 2
 """Neighbours on each side where all are asked for and a row has no end."""
 
-CELLS, CHOSEN = "", "\n"
-"""What stands for the cells, and for those that are chosen, among the names of boundaries."""
+CELLS, THRESHOLD = "", "\n"
+"""What stands for the cells, and for those of the threshold, among the names of boundaries."""
 
 
 class Period:
@@ -87,15 +87,15 @@ class PassageLayer(Layer):
     Parameters
     ----------
     stage : Stage
-    cells, boundaries, chosen
+    cells, boundaries, threshold
         The layers whose shapes are drawn again.
     """
 
     def __init__(
-        self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, chosen: ThresholdLayer
+        self, stage: Stage, cells: CellLayer, boundaries: BoundaryLayer, threshold: ThresholdLayer
     ) -> None:
         self.stage = stage
-        self._cells, self._boundaries, self._chosen = cells, boundaries, chosen
+        self._cells, self._boundaries, self._threshold = cells, boundaries, threshold
         self._period = Period()
         self._table = pv.LookupTable()
         self._key: tuple[object, ...] = ()
@@ -117,7 +117,7 @@ class PassageLayer(Layer):
         """Return the outermost points of every passage."""
         if not self._matrices:
             return []
-        # Chosen cells are within the others.
+        # Those of the threshold are within these.
         drawn = [*self._cells.shapes(), *self._boundaries.shapes()]
         every = [np.asarray(shape.points) for shape in drawn]
         ends = outermost(np.concatenate(every))
@@ -126,8 +126,8 @@ class PassageLayer(Layer):
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session; points and values are those of the mesh itself."""
         pair = self._period.of(new) if new.view.passages else None
-        # Chosen cells have no actor before some are chosen for the first time.
-        key = (pair, new.view.passages, self._chosen.actor)
+        # The threshold has no actor before it has cells for the first time.
+        key = (pair, new.view.passages, self._threshold.actor)
         if key != self._key:
             self._key = key
             self._redraw(matrices(new, pair))
@@ -139,8 +139,8 @@ class PassageLayer(Layer):
         found = {name: (one.shape, one.actor) for name, one in self._boundaries.drawn.items()}
         if self._cells.shape is not None:
             found[CELLS] = self._cells.shape, self._cells.actor
-        if self._chosen.actor is not None:
-            found[CHOSEN] = self._chosen.shape, self._chosen.actor
+        if self._threshold.actor is not None:
+            found[THRESHOLD] = self._threshold.shape, self._threshold.actor
         return found
 
     def _redraw(self, wanted: dict[int, FloatArray]) -> None:
@@ -182,7 +182,7 @@ class PassageLayer(Layer):
         plain = np.array(pv.Color(self.stage.scheme.cell).float_rgb)
         for name, (shape, actor) in self._sources().items():
             mapper, prop = self._mappers[name], self._props[name]
-            if mapper.dataset is not shape:  # other cells are chosen
+            if mapper.dataset is not shape:  # the threshold has other cells
                 mapper.dataset = shape
             mapper.scalar_visibility = actor.mapper.scalar_visibility
             prop.DeepCopy(actor.prop)

@@ -54,18 +54,18 @@ class Scene:
         self.stage = Stage(plotter, scheme, font_scale)
         self._cells = CellLayer(self.stage)
         self._boundaries = BoundaryLayer(self.stage)
-        self._chosen = ThresholdLayer(self.stage, self._cells)
+        self._threshold = ThresholdLayer(self.stage, self._cells)
         self._ghosts = GhostLayer(self.stage)
         self.sections = SectionLayer(self.stage)
         self._coarse = CoarseLayer(self.stage, self._boundaries, self.sections)
         self.layers: tuple[Layer, ...] = (
             self._cells,
             self._boundaries,
-            self._chosen,
+            self._threshold,
             self.sections,
             MarkLayer(self.stage),
             self._ghosts,
-            PassageLayer(self.stage, self._cells, self._boundaries, self._chosen),
+            PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
@@ -230,7 +230,7 @@ class Scene:
     def pick(self, x: float, y: float) -> str | None:
         """Return the visible boundary at a pixel counted from the lower left, or None.
 
-        Sections and chosen cells in 3D are no boundaries, and what is in front of them is glass.
+        In 3D sections and cells of the threshold are none, and what is in front of them is glass.
         """
         hidden = self.session.view.hidden
         drawn = [one for name, one in self.drawn.items() if name not in hidden]
@@ -239,7 +239,7 @@ class Scene:
         if drawn[0].surface.flat:
             return pick.nearest_line(self.plotter, x, y, drawn)
         # What is seen through glass is meant, not the glass.
-        solid = [*self.sections.actors(), *(actor for actor, _ in self._chosen.pickable())]
+        solid = [*self.sections.actors(), *(actor for actor, _ in self._threshold.pickable())]
         if pick.meets(self.plotter, x, y, solid):
             return None
         within = [one for one in drawn if one.surface.name not in self._boundaries.glass]
@@ -272,8 +272,8 @@ class Scene:
 
     def _pickable(self) -> list[tuple[Any, IntArray]]:
         """Return the actors of a 3D mesh whose cells can be picked, and whose sides they show."""
-        if self._chosen.cells is not None:
-            return self._chosen.pickable()
+        if self._threshold.cells is not None:
+            return self._threshold.pickable()
         hidden = self.session.view.hidden
         shown = [
             (one.actor, one.surface.owner) for name, one in self.drawn.items() if name not in hidden

@@ -14,25 +14,25 @@ from slideviz.scene.stage import Layer, Stage
 from slideviz.sections.threshold import cells_in_range
 from slideviz.session.state import Session
 
-NAME = "chosen"
+NAME = "threshold"
 
 
 class ThresholdLayer(Layer):
     """The cells within the threshold of the view.
 
-    In 2D the other cells keep a faint area without lines; in 3D the sides between chosen cells
-    are left out, so that what is drawn grows with the surface of what is chosen.
+    In 2D the other cells keep a faint area without lines; in 3D the sides between the others
+    are left out, so that what is drawn grows with the surface of these cells.
 
     Parameters
     ----------
     stage : Stage
     others : CellLayer
-        Draws all cells; it steps back while some are chosen.
+        Draws all cells; it steps back while there is a threshold.
 
     Attributes
     ----------
     cells : (k,) int64 or None
-        Which are chosen, None without a threshold.
+        Which these are, None without a threshold.
     shape : pyvista.PolyData or None
         What is drawn; ``owner`` tells whose sides its polygons are.
     """
@@ -62,9 +62,9 @@ class ThresholdLayer(Layer):
 
     def update(self, old: Session | None, new: Session) -> None:
         """Draw another state of the session."""
-        chosen = new.view.threshold is not None and new.frame is not None
-        self._fade(new, chosen)
-        if not chosen:
+        on = new.view.threshold is not None and new.frame is not None
+        self._fade(new, on)
+        if not on:
             if self.actor is not None:
                 self.actor.visibility = False
             self.cells = None
@@ -77,15 +77,15 @@ class ThresholdLayer(Layer):
             self.actor.mapper.scalar_visibility = True
             self.stage.edges(self.actor.prop, "edges" in new.view.drawn)
 
-    def _fade(self, session: Session, chosen: bool) -> None:
+    def _fade(self, session: Session, on: bool) -> None:
         """Make the cells beyond the threshold faint, or let them be as they were."""
         actor = self.others.actor
-        if actor is None or session.mesh is None or not (chosen or self._faded):
+        if actor is None or session.mesh is None or not (on or self._faded):
             return
-        self._faded = chosen
+        self._faded = on
         if session.mesh.dim == 3:
             see_through(actor, 0.12 if looks_inside(session) else 1.0)
-        if chosen:
+        if on:
             actor.mapper.scalar_visibility = False
             actor.prop.show_edges = False
 

@@ -52,11 +52,11 @@ def cells_in_range(values: FloatArray, threshold: tuple[float, float]) -> IntArr
     values : (m,) float64
         As ``Frame.shown_values`` gives them: not a number for an inverted cell.
     threshold : (float, float)
-        Lowest and highest value. From 0 or below, inverted cells are chosen too.
+        Lowest and highest value. From 0 or below, inverted cells are too.
     """
     low, high = threshold
-    chosen = (values >= low) & (values <= high)
-    return np.flatnonzero(chosen | np.isnan(values) if low <= 0.0 else chosen)
+    inside = (values >= low) & (values <= high)
+    return np.flatnonzero(inside | np.isnan(values) if low <= 0.0 else inside)
 
 
 def range_words(threshold: tuple[float, float]) -> str:

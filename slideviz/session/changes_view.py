@@ -51,8 +51,8 @@ def set_view(session: Session, **values: Any) -> Session:
         if "displacement" in (what, old.colour_by) and old.threshold != ONLY_INVERTED:
             values.setdefault("threshold", None)
     if "sections" in values:
-        chosen = followed(old.chosen, old.sections, values["sections"])
-        values.setdefault("chosen", chosen)
+        index = followed(old.section_index, old.sections, values["sections"])
+        values.setdefault("section_index", index)
     if session.in_file:
         values.pop("threshold", None)  # it would choose among all cells
     drawn = {name: values.pop(name) for name in SHOWN if name in values}
@@ -111,13 +111,13 @@ def lay_flat(session: Session, index: int | None) -> Session:
 
 @undoable("choice of a section")
 def choose_section(session: Session, index: int | None) -> Session:
-    """Return the session with the section at that place chosen; None: none."""
-    return set_view(session, chosen=index)
+    """Return the session with the section at that place selected; None: none."""
+    return set_view(session, section_index=index)
 
 
 @undoable("handle")
 def show_handle(session: Session, shown: bool) -> Session:
-    """Return the session with the handle of the section that is chosen shown, or not."""
+    """Return the session with the handle of the selected section shown, or not."""
     return set_view(session, handle=shown)
 
 
@@ -127,9 +127,9 @@ def flat_one(sections: Sequence[Section]) -> int | None:
 
 
 def followed(index: int | None, old: Sequence[Section], new: Sequence[Section]) -> int | None:
-    """Return the place of the chosen section after one was added, taken away or changed.
+    """Return the place of the selected section after one was added, taken away or changed.
 
-    One that was added is chosen; after the chosen one is gone, its neighbour is.
+    One that was added is selected; after the selected one is gone, its neighbour is.
     """
     if not new:
         return None

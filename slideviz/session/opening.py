@@ -32,7 +32,7 @@ def open_mesh(
     flat = flat_one(view.sections)
     if mesh.part is not None:
         view = replace(view, threshold=None)  # it would choose among all cells
-    view = replace(view, chosen=flat if flat is not None else 0 if view.sections else None)
+    view = replace(view, section_index=flat if flat is not None else 0 if view.sections else None)
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
     return Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)

@@ -58,8 +58,8 @@ class ViewState:
         Whether the second view stands to the left of the first.
     ranges : tuple of (str, (float, float))
         The colour ranges of what else the view was coloured by.
-    chosen : int or None
-        The place of the section that is worked on.
+    section_index : int or None
+        The place of the section that is selected, to be worked on.
     handle : bool
         Whether it shows its handle, to be dragged.
     """
@@ -79,7 +79,7 @@ class ViewState:
     beside: int | None = None
     swapped: bool = False
     ranges: tuple[tuple[ColourBy, tuple[float, float]], ...] = ()
-    chosen: int | None = None
+    section_index: int | None = None
     handle: bool = False
 
     @property
@@ -105,10 +105,10 @@ class ViewState:
 
     @property
     def section(self) -> Section | None:
-        """Return the chosen section, or None."""
-        if self.chosen is None or self.chosen >= len(self.sections):
+        """Return the selected section, or None."""
+        if self.section_index is None or self.section_index >= len(self.sections):
             return None
-        return self.sections[self.chosen]
+        return self.sections[self.section_index]
 
 
 __all__ = [

@@ -196,7 +196,7 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
     assert [panel.list.item(row).text() for row in (0, 1)] == [
         section.describe() for section in sections(window)
     ]
-    assert window.store.session.view.chosen == 1
+    assert window.store.session.view.section_index == 1
     panel.list.item(1).setCheckState(Qt.CheckState.Unchecked)
     assert [section.shown for section in sections(window)] == [True, False]
     assert set(window.scene.sections.drawn) == {"section:0"}
@@ -207,7 +207,7 @@ def test_several_are_listed_hidden_and_chosen(window, driver, panel):
     assert panel.handle.toolTip() not in (tip, "")
     driver.click(panel.remove)
     assert [section.kind for section in sections(window)] == ["plane"]
-    assert window.store.session.view.chosen == 0
+    assert window.store.session.view.section_index == 0
 
 
 def test_an_unrolled_cylinder_follows_radius_and_step_and_goes(window, driver, wheel):
@@ -254,7 +254,7 @@ def test_the_flat_view_comes_back_from_the_case_file(window, driver, panel, tmp_
     assert window.section_views.flat is None
     driver.open(tmp_path / "again.cfg")
     assert window.section_views.flat.scene.section.kind == "cylinder"
-    assert window.store.session.view.chosen == 1
+    assert window.store.session.view.section_index == 1
     assert panel.flat.isChecked()
 
 
@@ -339,7 +339,7 @@ def test_what_is_chosen_and_its_handle_are_undone(window, driver, panel):
     assert panel.list.currentRow() == 1
     assert window.section_views.section.kind == "cylinder"
     undo()
-    assert window.store.session.view.chosen is None
+    assert window.store.session.view.section_index is None
     assert sections(window) == ()
     for _ in range(3):
         redo()

@@ -10,8 +10,8 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.scene.legend import COLOURS, SIZE
 from slideviz.scene.passages import (
-    CHOSEN,
     PALER,
+    THRESHOLD,
     PassageLayer,
     Period,
     matrices,
@@ -230,13 +230,13 @@ def test_neighbours_of_a_3d_mesh_share_the_chosen_cells(scene, stator):
     for threshold, seen in (((0.0, 0.9), True), ((0.5, 0.95), True), ((-1.0, -0.5), False)):
         scene.update(changes.set_view(session, threshold=threshold))
         actors = scene.plotter.actors
-        copies = [actors[f"copy:{number}:{CHOSEN}"] for number in (-1, 1)]
+        copies = [actors[f"copy:{number}:{THRESHOLD}"] for number in (-1, 1)]
         for copy in copies:
             assert copy.mapper.dataset is chosen.shape, threshold
             assert bool(copy.visibility) is seen, threshold
         assert actors["copy:1:BLADE"].prop.opacity < 0.5, "glass, like the boundaries of the mesh"
     scene.update(changes.set_view(session, threshold=None))
-    assert not scene.plotter.actors[f"copy:1:{CHOSEN}"].visibility
+    assert not scene.plotter.actors[f"copy:1:{THRESHOLD}"].visibility
     assert scene.plotter.actors["copy:1:BLADE"].prop.opacity == 1.0
 
 

@@ -287,7 +287,7 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
     store.change(changes.choose_section, 0)
     store.change(changes.show_handle, True)
     store.change(changes.remove_section, 0)
-    assert (store.session.view.chosen, store.session.view.handle) == (0, True)
+    assert (store.session.view.section_index, store.session.view.handle) == (0, True)
     assert store.session.view.section.kind == "cylinder"
     told = []
     while store.can_undo:
@@ -304,16 +304,16 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
     ]
     for _ in range(4):
         store.redo()
-    assert (store.session.view.chosen, store.session.view.handle) == (0, True)
+    assert (store.session.view.section_index, store.session.view.handle) == (0, True)
 
 
 def test_a_mesh_opens_with_the_section_chosen_that_lies_flat(square):
     sections = (("plane", (1.0, 0, 0, 0.5, 0, 0), False, flat, True) for flat in (False, True))
     case = Case(view={"VIEW_SECTIONS": tuple(sections)})
     session = changes.open_mesh(Frame(square, quality(square)), None, (), case)
-    assert (session.view.chosen, session.view.handle) == (1, False)
+    assert (session.view.section_index, session.view.handle) == (1, False)
     case = Case(view={"VIEW_SECTIONS": (("plane", (1.0, 0, 0, 0.5, 0, 0), False, False, True),)})
-    assert changes.open_mesh(Frame(square, quality(square)), None, (), case).view.chosen == 0
+    assert changes.open_mesh(Frame(square, quality(square)), None, (), case).view.section_index == 0
 
 
 @pytest.fixture

@@ -138,7 +138,7 @@ def test_each_change_that_can_be_undone_has_words():
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
     passing = {"selected", "frame", "marked_cell", "beside", "swapped", "ranges"}
-    other_changes = {"chosen", "handle"}
+    other_changes = {"section_index", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
 

@@ -149,14 +149,14 @@ class SectionsPanel(Panel):
                 button.setText(words.name)
                 button.setToolTip(words.add)
         self._sync_list(session)
-        chosen = session.view.section
+        selected = session.view.section
         for widget in (self.list, self.tools):
             widget.setVisible(bool(sections))
         for widget in (self.hint, self.rest):
             widget.setVisible(not sections)
-        self.remove.setEnabled(chosen is not None)
-        fits = chosen is not None and can_cut(mesh, chosen)
-        self.editor.show_section(chosen if fits else None, mesh, session.view.chosen)
+        self.remove.setEnabled(selected is not None)
+        fits = selected is not None and can_cut(mesh, selected)
+        self.editor.show_section(selected if fits else None, mesh, session.view.section_index)
         self._sync_tools(session, dim)
 
     def _sync_list(self, session: Session) -> None:
@@ -179,14 +179,14 @@ class SectionsPanel(Panel):
                 # A new row has no box at all, which reads as one without its tick.
                 if item.data(Qt.ItemDataRole.CheckStateRole) is None or item.checkState() != state:
                     item.setCheckState(state)
-            chosen = session.view.chosen
-            self.list.setCurrentRow(-1 if chosen is None else chosen)
+            index = session.view.section_index
+            self.list.setCurrentRow(-1 if index is None else index)
 
     def _sync_tools(self, session: Session, dim: int) -> None:
-        chosen = session.view.section
-        row = next(iter(SECTION_SHAPES.values())) if chosen is None else chosen.shape.terms
+        selected = session.view.section
+        row = next(iter(SECTION_SHAPES.values())) if selected is None else selected.shape.terms
         words = row.words.get(dim, row.words[3])
-        shown = chosen is not None and chosen.shown
+        shown = selected is not None and selected.shown
         for box, name, tip in (
             (self.handle, "Handle", words.handle),
             (self.flat, words.flat_name, words.flat),
@@ -195,7 +195,7 @@ class SectionsPanel(Panel):
             box.setEnabled(shown)
             box.setToolTip(tip if shown else UNSEEN)
         self.handle.setChecked(session.view.handle)
-        self.flat.setChecked(chosen is not None and chosen.flat)
+        self.flat.setChecked(selected is not None and selected.flat)
         self.look.setToolTip(words.look)
         self.look.setVisible(bool(words.look))
         self.picture.setEnabled(not session.in_file)
@@ -224,12 +224,12 @@ class SectionsPanel(Panel):
     def _remove(self) -> None:
         view = self.store.session.view
         if view.section is not None:
-            self.store.change(changes.remove_section, view.chosen)
+            self.store.change(changes.remove_section, view.section_index)
 
     def _replace(self, section: Section) -> None:
         view = self.store.session.view
         if view.section is not None:
-            self.store.change(changes.replace_section, view.chosen, section)
+            self.store.change(changes.replace_section, view.section_index, section)
 
     def _checked(self, item: QListWidgetItem) -> None:
         row = self.list.row(item)
@@ -245,7 +245,7 @@ class SectionsPanel(Panel):
 
 def _concerned(old: Session, new: Session) -> bool:
     """Tell whether a change is one of the mesh or the sections."""
-    names = ("sections", "chosen", "handle")
+    names = ("sections", "section_index", "handle")
     same = (getattr(old.view, name) == getattr(new.view, name) for name in names)
     return old.mesh is not new.mesh or not all(same)
 

@@ -81,7 +81,7 @@ class SectionViews(QSplitter):
     def want_flat(self, wanted: bool) -> None:
         """Lay the selected section flat beside the 3D view, or end that."""
         if wanted != self.is_flat or not wanted:
-            at = self.store.session.view.chosen if wanted else None
+            at = self.store.session.view.section_index if wanted else None
             self.store.change(changes.lay_flat, at)
 
     def look_along(self) -> None:
@@ -135,8 +135,8 @@ class SectionViews(QSplitter):
 
     def _replaced(self, section: Section) -> None:
         if self.section is not None and section != self.section:
-            chosen = self.store.session.view.chosen
-            self.store.change(changes.replace_section, chosen, section)
+            at = self.store.session.view.section_index
+            self.store.change(changes.replace_section, at, section)
 
     def _sync_flat(self, session: Session) -> None:
         at = changes.flat_one(session.view.sections)

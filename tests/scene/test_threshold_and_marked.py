@@ -108,7 +108,7 @@ def test_3d_exactly_the_cells_in_the_range_are_drawn(scene, bent):
     low, high = np.quantile(values, [0.1, 0.4])
     session = changes.set_view(session, threshold=(low, high))
     scene.update(session)
-    layer, wanted = scene._chosen, in_range(session.frame, low, high)
+    layer, wanted = scene._threshold, in_range(session.frame, low, high)
     assert 0 < len(wanted) < len(values)
     assert layer.cells.tolist() == wanted.tolist()
     assert drawn(layer.shape) == outside(session.mesh, wanted)
@@ -129,7 +129,7 @@ def test_the_range_is_that_of_what_the_view_is_coloured_by(scene, bent):
     by_size = changes.set_view(session, colour_by="size")
     scene.update(by_size)
     wanted = np.flatnonzero(by_size.frame.quality.size <= 0.9)
-    assert scene._chosen.cells.tolist() == wanted.tolist()
+    assert scene._threshold.cells.tolist() == wanted.tolist()
     assert wanted.tolist() != in_range(session.frame, 0.0, 0.9).tolist()
 
 
@@ -139,13 +139,13 @@ def test_chosen_cells_follow_the_step(scene, cube):
     for frame in (2, 1, 2):
         session = changes.show_frame(session, frame)
         scene.update(session)
-        assert scene._chosen.cells.tolist() == in_range(session.frame, 0.0, 0.8).tolist()
+        assert scene._threshold.cells.tolist() == in_range(session.frame, 0.0, 0.8).tolist()
     # The same cells at another step: moved in place.
     every = changes.set_view(session, threshold=(0.0, 1.0))
     scene.update(every)
-    shape = scene._chosen.shape
+    shape = scene._threshold.shape
     scene.update(changes.show_frame(every, 1))
-    assert scene._chosen.shape is shape
+    assert scene._threshold.shape is shape
     nodes = shape.point_data["vtkOriginalPointIds"]
     assert np.allclose(shape.points, every.frames[1].mesh.points[nodes])
 
@@ -154,13 +154,13 @@ def test_inverted_cells_alone_can_be_chosen(scene, cube):
     session = stepped(changes.open_mesh(Frame(cube, quality(cube)), None), 0.12)
     assert session.frame.quality.inverted
     session = opened(scene, changes.set_view(session, threshold=ONLY_INVERTED))
-    assert len(scene._chosen.cells) == session.frame.quality.inverted
+    assert len(scene._threshold.cells) == session.frame.quality.inverted
     assert count(image(scene), INVERTED_COLOUR, 60) > 50
 
 
 def test_a_range_that_holds_nothing_draws_nothing(scene, bent):
     opened(scene, changes.set_view(bent, threshold=(0.001, 0.002)))
-    assert len(scene._chosen.cells) == 0
+    assert len(scene._threshold.cells) == 0
     assert scene.pick_cell(210, 150) is None
     image(scene)
 
@@ -175,7 +175,7 @@ def test_2d_the_other_cells_vanish(scene, session):
     session = opened(scene, changes.set_view(session, colour_by="size-skew", edges=True))
     whole = image(scene)
     scene.update(changes.set_view(session, threshold=(0.0, 0.99)))
-    assert scene._chosen.cells.tolist() == [5, 6, 9, 10]
+    assert scene._threshold.cells.tolist() == [5, 6, 9, 10]
     picture = image(scene)
 
     def colour(picture, point):
