@@ -131,7 +131,7 @@ class Store:
         self.failed: Failed | None = None
         self._undo: list[_Done] = []
         self._redo: list[_Done] = []
-        self._held = False
+        self._dragging = False
 
     def listen(self, listener: Listener) -> None:
         """Call ``listener(old, new)`` after each change from now on."""
@@ -149,19 +149,19 @@ class Store:
         self.put(new)
 
     @property
-    def held(self) -> bool:
+    def dragging(self) -> bool:
         """Tell whether the mouse drags something that changes the session."""
-        return self._held
+        return self._dragging
 
-    def hold(self, held: bool) -> None:
+    def set_dragging(self, dragging: bool) -> None:
         """Note that the mouse begins to drag something, or ends it.
 
         What changes meanwhile is undone as one, however long it takes, and apart from the rest.
         """
-        self._held = held
+        self._dragging = dragging
         if self._undo:
             last = self._undo[-1]
-            if held or last.at_s == float("inf"):
+            if dragging or last.at_s == float("inf"):
                 self._undo[-1] = replace(last, at_s=float("-inf"))
 
     def put(self, session: Session) -> None:
@@ -228,7 +228,7 @@ class Store:
         now = self._clock()
         last = self._undo[-1] if self._undo else None
         # Nothing is later than what the mouse still holds, so that it goes with the rest of it.
-        at_s = float("inf") if self._held else now
+        at_s = float("inf") if self._dragging else now
         if last is not None and last.kind == kind and now - last.at_s < TOGETHER_S:
             self._undo.pop()
             if last.before != Memento.of(new):

@@ -117,11 +117,11 @@ def test_a_section_that_is_dragged_goes_with_fewer_facets(stator, qtbot):
     assert not scene.coarse
     section = scene.sections.drawn["section:0"].actor.prop
     assert section.show_edges
-    window.store.hold(True)
+    window.store.set_dragging(True)
     other = Section("plane", (*place[:2], place[2] + 0.001), (0, 0, 1))
     window.store.change(changes.replace_section, 0, other)
     assert scene.coarse
     assert not section.show_edges
-    window.store.hold(False)
+    window.store.set_dragging(False)
     qtbot.waitUntil(lambda: not scene.coarse)
     assert section.show_edges

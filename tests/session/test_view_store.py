@@ -156,11 +156,11 @@ def test_undo_says_what_of_the_view_it_brings_back(store, clock):
 
 def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, clock):
     for low in (0.1, 0.5):
-        store.hold(True)
+        store.set_dragging(True)
         for step in range(4):
             store.change(changes.set_view, threshold=(low + 0.01 * step, 0.9))
             clock.now += 3 * TOGETHER_S
-        store.hold(False)
+        store.set_dragging(False)
     assert store.session.view.threshold == (0.53, 0.9)
     store.undo()
     assert store.session.view.threshold == (0.13, 0.9)

@@ -46,17 +46,17 @@ class BrushCanvas(PlotCanvas):
     -------
     brushed(object)
         The range (low, high) that the mouse holds, or None for a click beside it.
-    held(bool)
+    dragging(bool)
         The button is down, or up again.
     """
 
     brushed = Signal(object)
-    held = Signal(bool)
+    dragging = Signal(bool)
 
     def __init__(self, drawing: Callable[[], Draw]) -> None:
         super().__init__(drawing)
         self.band: Range | None = None
-        self._held: float | None = None
+        self._pressed: float | None = None
         self._moved = False
         self.setCursor(Qt.CursorShape.CrossCursor)
         self.setToolTip(BRUSH)
@@ -80,30 +80,30 @@ class BrushCanvas(PlotCanvas):
         if event.button() != Qt.MouseButton.LeftButton or not self.figure.axes or self.locked:
             return
         x = event.position().x()
-        self._held, self._moved = self.value_at(x), False
+        self._pressed, self._moved = self.value_at(x), False
         if self.band is not None:
             ends = [self.pixel_of(value) for value in self.band]
             for near, far in ((0, 1), (1, 0)):
                 if abs(x - ends[near]) <= END_PX:
-                    self._held, self._moved = self.band[far], True
-        self.held.emit(True)
+                    self._pressed, self._moved = self.band[far], True
+        self.dragging.emit(True)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._held is None:
+        if self._pressed is None:
             self._show_cursor(event.position().x())
             return
         here = self.value_at(event.position().x())
-        self._moved = self._moved or abs(self.pixel_of(self._held) - event.position().x()) > 3
+        self._moved = self._moved or abs(self.pixel_of(self._pressed) - event.position().x()) > 3
         if self._moved:
-            self.show_band((min(self._held, here), max(self._held, here)))
+            self.show_band((min(self._pressed, here), max(self._pressed, here)))
             self.brushed.emit(self.band)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton and self._held is not None:
-            self._held = None
+        if event.button() == Qt.MouseButton.LeftButton and self._pressed is not None:
+            self._pressed = None
             if not self._moved:
                 self.brushed.emit(None)
-            self.held.emit(False)
+            self.dragging.emit(False)
 
     def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
         self.brushed.emit(None)
@@ -141,7 +141,7 @@ class HistogramPanel(Panel):
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._brushed)
-        self.canvas.held.connect(self._held)
+        self.canvas.dragging.connect(self._dragged)
         self.numbers = QLabel()
         self.numbers.setTextFormat(Qt.TextFormat.RichText)
         self.numbers.setWordWrap(True)
@@ -257,11 +257,11 @@ class HistogramPanel(Panel):
         if not self._soon.isActive():
             self._soon.start()
 
-    def _held(self, held: bool) -> None:
-        if not held and self._soon.isActive():
+    def _dragged(self, dragging: bool) -> None:
+        if not dragging and self._soon.isActive():
             self._soon.stop()
             self._choose()
-        self.store.hold(held)
+        self.store.set_dragging(dragging)
 
     def _choose(self) -> None:
         if self._wanted is not None:

@@ -33,7 +33,7 @@ class SectionEditor(QWidget):
     """
 
     changed = Signal(object)
-    held = Signal(bool)
+    dragging = Signal(bool)
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ class SectionEditor(QWidget):
         self.slider.setPageStep(STEPS // 20)
         self.slider.setMinimumWidth(80)
         self.slider.valueChanged.connect(lambda _: self._soon.start())
-        self.slider.sliderPressed.connect(lambda: self.held.emit(True))
+        self.slider.sliderPressed.connect(lambda: self.dragging.emit(True))
         self.slider.sliderReleased.connect(self._let_go)
         self.number = NumberField(0.0, self._allowed)
         self.number.setFixedWidth(84)
@@ -201,7 +201,7 @@ class SectionEditor(QWidget):
         if self._soon.isActive():
             self._soon.stop()
             self._slid()
-        self.held.emit(False)
+        self.dragging.emit(False)
 
     def _slid(self) -> None:
         if self._section is None:

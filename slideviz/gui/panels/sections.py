@@ -102,7 +102,7 @@ class SectionsPanel(Panel):
         self.hint = hint_label(HINTS[3], Qt.AlignmentFlag.AlignTop)
         self.editor = SectionEditor()
         self.editor.changed.connect(self._replace)
-        self.editor.held.connect(self.store.hold)
+        self.editor.dragging.connect(self.store.set_dragging)
 
     def _make_tools(self) -> None:
         self.handle, self.flat = check_box("Handle", ""), check_box("Flat view", "")

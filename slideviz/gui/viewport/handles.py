@@ -30,12 +30,12 @@ class Handles:
     ----------
     moved : callable
         Gets the section while it is dragged.
-    held : callable
+    dragging : callable
         Gets whether the mouse begins to drag, or ends it.
     """
 
-    def __init__(self, moved: Callable[[Section], None], held: Callable[[bool], None]) -> None:
-        self._moved, self._held = moved, held
+    def __init__(self, moved: Callable[[Section], None], dragging: Callable[[bool], None]) -> None:
+        self._moved, self._dragging = moved, dragging
         self._section: Section | None = None
         self._of: dict[View3D, Handle] = {}
 
@@ -83,9 +83,9 @@ class Handles:
 
     def _make(self, kind: type[Handle], view: View3D, scene: Scene) -> Handle:
         if kind is PlaneHandle:
-            return PlaneHandle(view, self._dragged, self._held)
+            return PlaneHandle(view, self._dragged, self._dragging)
         made = FlatHandle if kind is FlatHandle else RoundHandle
-        return made(view, scene.stage.strip, self._moved, self._held)
+        return made(view, scene.stage.strip, self._moved, self._dragging)
 
     def drop(self, view: View3D) -> None:
         """Remove the handle from a view."""

@@ -37,7 +37,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         Returns the pixels at the right that are the legend's.
     moved : callable
         Gets the section while it is dragged, at most once per turn of the event loop.
-    held : callable
+    dragging : callable
         Gets whether the mouse begins to drag, or ends it.
     """
 
@@ -46,11 +46,11 @@ class MouseHandle(QObject, Generic[Grasp]):
         view: View3D,
         strip: Callable[[], float],
         moved: Callable[[Section], None],
-        held: Callable[[bool], None] = lambda _held: None,
+        dragging: Callable[[bool], None] = lambda _dragging: None,
     ) -> None:
         super().__init__(view)
         self.view, self._strip = view, strip
-        self._moved, self._held = moved, held
+        self._moved, self._dragging = moved, dragging
         self.section: Section | None = None
         self._part: str | None = None
         self._mouse = QPoint(-1, -1)
@@ -123,7 +123,7 @@ class MouseHandle(QObject, Generic[Grasp]):
         self._point_at(part)
         self._start = self.grasp(), self.place_of(where)
         self._at = None
-        self._held(True)
+        self._dragging(True)
         return True
 
     def _move(self, where: QPoint, pressed: bool) -> bool:
@@ -143,7 +143,7 @@ class MouseHandle(QObject, Generic[Grasp]):
             self._at = self.place_of(where)
             self.tell()
         self._start = self._at = None
-        self._held(False)
+        self._dragging(False)
         self.put()
         self._point_at(self.part_at(where))
         self.view.render_soon()

@@ -31,7 +31,7 @@ class PlaneHandle:
     view : View3D
     moved : callable
         Gets origin and normal while they are dragged, at most once per turn of the event loop.
-    held : callable
+    dragging : callable
         Gets whether the mouse begins to drag, or ends it.
     """
 
@@ -39,10 +39,10 @@ class PlaneHandle:
         self,
         view: View3D,
         moved: Callable[[Triple, Triple], None],
-        held: Callable[[bool], None] = lambda _held: None,
+        dragging: Callable[[bool], None] = lambda _dragging: None,
     ) -> None:
         self.view = view
-        self._moved, self._held = moved, held
+        self._moved, self._dragging = moved, dragging
         self.shape = vtkImplicitPlaneRepresentation()
         self.shape.SetPlaceFactor(1.0)
         self.shape.OutlineTranslationOff()
@@ -101,7 +101,7 @@ class PlaneHandle:
         if not dragging:
             self._soon.stop()
             self.tell()
-        self._held(dragging)
+        self._dragging(dragging)
 
     def _colour(self, scheme: ColorScheme) -> None:
         strong, plain = (pv.Color(name).float_rgb for name in (SELECTED_COLOUR, scheme.text))

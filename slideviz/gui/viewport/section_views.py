@@ -48,7 +48,7 @@ class SectionViews(QSplitter):
         self.viewing, self.store = viewing, viewing.store
         self.addWidget(viewing)
         self._multi_samples = multi_samples
-        self.handles = Handles(self._replaced, self.store.hold)
+        self.handles = Handles(self._replaced, self.store.set_dragging)
         self.flats: Flats | None = None
         self._closed = False
         self._kind: tuple[object, ...] = ()

@@ -216,7 +216,7 @@ class Viewing(QWidget):
                 scene.set_motion_ghosts(moved)
         if old.mesh is not new.mesh:
             return
-        if self.store.held:  # the mouse drags a section, for example
+        if self.store.dragging:  # the mouse drags a section, for example
             for view, _ in self.pairs():
                 view.signals.moving.emit()
         try:
