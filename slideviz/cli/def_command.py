@@ -7,13 +7,14 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from slideviz.cli.options import add_shared, changed
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.design.su2_config import Su2Config
+    from slideviz.design.su2_surface import Surface
     from slideviz.mesh.model import Mesh
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
@@ -108,14 +109,19 @@ def run_def(arguments: argparse.Namespace) -> int:
     folded = folded_cells(steps, mesh, found)
     report = run_report(case, mesh, steps, seconds, quality=found, undeformed=before, folded=folded)
     report["design"] = {
-        "variables": [
-            {"kind": variable.kind, "value": variable.value, "idle": idle}
-            for variable, idle in zip(config.variables, surface.idle, strict=True)
-        ],
+        "variables": variable_rows(surface),
         "boxes": {name: len(found.nodes) for name, found in surface.inside.items()},
         "ignored": list(config.ignored),
     }
     return tell(arguments, report, {"mesh": output, CELLS: rated}, found, before, folded)
+
+
+def variable_rows(surface: Surface) -> list[dict[str, Any]]:
+    """Return what a report says of each design variable."""
+    return [
+        {"kind": variable.kind, "value": variable.value, "idle": idle}
+        for variable, idle in zip(surface.config.variables, surface.idle, strict=True)
+    ]
 
 
 def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, begin: float) -> int:
@@ -143,10 +149,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
         "seconds": {"total": round(time.perf_counter() - begin, 6)},
         "warnings": list(case.warnings),
     }
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    elif not arguments.quiet:
+    if not save_json(arguments.json, report) and not arguments.quiet:
         for name, count in counts.items():
             print(f"FFD box {name}: {count} surface nodes")
         print(f"mesh: {case.mesh_out}")

@@ -7,7 +7,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from slideviz.cli.def_command import add_config, read_configuration
+from slideviz.cli.def_command import add_config, read_configuration, variable_rows
 from slideviz.cli.options import add_shared
 
 if TYPE_CHECKING:
@@ -62,18 +62,12 @@ def run_dot(arguments: argparse.Namespace) -> int:
         "sensitivities": found.source,
         "at": "design" if found.at_design else "mesh",
         "gradient": [] if gradient is None else found.variables.tolist(),
-        "variables": [
-            {"kind": variable.kind, "value": variable.value, "idle": idle}
-            for variable, idle in zip(config.variables, surface.idle, strict=True)
-        ],
+        "variables": variable_rows(surface),
         "ignored": list(config.ignored),
         "seconds": {"total": round(time.perf_counter() - begin, 6)},
         "warnings": list(dict.fromkeys(found.warnings)),
     }
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    elif not arguments.quiet:
+    if not save_json(arguments.json, report) and not arguments.quiet:
         _print(report, sensitivities, gradient)
     for warning in report["warnings"]:
         print(f"slideviz: warning: {warning}", file=sys.stderr)

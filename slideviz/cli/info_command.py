@@ -50,11 +50,8 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Qual
     from slideviz.mesh.periodic import find_pairs
 
     report = info_report(mesh, find_pairs(mesh), counts, found)
-    if arguments.json:
-        text = save_json(arguments.json, report)
-        if text is not None:
-            print(text, end="")
-            return DONE
+    if save_json(arguments.json, report):
+        return DONE
     zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
     print(f"{arguments.mesh}: {mesh.dim}D{zone}, {counts.points} points")
     print(table([(count, name) for name, count in report["cells_by_type"].items()]))

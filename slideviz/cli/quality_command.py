@@ -89,10 +89,7 @@ def _told(
 
     report = quality_report(name, found, worst)
     report |= {"reference": str(reference) if reference else None}
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    else:
+    if not save_json(arguments.json, report):
         print(f"{arguments.mesh}: size-skew, metric {found.metric}")
         print(f"  {words_of(reference)}")
         print(quality_lines(found))

@@ -191,14 +191,17 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
-def save_json(path: Path, report: Mapping[str, Any]) -> str | None:
-    """Write a report; returns the text instead when the path is ``-``."""
+def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:
+    """Write a report where one is asked for; ``-`` prints it. Tell whether it was printed."""
+    if path is None:
+        return False
     text = json.dumps(report, indent=2) + "\n"
     if str(path) == "-":
-        return text
+        print(text, end="")
+        return True
     with atomic_write(path, CaseError) as file:
         file.write(text.encode())
-    return None
+    return False
 
 
 def save_history(path: Path, report: Mapping[str, Any]) -> None:

@@ -31,10 +31,7 @@ def tell(
 
     if arguments.history:
         save_history(arguments.history, report)
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    elif not arguments.quiet:
+    if not save_json(arguments.json, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}

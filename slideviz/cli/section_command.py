@@ -196,10 +196,7 @@ def _report(arguments: argparse.Namespace, scene: _Scene, shown: Shown) -> int:
         "picture": str(arguments.output),
         **summary,
     }
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    else:
+    if not save_json(arguments.json, report):
         print(f"{Path(mesh.name).name}: {chosen.describe(mesh.dim)}")
         print(f"  {shown.paint.sentence(shown.ids)}, worst is cell {summary['worst_cell']}")
         if shown.note or scene.reference:

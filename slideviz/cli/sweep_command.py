@@ -102,10 +102,7 @@ def sweep(arguments: argparse.Namespace) -> int:
         found = _pulled(arguments, rows, len(designs.rows), folder / RESULTS)
     report = _report(arguments, designs, found, time.perf_counter() - begin)
     report["results"] = str(folder / RESULTS)
-    text = save_json(arguments.json, report) if arguments.json else None
-    if text is not None:
-        print(text, end="")
-    elif not arguments.quiet:
+    if not save_json(arguments.json, report) and not arguments.quiet:
         _print_sweep(report)
     _warn(case.warnings, found)
     if report["failed"] == len(found):
