@@ -8,7 +8,16 @@ from typing import Any
 from slideviz.case.key import MOTION, NO_DEFAULT, Key, setting
 from slideviz.case.model import Case
 from slideviz.case.values import Kind, one_of
-from slideviz.case.words import Word, is_none, list_of, name_text, number, shown, words_of
+from slideviz.case.words import (
+    Word,
+    groups_of,
+    is_none,
+    list_of,
+    name_text,
+    number,
+    shown,
+    words_of,
+)
 from slideviz.errors import CaseError
 from slideviz.terms import FFD_BLENDINGS
 
@@ -19,14 +28,9 @@ NUMBERS = 24
 
 
 def _groups(text: str) -> list[list[Word]]:
-    """Return the words between brackets, or between semicolons."""
-    groups: list[list[Word]] = [[]]
-    for word in [] if is_none(words_of(text)) else words_of(text):
-        if word.is_sign(";"):
-            groups.append([])
-        elif not any(word.is_sign(sign) for sign in "(),"):
-            groups[-1].append(word)
-    return [group for group in groups if group]
+    """Return the words of each box; ``NONE`` has no box."""
+    words = words_of(text)
+    return [] if is_none(words) else [group for group in groups_of(words) if group]
 
 
 def _read_definition(text: str) -> tuple[Definition, ...]:

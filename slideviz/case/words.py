@@ -57,6 +57,17 @@ def words_of(text: str) -> list[Word]:
     return found
 
 
+def groups_of(words: Iterable[Word]) -> list[list[Word]]:
+    """Return the words between semicolons, without brackets and commas."""
+    groups: list[list[Word]] = [[]]
+    for word in words:
+        if word.is_sign(";"):
+            groups.append([])
+        elif not any(word.is_sign(sign) for sign in "(),"):
+            groups[-1].append(word)
+    return groups
+
+
 def without_comment(line: str, signs: str = COMMENT_SIGNS) -> str:
     """Return the line up to its comment sign; one between quotes is no comment."""
     inside = False

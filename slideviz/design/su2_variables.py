@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from slideviz.case.lines import Entry, Problem
-from slideviz.case.words import Word, list_of, number, words_of
+from slideviz.case.words import Word, groups_of, list_of, number, words_of
 from slideviz.errors import CaseError
 
 KINDS = {
@@ -110,17 +110,11 @@ def _groups(
             problems.append((rows["DV_KIND"].line, "DV_PARAM is missing: ( ... ) ; ( ... )"))
             return []
         return [[] for _ in kinds]
-    groups: list[list[Word]] = [[]]
     try:
-        words = words_of(entry.value)
+        groups = groups_of(words_of(entry.value))
     except CaseError as problem:
         problems.append((entry.line, f"DV_PARAM: {problem}"))
         return []
-    for word in words:
-        if word.is_sign(";"):
-            groups.append([])
-        elif not any(word.is_sign(sign) for sign in "(),"):
-            groups[-1].append(word)
     groups = groups[:-1] if not groups[-1] else groups  # a semicolon after the last
     if len(groups) != len(kinds):
         said = f"DV_PARAM has {len(groups)} groups for {len(kinds)} variables; give one each"
