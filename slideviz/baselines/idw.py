@@ -22,7 +22,7 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf import compiled
 from slideviz.rbf.compiled import BLOCK, OPTIONS, TARGETS_PER_TASK, half_chord
 from slideviz.rbf.constraint_rows import merge
-from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick
+from slideviz.rbf.evaluate import CHUNK, Basis, Tick, no_tick, padded_rows
 from slideviz.rbf.methods import within
 from slideviz.rbf.problem import Problem, Solution, Watch
 from slideviz.rbf.slopes import TINY
@@ -78,8 +78,8 @@ def weighted_means(
     scale = np.full((4, 1), 1.0 / basis.radius)
     if basis.period > 0:
         scale[1:3] = 1.0
-    x, c = _rows(targets, 4) * scale, _rows(sources, 4) * scale
-    v, g = _rows(values.T, 3), np.ascontiguousarray(weights, float)
+    x, c = padded_rows(targets, 4) * scale, padded_rows(sources, 4) * scale
+    v, g = padded_rows(values.T, 3), np.ascontiguousarray(weights, float)
     total = x.shape[1]
     out = np.empty((3, total))
     size = max(1, CHUNK // max(1, c.shape[1]))
@@ -94,13 +94,6 @@ def weighted_means(
         out[:, start : start + size] = result
         tick(min(1.0, (start + size) / total))
     return np.ascontiguousarray(out[: values.shape[1]].T)
-
-
-def _rows(values: FloatArray, rows: int) -> FloatArray:
-    """Return the array (k, n) with zero rows added up to ``rows``."""
-    out = np.zeros((rows, values.shape[1]))
-    out[: len(values)] = values
-    return out
 
 
 def deform_idw(problem: Problem, watch: Watch, weights: Weights) -> Solution:

@@ -67,12 +67,12 @@ def evaluate(
     """
     rotational, kind = basis.period > 0, KERNELS[basis.kernel].code
     rows = 4 if rotational or kind or len(targets) == 4 else 3
-    c, w = _rows(controls, rows), _rows(weights.T, 3)
+    c, w = padded_rows(controls, rows), padded_rows(weights.T, 3)
     total, scale = targets.shape[1], 1.0 / basis.radius
     out = np.empty((total, weights.shape[1]))
     size = max(1, CHUNK // max(1, c.shape[1]))
     for start in range(0, total, size):
-        part = _rows(targets[:, start : start + size], rows)
+        part = padded_rows(targets[:, start : start + size], rows)
         result = np.empty_like(part[:3])
         with compiled.one_at_a_time(part.shape[1] * c.shape[1]):
             if kind:
@@ -102,8 +102,10 @@ def matrix(
         Features (k, N) of the node of each constraint, and its unit direction (N, d), or None
         to leave the dot product out. ``columns`` None: the same as the rows.
     """
-    x, across = _rows(rows[0], 4), _directions(*rows)
-    c, along = (x, across) if columns is None else (_rows(columns[0], 4), _directions(*columns))
+    x, across = padded_rows(rows[0], 4), _directions(*rows)
+    c, along = (
+        (x, across) if columns is None else (padded_rows(columns[0], 4), _directions(*columns))
+    )
     total, n = x.shape[1], c.shape[1]
     out = np.empty((total, n))
     size = max(1, CHUNK // max(1, n))
@@ -131,7 +133,7 @@ def _directions(features: FloatArray, directions: FloatArray | None) -> FloatArr
     return np.ascontiguousarray(directions.T)
 
 
-def _rows(values: FloatArray, rows: int) -> FloatArray:
+def padded_rows(values: FloatArray, rows: int) -> FloatArray:
     """Return the array (k, n) with zero rows added up to ``rows``, contiguous."""
     out = np.zeros((rows, values.shape[1]))
     out[: len(values)] = values

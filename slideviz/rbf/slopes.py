@@ -19,7 +19,7 @@ from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
 from slideviz.rbf.compiled import _A2, BLOCK, OPTIONS, TARGETS_PER_TASK, _distances, half_chord
-from slideviz.rbf.evaluate import Basis, _rows
+from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
 
 NEAR = 1e-12
@@ -173,10 +173,10 @@ def sum_powers(
     basis: Basis, targets: FloatArray, controls: FloatArray, weights: FloatArray, power: float
 ) -> FloatArray:
     """Return sum_j w_j (|x_i - c_j| / R)^-power at the targets, (N, d)."""
-    x, c = _rows(targets, 4), _rows(controls, 4)
+    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _sum_powers(x, c, _rows(weights.T, 3), basis.half, 1.0 / basis.radius, power, out)
+        _sum_powers(x, c, padded_rows(weights.T, 3), basis.half, 1.0 / basis.radius, power, out)
     return np.ascontiguousarray(out[: weights.shape[1]].T)
 
 
@@ -200,14 +200,14 @@ def pull_positions(
     power
         That of inverse distance weighting, in place of the radial function; 0: none.
     """
-    x, c = _rows(targets, 4), _rows(controls, 4)
+    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
         _reverse(
             x,
             c,
-            _rows(adjoint.T, 3),
-            _rows(weights.T, 3),
+            padded_rows(adjoint.T, 3),
+            padded_rows(weights.T, 3),
             basis.half,
             1.0 / basis.radius,
             INVERSE if power else KERNELS[basis.kernel].code,
@@ -236,15 +236,15 @@ def push_positions(
     power
         As of ``pull_positions``.
     """
-    x, c = _rows(targets, 4), _rows(controls, 4)
-    dx = np.zeros_like(x) if moved is None else _rows(moved, 4)
-    dc = np.zeros_like(c) if moved_controls is None else _rows(moved_controls, 4)
+    x, c = padded_rows(targets, 4), padded_rows(controls, 4)
+    dx = np.zeros_like(x) if moved is None else padded_rows(moved, 4)
+    dc = np.zeros_like(c) if moved_controls is None else padded_rows(moved_controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
         _forward(
             x,
             c,
-            _rows(weights.T, 3),
+            padded_rows(weights.T, 3),
             dx,
             dc,
             basis.half,
