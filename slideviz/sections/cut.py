@@ -95,10 +95,6 @@ class Cutter:
         """
         return self.cut(points, section).cell_ids
 
-    def crinkle(self, points: FloatArray, section: Section) -> Polygons:
-        """Return the surface of the cells that the section cuts, whole; in 2D the cells."""
-        return self.surface(points, self.which_cells(points, section))
-
     def all_cells(self, points: FloatArray) -> Polygons:
         """Return the surface of all cells; in 2D the cells."""
         return self.surface(points, np.concatenate([block.ids for block in self._blocks]))

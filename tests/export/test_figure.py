@@ -336,7 +336,7 @@ def test_a_drawing_has_the_sections_of_the_view_and_the_other_cells_faintly(rend
     mesh, values = renderer.session.frame.mesh, renderer.session.frame.quality.values
     cutter, extra = Cutter.of(mesh), [c for c in axes.collections if 1.0 < c.get_zorder() < 2.0]
     cut = cutter.cut(mesh.points, line)
-    whole = cutter.crinkle(mesh.points, circle)
+    whole = cutter.show(mesh.points, circle)
     arrays = [c.get_array() for c in extra if c.get_array() is not None]
     for wanted in (values[cut.cells], values[whole.cells]):
         assert any(np.array_equal(one, wanted) for one in arrays)

@@ -1,5 +1,7 @@
 """Sections: which cells a plane or cylinder cuts, and the polygons that come of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -180,7 +182,7 @@ def test_a_plane_cuts_a_2d_mesh_in_lines():
     ends = found.points[found.connectivity].reshape(-1, 2, 3)
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    whole = Cutter.of(mesh).crinkle(mesh.points, section)
+    whole = Cutter.of(mesh).show(mesh.points, replace(section, whole=True))
     assert whole.cells.tolist() == cut_cells(mesh, section)
     assert set(whole.sizes) <= {3, 4}
 
@@ -197,7 +199,9 @@ def test_a_cylinder_cuts_a_2d_mesh_in_a_circle(direction):
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
     assert 0.98 * 0.6 * np.pi < length < 0.6 * np.pi
     assert found.cell_ids.tolist() == cut_cells(mesh, section)
-    assert Cutter.of(mesh).crinkle(mesh.points, section).cells.tolist() == cut_cells(mesh, section)
+    assert Cutter.of(mesh).show(
+        mesh.points, replace(section, whole=True)
+    ).cells.tolist() == cut_cells(mesh, section)
 
 
 def test_in_2d_the_axis_of_a_cylinder_is_z():
@@ -214,7 +218,7 @@ def test_a_section_beside_the_mesh_cuts_nothing():
     ):
         cutter = Cutter.of(mesh)
         assert len(cutter.cut(mesh.points, section)) == 0
-        assert len(cutter.crinkle(mesh.points, section)) == 0
+        assert len(cutter.show(mesh.points, replace(section, whole=True))) == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
