@@ -154,7 +154,7 @@ _RUN = Menu("run", "&Run", entries=(
             lambda now: now.ready and not now.busy,
             button="Deform the mesh with these settings (Ctrl+R).", button_key="Ctrl+R"),
     Command("cancel", "&Cancel", "Stop what runs; the steps that are done are kept.",
-            lambda window: window.cancel(), image="cancel", enabled=lambda now: now.busy,
+            lambda window: window.running.cancel(), image="cancel", enabled=lambda now: now.busy,
             button="Stop within a second (Esc); the steps that are done stay.", button_key="Esc"),
     None,
     Command("designs", "&Designs…",

@@ -82,7 +82,9 @@ class Files(QObject):
         """Open a mesh or case in the background, once unsaved work is saved or may be lost."""
         if self.may_go_on(lambda: self.open_path(path, zone)):
             path = Path(path).absolute()
-            self.window.start_job(f"Opening {path.name}", self._opened, jobs.open_file, path, zone)
+            self.window.running.start_job(
+                f"Opening {path.name}", self._opened, jobs.open_file, path, zone
+            )
 
     def open_zone(self, zone: int) -> None:
         """Open another zone of the file that is open."""
@@ -105,7 +107,7 @@ class Files(QObject):
         """Write a sample case into a folder of this program and open it; ``run`` deforms it."""
         if not self.may_go_on(lambda: self.open_sample(name, run, size)):
             return
-        self.window.start_job(
+        self.window.running.start_job(
             f"Opening the sample {name}",
             self._opened_to_run if run else self._opened,
             partial(jobs.open_sample, size=size),
@@ -196,7 +198,7 @@ class Files(QObject):
         self.settings.setValue("folder", str(path.parent))
         last = frame is session.frames[-1]
         self.saving, self.after_save = True, then
-        self.window.start_job(
+        self.window.running.start_job(
             f"Saving {path.name}",
             lambda saved: self._mesh_saved(saved, last),
             partial(jobs.save_mesh, base=session.mesh),

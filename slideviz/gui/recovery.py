@@ -81,7 +81,9 @@ class SessionRecovery(QObject):
             self._later.append(self.waiting.pop(0))
             done = partial(self._opened, found)
             name = found.case.mesh_file.name
-            self.window.start_job(f"Restoring {name}", done, jobs.open_file, found.path, None)
+            self.window.running.start_job(
+                f"Restoring {name}", done, jobs.open_file, found.path, None
+            )
         self._offer()
 
     def _put_off(self) -> None:

@@ -5,16 +5,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from qtpy.QtCore import QSettings, QSize, Qt, QTimer
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from qtpy.QtWidgets import QDockWidget, QGridLayout, QLabel, QWidget
 
-from slideviz.case.model import Case
 from slideviz.case.motion_words import mesh_words
 from slideviz.color_scheme import ColorScheme
 from slideviz.gui.actions import Actions
@@ -258,16 +256,6 @@ class MainWindow(Services):
 
     # Jobs ------------------------------------------------------------------------------
 
-    def start_job(
-        self,
-        text: str,
-        finish: Callable[[Any], object],
-        function: Callable[..., Any],
-        *values: object,
-    ) -> None:
-        """Start a job beside the window; one that still runs is cancelled first."""
-        self.running.start_job(text, finish, function, *values)
-
     def start_run(self) -> None:
         """Deform the mesh with the settings there are."""
         session = self.store.session
@@ -278,14 +266,6 @@ class MainWindow(Services):
         output = self.files.ask_output()
         if output is not None:
             self.running.start_run(output)
-
-    def show_design(self, case: Case, name: str) -> bool:
-        """Show the run of a design, which is deformed first; False where another job runs."""
-        return self.running.show_design(case, name)
-
-    def cancel(self) -> None:
-        """Cancel the running job."""
-        self.running.cancel()
 
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty one takes it away."""

@@ -163,7 +163,7 @@ def test_cancelling_a_run(benchmark, bench):
         window.start_run()
         bench.rest(2.0)
         began = time.perf_counter()
-        window.cancel()
+        window.running.cancel()
         bench.until(lambda: not window.runner.busy)
         benchmark.extra_info["cancel_s"] = time.perf_counter() - began
 

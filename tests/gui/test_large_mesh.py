@@ -179,7 +179,7 @@ def test_a_run_that_is_cancelled_leaves_no_file(stator, tmp_path, answers):
     output = tmp_path / "out.su2b"
     answers("ask_save", output)
     stator.window.start_run()
-    stator.window.cancel()
+    stator.window.running.cancel()
     stator.settle()
     assert not output.exists()
     assert stator.session.frame is stator.session.first

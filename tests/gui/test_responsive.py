@@ -52,7 +52,7 @@ def test_cancel_at_ten_random_moments_of_a_3d_run(driver, case_file):
     for _ in range(10):
         window.start_run()
         driver.qtbot.wait(round(1000 * rng.uniform(0.0, 0.5 * whole)))
-        window.cancel()
+        window.running.cancel()
         driver.settle(timeout=10_000)
         ends.append(sound(driver.session).end)
         assert window.run_panel.run.isVisible()
@@ -75,7 +75,7 @@ def test_opening_can_be_cancelled_at_any_moment_and_keeps_what_is_open(driver, c
     for pause in (0, 1, 3, 10, 30):
         window.files.open_path(case_file)
         driver.qtbot.wait(pause)
-        window.cancel()
+        window.running.cancel()
         driver.settle(timeout=10_000)
         assert driver.session.mesh is not None
         assert not window.banner.isVisible()
@@ -149,7 +149,7 @@ def test_closing_does_not_wait_for_a_job_that_does_not_stop(driver, case_file, m
     monkeypatch.setattr(worker, "CLOSING_S", 0.05)
     driver.open(case_file)
     go = threading.Event()
-    driver.window.start_job("Deaf", lambda _: None, lambda report, stopped: go.wait(60))
+    driver.window.running.start_job("Deaf", lambda _: None, lambda report, stopped: go.wait(60))
     try:
         assert driver.window.close()
         assert driver.window.left_behind

@@ -149,7 +149,7 @@ class Exports(QObject):
         default = files.folder() / f"{files.stem()}_quality.csv"
         path = questions.ask_save(self.window, "Export quality", default, "CSV table (*.csv)")
         if path is not None:
-            self.window.start_job(
+            self.window.running.start_job(
                 f"Saving {path.name}", self._written, jobs_export.save_quality, path, frame
             )
 
@@ -169,7 +169,7 @@ class Exports(QObject):
         there = [one for one in jobs_export.step_paths(path, len(run.frames)) if one.exists()]
         if there and not questions.ask_replace(self.window, there):
             return
-        self.window.start_job(
+        self.window.running.start_job(
             "Saving the steps",
             lambda paths: self._steps_written(paths, run.number),
             partial(jobs_export.save_steps, first=session.frames[0]),

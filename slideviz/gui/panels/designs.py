@@ -228,7 +228,7 @@ class DesignsPanel(Panel):
         except CaseError as error:
             self._say(str(error), wrong=True)
             return
-        if not self.services.show_design(design.case, f"design {number}"):
+        if not self.services.running.show_design(design.case, f"design {number}"):
             self._say("Another job runs in the window; wait for it, or cancel it.", wrong=True)
             return
         self.shown = number

@@ -268,7 +268,7 @@ def save_picture(window: Services, paper: Paper) -> None:
     if path is None:
         return
     window.settings.setValue("folder", str(path.parent))
-    window.start_job(
+    window.running.start_job(
         f"Drawing {path.name}",
         lambda done: window.say(f"Saved {done}"),
         save_section,

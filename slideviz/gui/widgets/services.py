@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QSettings
 from qtpy.QtWidgets import QMainWindow, QWidget
 
-from slideviz.case.model import Case
 from slideviz.gui.responsiveness.worker import JobRunner
 from slideviz.gui.widgets.banner import Banner
 from slideviz.session.store import Store
@@ -17,6 +15,7 @@ from slideviz.session.store import Store
 if TYPE_CHECKING:
     from slideviz.gui.docks import Docks
     from slideviz.gui.files import Files
+    from slideviz.gui.running import Running
     from slideviz.gui.viewport.section_views import SectionViews
     from slideviz.gui.viewport.viewing import Viewing
 
@@ -32,8 +31,10 @@ class Services(QMainWindow):
         What is kept from one start to the next.
     banner : Banner
         Tells what went wrong.
+    running : Running
+        Starts jobs and runs.
     runner : JobRunner
-        Whether a job runs; `start_job` starts one.
+        Tells whether one runs.
     files : Files
         Where file dialogs start, and what the files that they offer begin with.
     viewing, section_views
@@ -45,6 +46,7 @@ class Services(QMainWindow):
     store: Store
     settings: QSettings
     banner: Banner
+    running: Running
     runner: JobRunner
     files: Files
     viewing: Viewing
@@ -53,20 +55,6 @@ class Services(QMainWindow):
 
     def say(self, text: str) -> None:
         """Show a short message in the status bar; an empty one takes it away."""
-        raise NotImplementedError
-
-    def start_job(
-        self,
-        text: str,
-        finish: Callable[[Any], object],
-        function: Callable[..., Any],
-        *values: object,
-    ) -> None:
-        """Start a job beside the window; ``finish`` takes what it returns."""
-        raise NotImplementedError
-
-    def show_design(self, case: Case, name: str) -> bool:
-        """Show the run of a design, which is deformed first; False where another job runs."""
         raise NotImplementedError
 
 
