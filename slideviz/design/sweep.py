@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,7 +81,7 @@ def sweep(
     Raises
     ------
     CaseError
-        The table is wrong, or results in ``folder`` are of other designs.
+        The table is wrong, or ``folder`` has other designs' results, or another sweep writes there.
     MeshError
         The mesh cannot be read.
     DeformError
@@ -132,15 +132,15 @@ def sweep(
 def _rows(loop: _Loop, earlier: list[Row], results: Results | None) -> Iterator[Row]:
     """Yield the rows of a stopped sweep and then the others as they come; keep them in a table."""
     rows = list(earlier)
-    yield from earlier
-    with closing(loop.rows()) as coming:
+    with closing(loop.rows()) as coming, nullcontext() if results is None else closing(results):
+        yield from earlier
         for row in coming:
             if results is not None:
                 results.add(row)
             rows.append(row)
             yield row
-    if results is not None:
-        results.sort(rows)
+        if results is not None:
+            results.sort(rows)
 
 
 class _Tasks:

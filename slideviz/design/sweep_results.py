@@ -24,6 +24,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Prescribed
 from slideviz.design.sweep_columns import Value
 from slideviz.design.sweep_designs import Designs
+from slideviz.design.sweep_lock import FolderLock
 from slideviz.design.sweep_row import NUMBERS, Row
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
@@ -35,7 +36,7 @@ _WORDS = ("mesh", "warnings", "problem")
 
 
 class Results:
-    """The results of a sweep in a folder.
+    """The results of a sweep in a folder, which no other sweep writes to until `close`.
 
     Parameters
     ----------
@@ -47,6 +48,7 @@ class Results:
 
     def __init__(self, folder: Path, designs: Designs, sources: Mapping[str, str]) -> None:
         self._folder, self._designs, self._sources = folder, designs, sources
+        self._lock: FolderLock | None = None
         self._head = ["design", *designs.columns, *NUMBERS, *_WORDS]
 
     @property
@@ -63,8 +65,27 @@ class Results:
         ------
         CaseError
             There are results, and it was not said what to do with them; or they are of another
-            case, mesh or table; or the table cannot be written.
+            case, mesh or table; or the table cannot be written; or another sweep writes it.
         """
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise CaseError(
+                f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
+            ) from problem
+        self._lock = FolderLock(self._folder)
+        try:
+            return self._started(resume, force, meshes)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let other sweeps write into the folder."""
+        if self._lock is not None:
+            self._lock.release()
+
+    def _started(self, resume: bool, force: bool, meshes: bool) -> list[Row]:
         if resume and self.path.exists():
             found = {row.design: row for row in self._go_on()}
             return [row for row in found.values() if not row.problem and _has(row, meshes)]
@@ -78,12 +99,6 @@ class Results:
 
     def _begin(self) -> None:
         """Write an empty table, and what the results depend on."""
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise CaseError(
-                f"{self._folder}: cannot be made a folder: {reason_of(problem)}"
-            ) from problem
         text = json.dumps({"slideviz": __version__, **self._sources}, indent=2) + "\n"
         with atomic_write(self._folder / SOURCES, CaseError) as file:
             file.write(text.encode())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ import slideviz as sv
 from slideviz.design import sweep as sweeping
 from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
 from slideviz.design.sweep_designs import read_designs
+from slideviz.design.sweep_lock import FolderLock
 from slideviz.design.sweep_row import Row
 from slideviz.design.sweep_worker import Answer, Packed, Task, hold, packed, work
 from slideviz.errors import CaseError, DeformError
@@ -402,3 +404,29 @@ def test_a_design_has_one_thread(passage, monkeypatch):
     assert work(Task(1, passage.case, mesh.name, packed=mesh)).row.problem == ""
     assert set(found[-1]) == {1}
     assert threads() == before
+
+
+def test_of_two_sweeps_in_a_folder_the_second_is_refused(passage, here, tmp_path):
+    asked = {"mesh": passage.mesh, "folder": tmp_path}
+    # A process that was killed leaves the file; nobody holds it.
+    (tmp_path / "sweep.lock").write_text("1\n")
+    rows = sv.sweep(passage.case, DESIGNS, here, **asked)
+    first = next(rows)
+    for how in ({"resume": True}, {"force": True}):
+        with pytest.raises(CaseError, match=rf"another sweep .* \(process {os.getpid()}\); wait"):
+            sv.sweep(passage.case, DESIGNS, here, **asked, **how)
+    assert len([first, *rows]) == 3
+    assert not (tmp_path / "sweep.lock").exists()
+    # Nor does a refusal leave it held, nor a sweep that was given up.
+    with pytest.raises(CaseError, match="there are results already"):
+        sv.sweep(passage.case, DESIGNS, here, **asked)
+    again = sv.sweep(passage.case, DESIGNS, here, force=True, **asked)
+    next(again)
+    again.close()
+    assert len(swept(passage.case, DESIGNS, here, resume=True, **asked)) == 3
+
+
+def test_a_lock_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "sweep.lock").mkdir()
+    with pytest.raises(CaseError, match=r"sweep\.lock: cannot be written: .*folder"):
+        FolderLock(tmp_path)
