@@ -64,10 +64,10 @@ class SessionRecovery(QObject):
             return
         found = self.waiting[0]
         more = len(self.waiting) - 1
-        name = found.case.mesh_file.name if found.source is None else found.source.name
+        path = found.case.mesh_file if found.source is None else found.source
         text = (
             f"slideviz did not end properly. Restore the session of {_time_text(found.when)} "
-            f"with {name}?" + (f" ({more} more)" if more else "")
+            f"with {path.name} in {path.parent}?" + (f" ({more} more)" if more else "")
         )
         answers = {"Restore": partial(self.answer, True), "Discard": partial(self.answer, False)}
         self.banner.ask(text, answers, self._trace, later=self._put_off)

@@ -145,7 +145,9 @@ def test_after_a_crash_it_is_offered_and_restored(make, qtbot, crashed, case_fil
     assert window.offer.isVisible()
     text = window.offer.text.text()
     assert "did not end properly" in text
-    assert f"with {case_file.name}?" in text, "it is known by the case that was open"
+    assert f"with {case_file.name} in {case_file.parent}?" in text, (
+        "it is known by the case that was open"
+    )
     window.offer.answers["Restore"].click()
     qtbot.waitUntil(lambda: window.store.session.mesh is not None and not window.runner.busy)
     session = window.store.session
