@@ -12,8 +12,8 @@ from qtpy.QtWidgets import QLabel, QMenu, QMenuBar, QSizePolicy, QToolBar, QWidg
 
 from slideviz.gui.commands import COMMANDS, MENUS
 from slideviz.gui.widgets.build import tool_button
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import Menu, Now, valued
-from slideviz.gui.widgets.fields import Choice
 from slideviz.session import changes
 from slideviz.session.state import Session
 from slideviz.session.store import Store

@@ -159,8 +159,8 @@ _RUN = Menu("run", "&Run", entries=(
     None,
     Command("designs", "&Designs…",
             "Run a table of designs, each with other numbers of the motions or other settings, "
-            "and see their quality.",
-            lambda window: window.docks_.lead_to("designs"), ("F6",), enabled=opened,
+            "and see their quality; or hide the panel for it.",
+            lambda window: window.docks_.toggle("designs"), ("F6",), enabled=opened,
             tip_now=why_not(opened, "There is no mesh yet: open one first.")),
 ))
 

@@ -211,7 +211,7 @@ class Docks(QObject):
         """Return a dock at that side which is in front: one behind a tab keeps an old width."""
         for dock in self.by_name.values():
             here = self.window.dockWidgetArea(dock) == side and not dock.isFloating()
-            if here and dock.isVisible() and not dock.visibleRegion().isEmpty():
+            if here and _is_in_front(dock):
                 return dock
         return None
 
@@ -246,6 +246,13 @@ class Docks(QObject):
         if state is not None and not any(dock.isVisible() for dock in self.by_name.values()):
             self.window.restoreState(state)
 
+    def toggle(self, name: str) -> None:
+        """Bring a dock to the front, or hide it if it is there."""
+        if _is_in_front(self.by_name[name]):
+            self.by_name[name].hide()
+        else:
+            self.lead_to(name)
+
     def lead_to(self, name: str) -> None:
         """Bring a dock to the front."""
         dock = self.by_name[name]
@@ -255,6 +262,11 @@ class Docks(QObject):
         at = self.window.focusWidget()
         if at is None or not dock.isAncestorOf(at):
             dock.widget().setFocus()
+
+
+def _is_in_front(dock: QDockWidget) -> bool:
+    """Tell whether a dock is seen: neither hidden nor behind a tab."""
+    return dock.isVisible() and not dock.visibleRegion().isEmpty()
 
 
 def _leave(dock: QDockWidget) -> None:

@@ -15,6 +15,7 @@ from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
 from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
+from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.files import usual_ending
@@ -147,7 +148,8 @@ class Files(QObject):
         before : str
             What the changes would be lost by, in words.
         """
-        unsaved = Unsaved.of(self.window.store.session, self.window.runner.busy)
+        designs = self.window.docks_.panel(DesignsPanel).unsaved
+        unsaved = Unsaved.of(self.window.store.session, self.window.runner.busy, designs)
         if self._answered or not unsaved.what:
             return True
         question = unsaved.question(before)

@@ -96,7 +96,7 @@ class Running(QObject):
         """
         for run in self.store.session.runs:
             if run.name == name and run.case == case and run.end == "done":
-                self.store.change(changes.show_run, run.number)
+                self.store.change(changes.show_design, run.number)
                 return True
         if self.runner.busy:
             if self._shows_design:

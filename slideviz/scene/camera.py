@@ -197,13 +197,22 @@ class Camera:
 
         They may be outside by ``slack``, a part of its size.
         """
-        boxes = [np.array(shape.bounds).reshape(3, 2) for shape in self._shapes()]
-        corners = [np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes]
-        if not corners:
-            return True
-        seen = to_display(self.stage.plotter, np.concatenate(corners))
+        seen = np.concatenate([*self._boxes(), np.empty((0, 2))])
         size = np.array(self.stage.plotter.window_size)
         return bool((seen >= -slack * size).all() and (seen <= (1 + slack) * size).all())
+
+    def loses_all(self) -> bool:
+        """Tell whether the boxes around all data sets to be seen are outside the view."""
+        size = np.array(self.stage.plotter.window_size)
+        boxes = self._boxes()
+        outside = ((box.max(axis=0) < 0).any() or (box.min(axis=0) > size).any() for box in boxes)
+        return bool(boxes) and all(outside)
+
+    def _boxes(self) -> list[FloatArray]:
+        """Return where the corners (8, 2) of the box around each data set are, in pixels."""
+        boxes = (np.array(shape.bounds).reshape(3, 2) for shape in self._shapes())
+        corners = (np.stack(np.meshgrid(*box), -1).reshape(-1, 3) for box in boxes)
+        return [to_display(self.stage.plotter, one) for one in corners]
 
     def loses_some(self) -> bool:
         """Tell whether a node to be seen is outside the view, or below the legend."""

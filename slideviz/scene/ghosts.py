@@ -170,13 +170,17 @@ def is_apart(points: FloatArray, surface: Surface, session: Session) -> bool:
 def is_planned(session: Session) -> bool:
     """Tell whether a view shows where motions will take boundaries.
 
-    Of the undeformed mesh it should; of the steps of a run, where settings have changed since.
+    Of the undeformed mesh it should; of the steps of a run, where settings have changed since;
+    of a design, which is not what the panels have, where motions have changed since.
     Two views beside each other say the same, or a ghost would look like a difference between
     runs: they say it of motions that no run has shown yet.
     """
     if session.view.beside is not None:
         now = _motion(session.case)
         return all(_motion(run.case) != now for run in session.runs)
+    run = session.run_shown
+    if run is not None and run.panels is not None:
+        return _motion(run.panels) != _motion(session.case)
     return session.view.frame == 0 or session.outdated
 
 

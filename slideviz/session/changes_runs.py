@@ -20,11 +20,12 @@ MOST_REMOVED = 2
 def start_run(session: Session, case: Case | None = None, name: str = "") -> Session:
     """Return the session with a new run of a case, or else of the settings, which is shown.
 
-    Runs that were cancelled or failed before their first step go.
+    A case with a name is a design. Runs that were cancelled or failed before their first step go.
     """
     kept = tuple(run for run in session.runs if run.frames)
     number = 1 + max((session.newest, *(run.number for run in session.runs)))
-    runs = (*kept, Run(number, case or session.case, name=name))
+    panels = session.case if name else None
+    runs = (*kept, Run(number, case or session.case, name=name, panels=panels))
     session = replace(session, runs=runs, shown=number, newest=number)
     return show_frame(session, 0)
 
@@ -55,6 +56,14 @@ def show_run(session: Session, number: int) -> Session:
     beside = None if session.view.beside == number else session.view.beside
     session = set_view(replace(session, shown=number), beside=beside)
     return show_frame(session, len(run.frames))
+
+
+def show_design(session: Session, number: int) -> Session:
+    """Return the session with the last step of the run of a design shown, asked for now."""
+    asked = (
+        replace(one, panels=session.case) if one.number == number else one for one in session.runs
+    )
+    return show_run(replace(session, runs=tuple(asked)), number)
 
 
 def show_beside(session: Session, number: int | None) -> Session:

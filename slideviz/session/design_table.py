@@ -87,6 +87,21 @@ class DesignTable:
         more = {row.design: row for row in rows}
         return replace(self, results=MappingProxyType({**self.results, **more}))
 
+    def keeping(self, other: DesignTable) -> DesignTable:
+        """Return the table with the results that another one has of the same designs."""
+        if sorted(self.columns) != sorted(other.columns):
+            return self
+        at = [other.columns.index(name) for name in self.columns]
+        known = {
+            tuple(other.rows[number - 1][k] for k in at): row
+            for number, row in other.results.items()
+        }
+        return self.with_results(
+            replace(known[values], design=number)
+            for number, values in enumerate(self.rows, start=1)
+            if values in known
+        )
+
     def without_results(self) -> DesignTable:
         """Return the table as it was before it ran."""
         return replace(self, results=MappingProxyType({}))

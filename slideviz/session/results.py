@@ -105,6 +105,8 @@ class Run:
         What the user calls it; empty as long as nobody did.
     undeformed : Frame or None
         The undeformed mesh, where the metric of this run judges it otherwise than the session's.
+    panels : Case or None
+        Of a design, what the panels had when it was asked for: settings of another deformation.
     """
 
     number: int
@@ -114,6 +116,7 @@ class Run:
     saved: bool = False
     name: str = ""
     undeformed: Frame | None = None
+    panels: Case | None = None
 
     @property
     def label(self) -> str:
@@ -121,7 +124,7 @@ class Run:
         if not self.name:
             return f"run {self.number}"
         short = self.name if len(self.name) <= LABEL else f"{self.name[: LABEL - 1].rstrip()}…"
-        return f"{self.number} {short}"
+        return f"run {self.number}: {short}"
 
     @property
     def last(self) -> Frame | None:

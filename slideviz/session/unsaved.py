@@ -16,15 +16,16 @@ class Unsaved:
     ----------
     session : Session
     what : mapping
-        The words for what would be lost: of a case, of a mesh, or of a run that goes on.
+        The words for what would be lost: of a case, of a mesh, of a run that goes on; of designs,
+        a sentence.
     """
 
     session: Session
     what: Mapping[str, str]
 
     @classmethod
-    def of(cls, session: Session, busy: bool) -> Unsaved:
-        """Return the unsaved work of a session, while a job runs or none does."""
+    def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
+        """Return the unsaved work of a session, while a job runs or none does, and of designs."""
         what = {}
         if session.unsaved_case:
             source = session.case.source
@@ -36,12 +37,14 @@ class Unsaved:
             # While it goes on there is no last step to save.
             name = "mesh" if run.end and not busy else "run"
             what[name] = f"the deformed mesh of run {run.number}"
+        if designs:
+            what["designs"] = designs
         return cls(session, what)
 
     @property
     def can_save(self) -> list[str]:
         """Return what can be saved now, ``case`` and ``mesh``."""
-        return [name for name in self.what if name != "run"]
+        return [name for name in self.what if name not in ("run", "designs")]
 
     def question(self, before: str) -> str:
         """Return the question to the user; a second line says what saving is good for.
@@ -52,15 +55,22 @@ class Unsaved:
             What the work would be lost by, as ``closing``.
         """
         number = self.session.shown
+        if "designs" in self.what:
+            if len(self.what) == 1:
+                return f"{self.what['designs']} Lose their results?"
+            return f"{self._without('designs').question(before)}\n{self.what['designs']}"
         if "run" in self.what:
-            rest = {name: words for name, words in self.what.items() if name != "run"}
-            if not rest:
+            if len(self.what) == 1:
                 return f"Run {number} goes on. Lose its steps?"
             lost = "Its steps are lost, for it goes on; cancel it to save what there is."
-            return f"{replace(self, what=rest).question(before)}\nRun {number} goes on. {lost}"
+            return f"{self._without('run').question(before)}\nRun {number} goes on. {lost}"
         text = f"Save {' and '.join(self.what.values())} before {before}?"
         more = " ".join(filter(None, (self._repeats(), self._others())))
         return f"{text}\n{more}" if more else text
+
+    def _without(self, gone: str) -> Unsaved:
+        """Return the work but for one part of it."""
+        return replace(self, what={name: self.what[name] for name in self.what if name != gone})
 
     def _repeats(self) -> str:
         run = self.session.run_shown

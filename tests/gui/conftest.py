@@ -27,6 +27,7 @@ DIALOGS = (
     "ask_sample",
     "ask_unsaved",
     "ask_overwrite_input",
+    "ask_lose_results",
 )
 
 

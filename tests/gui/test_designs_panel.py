@@ -11,6 +11,8 @@ import slideviz as sv
 from slideviz.design import sweep as sweeping
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import plot_canvas
+from slideviz.gui.widgets.plot_image import Paper, Place, picture
+from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
 
 LEFT = Qt.MouseButton.LeftButton
@@ -177,3 +179,115 @@ def test_a_stop_keeps_what_is_there(passage, qtbot, in_a_thread):
     qtbot.waitUntil(lambda: not panel.runner.busy, timeout=60_000)
     assert panel.said.text() == "Stopped; the results stay."
     assert 1 < len(panel.table.results) < 500
+
+
+def test_results_are_not_lost_without_a_question(
+    window, passage, qtbot, in_a_thread, answers, tmp_path
+):
+    panel = passage
+    fill(panel, "STEPS", "1, 2")
+    assert not panel.unsaved
+    run(panel, qtbot)
+    file = tmp_path / "designs.csv"
+    file.write_text("STEPS\n2\n3\n")
+    answers("ask_table", file)
+    asked = answers("ask_lose_results", False)
+    QTest.mouseClick(panel.load, LEFT)
+    assert asked == [(1,)]
+    assert panel.table.rows == (("1",), ("2",))
+    answers("ask_lose_results", True)
+    QTest.mouseClick(panel.load, LEFT)
+    assert panel.table.rows == (("2",), ("3",))
+    assert {k: row.steps for k, row in panel.table.results.items()} == {1: 2}
+    # The window does not close over them either, until they are saved.
+    asked = answers("ask_unsaved", "cancel")
+    assert not window.close()
+    assert "table of designs, 1 with results, is not saved" in asked[0][0]
+    answers("ask_save", tmp_path / "out.csv")
+    QTest.mouseClick(panel.save, LEFT)
+    assert not panel.unsaved
+
+
+def test_closing_asks_about_designs_that_go_on(window, passage, qtbot, in_a_thread, answers):
+    fill(passage, "airfoil.rotate.angle_deg", "-6 to 0 in 500")
+    QTest.mouseClick(passage.run, LEFT)
+    asked = answers("ask_unsaved", "cancel")
+    assert not window.close()
+    assert "The designs go on: 0 of 500 are done." in asked[0][0]
+    assert passage.runner.busy
+    passage.stop.click()
+    qtbot.waitUntil(lambda: not passage.runner.busy, timeout=60_000)
+
+
+def test_all_mistakes_of_a_file_are_told_with_their_rows(window, passage, answers, tmp_path):
+    file = tmp_path / "designs.csv"
+    file.write_text("STEPS\n1\nmany\n0.5\nx\ny\nz\n")
+    answers("ask_table", file)
+    QTest.mouseClick(passage.load, LEFT)
+    assert "(and 4 more)" in passage.said.text()
+    assert window.banner.isVisible()
+    window.banner.details.click()
+    told = window.banner.dialog.text.toPlainText()
+    assert all(f"designs.csv:{line}: " in told for line in (3, 4, 5, 6, 7))
+    window.banner.dialog.close()
+
+
+def test_its_key_shows_and_hides_the_panel(window, passage, qtbot):
+    assert window.docks["designs"].isVisible()
+    QTest.keyClick(window, Qt.Key.Key_F6)
+    assert not window.docks["designs"].isVisible()
+    QTest.keyClick(window, Qt.Key.Key_F6)
+    assert window.docks["designs"].isVisible()
+    # Behind another tab it is brought to the front, not hidden.
+    window.tabifyDockWidget(window.docks["designs"], window.docks["log"])
+    window.docks["log"].show()
+    window.docks["log"].raise_()
+    qtbot.waitUntil(lambda: passage.visibleRegion().isEmpty())
+    QTest.keyClick(window, Qt.Key.Key_F6)
+    qtbot.waitUntil(lambda: not passage.visibleRegion().isEmpty())
+
+
+def test_a_design_is_shown_whole_and_without_the_ghost_of_the_motion_panel(
+    window, passage, qtbot, in_a_thread, driver
+):
+    from slideviz.session import changes
+
+    def ghosts():
+        return [
+            actor.visibility
+            for name, actor in window.scene.plotter.actors.items()
+            if name == "motion:airfoil"
+        ]
+
+    assert ghosts() == [True]
+    fill(passage, "airfoil.rotate.angle_deg", "0, -1")
+    passage.show_design(1)
+    driver.settle()
+    assert window.store.session.run_shown.name == "design 1"
+    assert ghosts() == [False]
+    # Where the mesh is outside of the view, it comes back with a design that was run already.
+    window.scene.camera.aim((99.0, 99.0, 0.0), 0.1)
+    passage.show_design(1)
+    assert window.scene.sees_all()
+    # A motion that is typed now is seen again.
+    motion = window.store.session.case.motions[0]
+    window.store.change(changes.replace_motion, 0, sv.Rotate(motion.marker, 20.0))
+    assert ghosts() == [True]
+
+
+def test_a_legend_that_grows_takes_room_from_the_axes():
+    drawn = []
+    place = Place()
+    for words in (["1", "2"], ["1", "2", "many words of a design"]):
+
+        def draw(figure, _style, words=words):
+            axes = figure.add_subplot()
+            for word in words:
+                axes.plot([0, 1], [0, 1], label=word)
+            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+        made = picture(draw, Paper(420, 260, 1.0, PRINT), place)
+        place = made.place
+        box = made.figure.axes[0].get_legend().get_window_extent()
+        drawn.append(box.x1 <= made.figure.bbox.x1)
+    assert drawn == [True, True]

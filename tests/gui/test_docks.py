@@ -12,7 +12,8 @@ from qtpy.QtWidgets import QApplication, QWidget
 from slideviz.case.model import Reduction
 from slideviz.gui.docks import LEFT_WIDTH, RIGHT_WIDTH
 from slideviz.gui.widgets import questions
-from slideviz.gui.widgets.fields import Choice, NumberField
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.window import MainWindow
 from slideviz.session import changes
 

@@ -7,7 +7,8 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui.widgets import theme
-from slideviz.gui.widgets.fields import Choice, NumberField, short_text
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, short_text
 from slideviz.gui.widgets.vector_field import VectorField
 
 THIRD = 0.005596983152812345
@@ -147,3 +148,19 @@ def test_tool_tips_and_boxes_stand_out_in_every_theme(qtbot, name):
         outline = QApplication.palette(kind).color(role.Window).darker(140)
         assert min(contrast(outline, window), contrast(outline, base)) >= 2.9, kind
     theme.apply("system")
+
+
+def test_a_narrow_choice_ends_with_an_ellipsis_and_its_list_shows_every_word(qtbot):
+    choice = Choice({"a": "a", "b": "airfoil.rotate.angle_deg   (now -8)"})
+    qtbot.addWidget(choice)
+    choice.resize(120, choice.sizeHint().height())
+    with qtbot.waitExposed(choice):
+        choice.show()
+    assert choice.shown == "a"
+    before = choice.grab().toImage()
+    choice.setCurrentIndex(1)
+    assert choice.shown.endswith("…")
+    assert choice.grab().toImage() != before
+    choice.showPopup()
+    assert choice.view().width() >= choice.fontMetrics().horizontalAdvance(choice.itemText(1))
+    choice.hidePopup()

@@ -6,7 +6,8 @@ from qtpy.QtTest import QTest
 from slideviz.case.key import REDUCTION
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Reduction
-from slideviz.gui.widgets.fields import Choice, NumberBox, NumberField, Switch
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.session import changes
 

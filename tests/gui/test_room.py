@@ -197,7 +197,8 @@ def test_the_dialog_of_the_size_says_what_is_counted(qtbot, driver, monkeypatch)
     monkeypatch.undo()
     from qtpy.QtWidgets import QDialog, QLabel
 
-    from slideviz.gui.widgets.fields import Choice, NumberBox
+    from slideviz.gui.widgets.choice import Choice
+    from slideviz.gui.widgets.fields import NumberBox
 
     seen = []
 

@@ -125,7 +125,7 @@ def test_f2_gives_a_run_a_name(ran, qtbot):
     assert ran.window.viewing.titles[1].text.startswith("Run 2: other · direct sliding")
     ran.window.docks["histogram"].raise_()
     canvas = ran.window.docks_.panels["histogram"].canvas
-    qtbot.waitUntil(lambda: "1 stiff blade" in legend_of(canvas))
+    qtbot.waitUntil(lambda: "run 1: stiff blade" in legend_of(canvas))
 
 
 def legend_of(canvas):

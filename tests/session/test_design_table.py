@@ -126,3 +126,14 @@ def test_it_can_be_stopped(passage):
             lambda _: None,
             lambda: True,
         )
+
+
+def test_another_table_keeps_the_results_of_the_same_designs():
+    old = DesignTable(("a", "b"), (("1", "x"), ("2", "x"))).with_results(
+        Row(number, {}, seconds=float(number)) for number in (1, 2)
+    )
+    other = DesignTable(("b", "a"), (("y", "1"), ("x", "2"))).keeping(old)
+    assert {number: (row.design, row.seconds) for number, row in other.results.items()} == {
+        2: (2, 2.0)
+    }
+    assert not DesignTable(("a",), (("1",),)).keeping(old).results

@@ -135,8 +135,10 @@ def test_a_run_can_have_a_name_of_its_own():
     assert (named.name, plain.name) == ("stiff blade", "")
     assert (run_words(named), run_words(plain)) == ("stiff blade", "no sliding")
     assert brief(named, session.runs).startswith("no sliding · "), "what it is, is told still"
-    assert (named.label, plain.label) == ("2 stiff blade", "run 1")
-    assert replace(named, name="a name of many letters in all").label == "2 a name of many lett…"
+    assert (named.label, plain.label) == ("run 2: stiff blade", "run 1")
+    assert (
+        replace(named, name="a name of many letters in all").label == "run 2: a name of many lett…"
+    )
     assert changes.rename_run(session, 2, "stiff blade") is session
     assert changes.rename_run(session, 9, "nobody") is session
     assert changes.rename_run(session, 2, "").runs[1].label == "run 2"

@@ -61,3 +61,16 @@ def test_a_case_is_asked_about_by_the_name_of_its_file(session):
     )
     assert title_of(named) == "*a.cfg – slideviz"
     assert title_of(replace(named, saved=named.case)) == "a.cfg – slideviz"
+
+
+def test_designs_are_asked_about_in_the_same_question(session):
+    words = "The designs go on: 2 of 9 are done."
+    alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)
+    assert not alone.can_save
+    assert alone.question("closing") == f"{words} Lose their results?"
+    both = Unsaved.of(saved(session, 1), busy=False, designs=words)
+    assert both.can_save == ["mesh"]
+    assert both.question("closing").splitlines() == [
+        "Save the deformed mesh of run 2 before closing?",
+        words,
+    ]

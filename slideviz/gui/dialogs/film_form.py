@@ -13,7 +13,7 @@ from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.reel import FPS, SIZES, Reel, check_film
 from slideviz.gui.widgets.build import check_box, decimal_box, in_row, number_box
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 
 KINDS = {
     ".mp4": "MP4, small and plays everywhere",

@@ -38,7 +38,7 @@ from slideviz.gui.widgets.build import (
     number_box,
     set_style,
 )
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.pixmaps import (
     copy_image,
     drawn_for,

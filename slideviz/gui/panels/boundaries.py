@@ -19,7 +19,7 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.build import hint_label, in_column, in_row, push_button
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel

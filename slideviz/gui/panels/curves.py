@@ -17,7 +17,7 @@ from qtpy.QtWidgets import QHBoxLayout, QWidget
 from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw

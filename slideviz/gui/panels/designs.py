@@ -39,6 +39,8 @@ class DesignsPanel(Panel):
         Of the results there are: a change of the session does not change them.
     shown : int or None
         The design whose mesh was asked for last.
+    written : DesignTable or None
+        The table that was saved last.
     """
 
     def __init__(self, services: Services) -> None:
@@ -48,6 +50,7 @@ class DesignsPanel(Panel):
         self.case: Case | None = None
         self.mesh: Mesh | None = None
         self.shown: int | None = None
+        self.written: DesignTable | None = None
         self._drawn: tuple[object, object] = (None, None)
         self.job = DesignsJob(self._ended, self)
         self.runner = self.job.runner
@@ -157,12 +160,25 @@ class DesignsPanel(Panel):
 
     # What the user does ----------------------------------------------------------------
 
+    @property
+    def unsaved(self) -> str:
+        """Return what would be lost with this panel, in a sentence, or nothing."""
+        done, count = len(self.table.results), len(self.table.rows)
+        if self.runner.busy:
+            return f"The designs go on: {done:,} of {count:,} are done."
+        if not done or self.table is self.written:
+            return ""
+        return f"The table of designs, {done:,} with results, is not saved."
+
     def _try(self, change: Callable[[], DesignTable]) -> None:
         """Change the table, or say why that cannot be."""
         try:
             table = change()
         except SlidevizError as error:
-            self._say(str(error).splitlines()[0], wrong=True)
+            first, *more = str(error).splitlines()
+            self._say(f"{first} (and {len(more)} more)" if more else first, wrong=True)
+            if more:
+                self.services.banner.tell_error(error)
             return
         self._say(f"{len(table.rows):,} designs" if table.rows else "")
         self._put(table)
@@ -177,7 +193,7 @@ class DesignsPanel(Panel):
         def crossed() -> DesignTable:
             values = values_of(self.rows.values.text())
             read_designs(self.store.session.case, {name: values})
-            return self.table.crossed(name, values)
+            return self._replacing(self.table.crossed(name, values))
 
         if name is not None and not self.runner.busy:
             self._try(crossed)
@@ -193,7 +209,13 @@ class DesignsPanel(Panel):
     def _load(self) -> None:
         path = questions.ask_table(self, self.services.files.folder())
         if path is not None:
-            self._try(lambda: read_table(self.store.session.case, path))
+            self._try(lambda: self._replacing(read_table(self.store.session.case, path)))
+
+    def _replacing(self, table: DesignTable) -> DesignTable:
+        """Return another table with the results there are; this one if too many were lost."""
+        table = table.keeping(self.table)
+        lost = len(self.table.results) - len(table.results)
+        return table if lost <= 0 or questions.ask_lose_results(self, lost) else self.table
 
     def _remove(self) -> None:
         self._try(lambda: self.table.without(self.rows.selected))
@@ -208,6 +230,7 @@ class DesignsPanel(Panel):
         except SlidevizError as error:
             self._say(str(error), wrong=True)
         else:
+            self.written = self.table
             self._say(f"Saved {path}")
 
     def show_design(self, number: int) -> None:
@@ -231,6 +254,7 @@ class DesignsPanel(Panel):
         if not self.services.running.show_design(design.case, f"design {number}"):
             self._say("Another job runs in the window; wait for it, or cancel it.", wrong=True)
             return
+        self.services.viewing.refit()  # where its run is there already, nothing ends
         self.shown = number
         self._say(f"Design {number} is shown.")
         self._sync()

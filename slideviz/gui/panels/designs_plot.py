@@ -13,7 +13,7 @@ from qtpy.QtGui import QMouseEvent
 from qtpy.QtWidgets import QWidget
 
 from slideviz.gui.widgets.build import in_column, in_row, push_button
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.plots.designs import RESULTS, against_designs, design_curves, nearest_design

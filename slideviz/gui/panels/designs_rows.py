@@ -15,7 +15,7 @@ from qtpy.QtWidgets import (
 from slideviz.case.model import Case
 from slideviz.gui.panels.designs_model import DesignsModel
 from slideviz.gui.widgets.build import Do, hint_label, in_column, in_row, push_button
-from slideviz.gui.widgets.fields import Choice
+from slideviz.gui.widgets.choice import Choice
 from slideviz.session.design_table import DesignTable, column_choices
 
 ABOUT = (

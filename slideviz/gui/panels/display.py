@@ -14,8 +14,9 @@ from qtpy.QtWidgets import QCheckBox, QFormLayout, QGridLayout, QLabel, QPushBut
 
 from slideviz.gui.commands import COMMANDS
 from slideviz.gui.widgets.build import PanelScroll, check_box, grow_fields, in_row, push_button
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import Now
-from slideviz.gui.widgets.fields import Choice, NumberBox, NumberField, number_text
+from slideviz.gui.widgets.fields import NumberBox, NumberField, number_text
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import main_window

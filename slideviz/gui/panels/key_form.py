@@ -12,13 +12,8 @@ from slideviz.case.keys import BY_WEIGHT
 from slideviz.case.model import Case
 from slideviz.case.values import Entry, Kind
 from slideviz.gui.widgets.build import grow_fields
-from slideviz.gui.widgets.fields import (
-    Choice,
-    NumberBox,
-    NumberField,
-    Switch,
-    number_text,
-)
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberBox, NumberField, Switch, number_text
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 

@@ -24,8 +24,9 @@ from slideviz.gui.widgets.build import (
     in_row,
     tool_button,
 )
+from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.field_watch import FieldWatch
-from slideviz.gui.widgets.fields import Choice, NumberField, number_text
+from slideviz.gui.widgets.fields import NumberField, number_text
 from slideviz.gui.widgets.panel import Panel
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes

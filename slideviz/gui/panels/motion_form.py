@@ -9,7 +9,8 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QLineEdit, QPushButton, QSizePol
 
 from slideviz.case.model import Ffd, FromFile, Motion, Radial, Rotate, Scale, Target, Translate
 from slideviz.gui.widgets.build import boxed, grow_fields, in_row
-from slideviz.gui.widgets.fields import Choice, NumberField, not_zero
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField, not_zero
 from slideviz.gui.widgets.vector_field import VectorField, a_direction
 from slideviz.session.motions import Axis
 from slideviz.terms import MOTION_KINDS

@@ -12,7 +12,8 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QSlider, QWidget
 from slideviz.errors import CaseError
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets.build import check_box, grow_fields, in_row
-from slideviz.gui.widgets.fields import Choice, NumberField
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberField
 from slideviz.gui.widgets.vector_field import VectorField
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.sections.model import Section, Triple

@@ -282,10 +282,12 @@ class Viewing(QWidget):
     def refit(self) -> None:
         """Show the whole mesh again, where a part left a view whose camera nobody has moved.
 
-        While everything is seen the camera stays: a jump would look like a motion of the mesh.
+        Also where all of it left a view. While everything is seen the camera stays: a jump would
+        look like a motion of the mesh.
         """
+        cameras = [scene.camera for scene in self._scenes()]
         fitted = self._leader.camera.fitted
-        if fitted and any(scene.camera.loses_some() for scene in self._scenes()):
+        if any(one.loses_some() if fitted else one.loses_all() for one in cameras):
             self.fit()
 
     def fly_to(self, cell: int) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -87,7 +88,7 @@ def _arrange(figure: Figure, place: Place) -> Place:
     axes = figure.axes[0]
     digits = [len(f"{end:.0f}") for end in axes.get_ylim()]
     labels = axes.get_xlabel(), axes.get_ylabel(), axes.get_title(), axes.get_yscale()
-    key = (*figure.bbox.size, figure.dpi, *labels, *digits)
+    key = (*figure.bbox.size, figure.dpi, *labels, *digits, *_beside(axes))
     if key != place.key:
         engine = figure.get_layout_engine()
         assert engine is not None
@@ -96,6 +97,14 @@ def _arrange(figure: Figure, place: Place) -> Place:
     figure.set_layout_engine("none")
     axes.set_position(place.bounds)
     return place
+
+
+def _beside(axes: Axes) -> list[str]:
+    """Return the texts of a legend that stands beside the axes, and takes room from them."""
+    legend = axes.get_legend()
+    if legend is None or legend.get_bbox_to_anchor().width > 0:
+        return []
+    return [text.get_text() for text in (legend.get_title(), *legend.get_texts())]
 
 
 def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:

@@ -16,7 +16,8 @@ from qtpy.QtWidgets import (
 )
 
 from slideviz.gui.widgets.build import decimal_box, dialog_buttons, hint_label
-from slideviz.gui.widgets.fields import Choice, NumberBox
+from slideviz.gui.widgets.choice import Choice
+from slideviz.gui.widgets.fields import NumberBox
 from slideviz.mesh.model import Mesh
 from slideviz.session.formats import formats_for
 
@@ -164,6 +165,13 @@ def ask_replace(parent: QWidget, paths: Sequence[Path]) -> bool:
     if several:
         text = f"{len(paths)} files exist already ({names}). Replace them?"
     return _agreed(parent, QMessageBox.Icon.Question, "Replace files?", text)
+
+
+def ask_lose_results(parent: QWidget, count: int) -> bool:
+    """Return whether the results of so many designs may be lost."""
+    what = f"the results of {count:,} designs" if count > 1 else "the result of a design"
+    text = f"The other table takes away {what}. Go on?"
+    return _agreed(parent, QMessageBox.Icon.Question, "Lose results?", text)
 
 
 def ask_overwrite_input(parent: QWidget, path: Path) -> bool:

@@ -1,0 +1,83 @@
+"""Drop-downs of values with words."""
+
+# ruff: noqa: N802, D102  (Qt's names, and its documentation)
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeVar
+
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtGui import QPaintEvent, QWheelEvent
+from qtpy.QtWidgets import QComboBox, QStyle, QStyleOptionComboBox, QStylePainter
+
+from slideviz.gui.widgets.labels import wrapped
+
+Value = TypeVar("Value")
+MARGIN = 4
+"""Pixels that the style leaves free beside the text."""
+
+
+class Choice(QComboBox):
+    """A drop-down of values with words; the wheel scrolls the panel instead of changing it.
+
+    Signals
+    -------
+    chosen(object)
+        The value that the user has chosen.
+    """
+
+    chosen = Signal(object)
+
+    def __init__(self, words: Mapping[Value, str], tip: str = "", name: str = "") -> None:
+        super().__init__()
+        self.setToolTip(wrapped(tip))
+        self.setObjectName(name)
+        for value, text in words.items():
+            self.addItem(text, value)
+        self.setMinimumContentsLength(8)
+        self.activated.connect(lambda _: self.chosen.emit(self.currentData()))
+
+    def show_value(self, value: object) -> None:
+        """Show a value; `chosen` is not emitted."""
+        index = self.findData(value)
+        if index >= 0 and index != self.currentIndex():
+            self.setCurrentIndex(index)
+
+    def explain(self, tips: Mapping[str, str]) -> None:
+        """Give entries tooltips, by their values."""
+        for value, tip in tips.items():
+            self.setItemData(self.findData(value), wrapped(tip), Qt.ItemDataRole.ToolTipRole)
+
+    def showPopup(self) -> None:
+        # A list narrower than its words would cut them, and they are nowhere else in full.
+        frame = self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent) + 2 * MARGIN
+        self.view().setMinimumWidth(self.view().sizeHintForColumn(0) + frame)
+        # Escape leaves the list at the entry below the mouse; it would open there next time.
+        self.view().setCurrentIndex(self.model().index(self.currentIndex(), self.modelColumn()))
+        super().showPopup()
+
+    @property
+    def shown(self) -> str:
+        """Return the text for which there is room."""
+        return self._option().currentText
+
+    def _option(self) -> QStyleOptionComboBox:
+        """Return what the style paints: a text that is too long ends with an ellipsis."""
+        option = QStyleOptionComboBox()
+        self.initStyleOption(option)
+        part, kind = QStyle.SubControl.SC_ComboBoxEditField, QStyle.ComplexControl.CC_ComboBox
+        room = self.style().subControlRect(kind, option, part, self).width() - MARGIN
+        if not option.currentIcon.isNull():
+            room -= option.iconSize.width() + MARGIN
+        elided = Qt.TextElideMode.ElideRight
+        option.currentText = self.fontMetrics().elidedText(option.currentText, elided, room)
+        return option
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter, option = QStylePainter(self), self._option()
+        painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
+        painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
