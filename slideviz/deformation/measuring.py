@@ -56,7 +56,7 @@ class PointFiles:
             rows = source.array(
                 self.place.points + first * kind.itemsize, count, kind, "the points"
             )
-            out[a:b] = rows["x"][nodes[a:b] - first]
+            out[a:b] = rows["x"] if b - a == count else rows["x"][nodes[a:b] - first]
             a = b
         return out
 
@@ -68,6 +68,11 @@ def nodes_of(block: Block) -> tuple[IntArray, IntArray]:
         return np.arange(low, high), block.nodes - low
     nodes, flat = np.unique(block.nodes, return_inverse=True)
     return nodes, flat
+
+
+def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Return those of 1 and -1 that stand in signs (k,), ascending: (1,) or (2,)."""
+    return np.unique([signs.min(), signs.max()])
 
 
 def require_one_way(signs: NDArray[np.int8], name: str, first: int, also: str = "") -> None:
@@ -130,7 +135,7 @@ def measured(block: Block, base: Mesh, moved: Mesh, metric: Metric, listed: int)
         one.values,
         other.status,
         one.status,
-        np.unique(one.signs),
+        ways_of(one.signs),
         {
             int(block.ids[k]): (int(block.types[k]), block.nodes[ends[k] : ends[k + 1]].copy())
             for k in lowest
@@ -157,7 +162,7 @@ class Rating:
 
     def add(self, found: Measured, listed: int) -> None:
         """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
-        self._signs = np.unique(np.concatenate([self._signs, found.signs]))
+        self._signs = ways_of(np.concatenate([self._signs, found.signs]))
         require_one_way(self._signs, found.name, found.first)
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status

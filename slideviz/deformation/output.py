@@ -60,33 +60,33 @@ class Output:
     ) -> None:
         assert case.mesh_file is not None
         self._stack, self._case, self._path, self._watch = stack, case, output, watch
-        self._ranks, self._about = ranks, about
-        self._resume, self._replaces = resume, replaces
+        self._ranks = ranks
         self._mesh_file = case.mesh_file
         source = Source(case.mesh_file, stack.enter_context(case.mesh_file.open("rb")))
         self._place = find_zone(source, case.zone)
         self.files = PointFiles(source, source, self._place)
-        self._partial: Partial | None = None
+        self._partial = stack.enter_context(
+            partial_copy(
+                output,
+                case.mesh_file,
+                f"{about} {parts(self._place.n_points)[0]}",
+                resume=resume,
+                replaces=replaces,
+                ranks=ranks,
+            )
+        )
+        self._is_ready = False
         self._rating: Rating | None = None
 
     def _opened(self) -> Partial:
-        """Return the copy that is changed; it is made when it is needed first."""
-        if self._partial is None:
+        """Return the copy that is changed, when it is there."""
+        if not self._is_ready:
             with self._watch.phase("write") as tick:
-                self._partial = self._stack.enter_context(
-                    partial_copy(
-                        self._path,
-                        self._mesh_file,
-                        f"{self._about} {parts(self._place.n_points)[0]}",
-                        resume=self._resume,
-                        replaces=self._replaces,
-                        progress=tick,
-                        ranks=self._ranks,
-                    )
-                )
+                self._partial.ready(tick)
                 self._check(self._partial, tick)
             after = self.files.before.of(self._partial.file)
             self.files = PointFiles(self.files.before, after, self._place)
+            self._is_ready = True
         return self._partial
 
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:

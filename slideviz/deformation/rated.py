@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, require_one_way
+from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, require_one_way, ways_of
 from slideviz.errors import MeshError
 from slideviz.mesh.io.su2b.elements import Block, element_blocks
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
@@ -79,7 +79,7 @@ def rated_blocks(
             now = Mesh(files.points(source, nodes), cells, name=source.name)
             base = now.with_points(before.points(before.before, nodes)) if before else None
             found = quality(now, base, metric)
-            signs = np.unique(np.concatenate([signs, found.signs]))
+            signs = ways_of(np.concatenate([signs, found.signs]))
             also = "" if before else "give --reference UNDEFORMED, "
             require_one_way(signs, source.name, block.first, also)
             yield Rated(block.ids, nodes, now, base, found)

@@ -66,7 +66,7 @@ class Rest:
             now = cartesian(frame, points, start, coords)
             if not np.all(np.isfinite(now)):
                 raise DeformError(f"step {step.index}: coordinates became infinite; use more steps")
-            self._require_sound(step, nodes, points, (coords - start) * inner[:, None])
+            self._require_sound(step, nodes, points, coords - start, at)
             # A Cartesian frame has the points as coordinates, which are those of the next step.
             out = now.copy()
             out[at] = step.mesh.points[where]
@@ -75,10 +75,11 @@ class Rest:
     def _in_skin(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
         """Return which of some nodes, ascending, are in the skin, and their places there."""
         assert self.skin.part is not None
-        numbers = self.skin.part.points
-        where = np.searchsorted(numbers, nodes)
-        at = np.flatnonzero(numbers[np.minimum(where, len(numbers) - 1)] == nodes)
-        return at, where[at]
+        low, high = np.searchsorted(self.skin.part.points, [nodes[0], nodes[-1] + 1])
+        numbers = self.skin.part.points[low:high]
+        at = np.searchsorted(nodes, numbers)
+        same = np.flatnonzero(nodes[at] == numbers)
+        return at[same], low + same
 
     @cached_property
     def _sector(self) -> tuple[float, float]:
@@ -109,11 +110,13 @@ class Rest:
             )
 
     def _require_sound(
-        self, step: Step, nodes: IntArray, points: FloatArray, shift: FloatArray
+        self, step: Step, nodes: IntArray, points: FloatArray, shift: FloatArray, at: IntArray
     ) -> None:
-        length = np.linalg.norm(shift, axis=1)
-        k = int(np.argmax(length))
-        far, after = float(length[k]), step.mesh.points
+        """Raise where nodes, but for those ``at`` (b,) that are in the skin, went too far."""
+        squared = np.einsum("nd,nd->n", shift, shift)
+        squared[at] = 0.0
+        k = int(np.argmax(squared))
+        far, after = float(np.linalg.norm(shift[k])) if squared[k] else 0.0, step.mesh.points
         message = overshoot_of_rest(self.setup, self.skin, after, step.part, far)
         if message:
             where = ", ".join(f"{value:.6g}" for value in points[k])

@@ -110,12 +110,12 @@ def stream(
     require_stream(case)
     total = max(1, case.steps)
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
-    with watch.phase("read") as tick:
-        skin = read_skin(path, case.zone, tick, ranks)
     with ExitStack() as stack:
-        stack.enter_context(_numbered(skin))
         about = _about(case, path)
         out = Output(stack, case, output, watch, ranks, about, resume=resume, replaces=replaces)
+        with watch.phase("read") as tick:
+            skin = read_skin(path, case.zone, tick, ranks)
+        stack.enter_context(_numbered(skin))
         if resume:
             note(out.found())
         rest = _solved(case, skin, out, tell)

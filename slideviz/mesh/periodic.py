@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -87,7 +88,12 @@ def axis_basis(axis: Vector) -> FloatArray:
     MeshError
         The axis has length zero.
     """
-    direction = np.asarray(axis, float)
+    return _basis_of(*map(float, axis)).copy()
+
+
+@lru_cache(16)
+def _basis_of(*axis: float) -> FloatArray:
+    direction = np.array(axis)
     length = np.linalg.norm(direction)
     if not length > 0:
         raise MeshError("the axis of rotation has length zero; give a direction such as 0, 0, 1")

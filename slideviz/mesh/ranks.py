@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import pickle
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -18,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from slideviz.errors import MeshError, SlidevizError
+from slideviz.mesh.threads import at_most, cores
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm, Intracomm
@@ -34,7 +36,7 @@ PIECE = 1 << 30
 
 
 class Alone:
-    """One process, which does all parts by itself."""
+    """One process, which does all parts by itself, as many at a time as it has cores."""
 
     size = 1
 
@@ -46,10 +48,28 @@ class Alone:
         ----------
         make : callable
             A function of a module, called with ``given`` by each rank: a context with what does
-            one task. It opens files itself; ``given``, tasks and results go from rank to rank.
+            one task, from any thread. It opens files itself; ``given``, tasks and results go from
+            rank to rank.
         """
-        with make(*given) as work:
-            yield lambda tasks: map(work, tasks)
+        threads = cores()
+        with make(*given) as work, at_most(1), ThreadPoolExecutor(threads) as pool:
+            try:
+                yield lambda tasks: _in_order(pool, work, tasks, threads)
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+
+def _in_order(
+    pool: ThreadPoolExecutor, work: Callable[[Task], Result], tasks: Sequence[Task], threads: int
+) -> Iterator[Result]:
+    """Yield the results of tasks; each thread has the next one before it is asked for."""
+    ahead: deque[Future[Result]] = deque()
+    for task in tasks:
+        ahead.append(pool.submit(work, task))
+        if len(ahead) > 2 * threads:
+            yield ahead.popleft().result()
+    while ahead:
+        yield ahead.popleft().result()
 
 
 ALONE = Alone()
@@ -258,8 +278,6 @@ def limited(threads: int) -> Iterator[Callable[[], None]]:
     """Return what limits the thread that calls it, in a context where all keep to fewer threads."""
     from numba import config, set_num_threads
     from threadpoolctl import threadpool_limits
-
-    from slideviz.mesh.threads import at_most
 
     with threadpool_limits(threads, user_api="blas"), at_most(threads):
         yield lambda: set_num_threads(min(threads, config.NUMBA_NUM_THREADS))

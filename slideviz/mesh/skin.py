@@ -171,11 +171,12 @@ def _cells_at(source: Source, place: ZonePlace, found: Iterator[_Near]) -> tuple
 
 def _check_block(source: Source, place: ZonePlace, block: Block, cells: Cells) -> None:
     """Raise where a cell of a block has a node twice, or its index is no number or another's."""
-    wrong = block.ids.view(np.uint64) >= place.cells.count
-    _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
-    if wrong.any() or (count > 1).any():
-        k = int(np.argmax(wrong)) if wrong.any() else int(first[np.argmax(count)])
-        raise _twice(source, place, block.first + k, int(block.ids[k]))
+    if not np.array_equal(block.ids, np.arange(block.first, block.first + len(block.ids))):
+        wrong = block.ids.view(np.uint64) >= place.cells.count
+        _, first, count = np.unique(block.ids, return_index=True, return_counts=True)
+        if wrong.any() or (count > 1).any():
+            k = int(np.argmax(wrong)) if wrong.any() else int(first[np.argmax(count)])
+            raise _twice(source, place, block.first + k, int(block.ids[k]))
     fault = first_fault(cells, place.n_points)
     if fault is not None:
         raise _cell_error(source, place, block.first + fault[0], fault[1])

@@ -207,15 +207,16 @@ def test_errors_of_other_ranks_can_be_raised():
 def test_a_killed_rank_ends_all_and_others_go_on_with_what_is_done(square, alone):
     """From one process to two ranks, and back: parts are the same."""
     ours, note = names_of(square / "out.su2b")
-    kill = "if rank == {} and given[-1][0] > {}: os.kill(os.getpid(), signal.SIGKILL)"
+    # Parts before it are finished by other threads meanwhile.
+    kill = "if rank == {} and given[-1][0] > {}: time.sleep(.5), os.kill(os.getpid(), 9)"
     code, out, err = done(started(square, 0, *WORDS, hook=kill.format(0, 100)))
     assert (code, out, err) == (-9, "", "")
     first = len(json.loads(note.read_text())["sums"])
-    assert first == 3
+    assert 0 < first <= 3
     hook = kill.format(1, 300)
     code, out, err = done(started(square, 2, *WORDS, "--resume", hook=hook, pause=0.02))
     assert (code != 0, out) == (True, "")
-    assert "slideviz: note: out.su2b: goes on after 3 of 19 parts" in err
+    assert f"slideviz: note: out.su2b: goes on after {first} of 19 parts" in err
     assert err.count("slideviz: ended by SIGTERM; what is done is kept in .out.su2b.partial") == 1
     assert err.count("slideviz:") == 2
     assert not (square / "out.su2b").exists()
@@ -355,7 +356,7 @@ def test_parts_that_changed_since_are_made_again(tmp_path, monkeypatch):
     told = []
     stream(case, out, resume=True, note=told.append)
     assert "goes on after 3 of 10 parts" in told[0]
-    assert made[0] == (30, 40)
+    assert min(made) == (30, 40)
     assert out.read_bytes() == whole
 
 

@@ -13,6 +13,7 @@ import os
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import BinaryIO, Literal
 
 import numpy as np
@@ -89,7 +90,7 @@ class Source:
     """
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
-        self.name, self._file = printable(path), file
+        self.name, self._file, self._lock = printable(path), file, Lock()
         self.size = os.fstat(file.fileno()).st_size
         head = file.read(2 * _INT)
         if head[:_INT] not in MAGIC:
@@ -107,7 +108,7 @@ class Source:
     def of(self, file: BinaryIO) -> Source:
         """Return the same for another file of the same layout, whose head is not read."""
         other = copy(self)
-        other._file = file
+        other._file, other._lock = file, Lock()
         return other
 
     @property
@@ -151,8 +152,9 @@ class Source:
         kind = np.dtype(dtype)
         self.require(at, count, kind.itemsize, what)
         try:
-            self._file.seek(at)
-            found = np.fromfile(self._file, kind, count)
+            with self._lock:
+                self._file.seek(at)
+                found = np.fromfile(self._file, kind, count)
         except OSError as problem:
             raise self.error(at, f"cannot be read: {problem}; check the disk") from problem
         if len(found) != count:

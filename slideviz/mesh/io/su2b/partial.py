@@ -11,9 +11,11 @@ import errno
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import BinaryIO
 
 from slideviz.errors import MeshError
@@ -24,7 +26,8 @@ from slideviz.mesh.ranks import ALONE, Alone
 
 HEAD = 8
 """Bytes that are zeros until the end."""
-_PIECE = 1 << 28
+_PIECE = 1 << 26
+Tick = Callable[[float], object]
 
 
 @dataclass(eq=False)
@@ -39,11 +42,14 @@ class Partial:
         Its name meanwhile.
     sums : list of int
         The checksums of the parts that are made, of those that the caller counts.
+    ready : callable
+        Waits until the copy is made, and is to be called before anything is written to it.
     """
 
     file: BinaryIO
     path: Path
     sums: list[int]
+    ready: Callable[[Tick], None]
     _note: Path
     _about: str
 
@@ -77,10 +83,11 @@ def partial_copy(
     *,
     resume: bool,
     replaces: Path | None,
-    progress: Callable[[float], object],
     ranks: Alone = ALONE,
 ) -> Iterator[Partial]:
     """Return a copy of ``source`` to be changed; it takes the place of ``path`` at the end.
+
+    One process makes the copy beside its other work, ranks make it when it has to be ready.
 
     After an error nothing is left; after the end of the process the copy and the note of what is
     done stay, so that ``resume`` can go on with them.
@@ -106,15 +113,20 @@ def partial_copy(
             _lock(file, path)
             with removed_at_stop(ours):
                 try:
-                    if sums and os.fstat(file.fileno()).st_size == source.stat().st_size:
+                    size = source.stat().st_size
+                    if sums and os.fstat(file.fileno()).st_size == size:
                         keep(ours, _kept_words(ours))
+                        tasks = []
                     else:
-                        sums = []
+                        sums, tasks = [], _pieces(size)
                         note.unlink(missing_ok=True)
-                        _copy(file, source, ours, progress, ranks)
+                        os.ftruncate(file.fileno(), 0)
+                        os.ftruncate(file.fileno(), size)
                     with source.open("rb") as given:
                         head = given.read(HEAD)
-                    yield Partial(file, ours, sums, note, about)
+                    copying = _beside if ranks.size == 1 else _together
+                    with copying(source, ours, tasks, ranks) as ready:
+                        yield Partial(file, ours, sums, ready, note, about)
                     file.seek(0)
                     file.write(head)
                     file.flush()
@@ -157,32 +169,72 @@ def _lock(file: BinaryIO, path: Path) -> None:
         ) from problem
 
 
-def _copy(
-    file: BinaryIO, source: Path, ours: Path, progress: Callable[[float], object], ranks: Alone
-) -> None:
-    """Copy the source but for its head."""
-    size = source.stat().st_size
-    os.ftruncate(file.fileno(), 0)
-    os.ftruncate(file.fileno(), size)
-    # Each ends where a page does, which only one rank writes then.
+Piece = tuple[int, int]
+"""The first of some bytes, and the one after the last."""
+
+
+def _pieces(size: int) -> list[Piece]:
+    """Return the pieces of a file without its head; each ends where a page does."""
     ends = [*range(_PIECE, size, _PIECE), size]
-    tasks = list(zip([HEAD, *ends[:-1]], ends, strict=True))
-    with ranks.sharing(_copying, source, ours, ranks.size > 1) as do:
-        for (_, end), _ in zip(tasks, do(tasks), strict=True):
-            progress(end / size)
+    return list(zip([HEAD, *ends[:-1]], ends, strict=True))
 
 
 @contextmanager
-def _copying(source: Path, ours: Path, synced: bool) -> Iterator[Callable[[tuple[int, int]], None]]:
-    """Return what copies the bytes of a file from one place to another."""
+def _together(
+    source: Path, ours: Path, tasks: list[Piece], ranks: Alone
+) -> Iterator[Callable[[Tick], None]]:
+    """Return what copies the pieces of a file, all ranks some."""
+
+    def ready(tick: Tick) -> None:
+        with ranks.sharing(_copying, source, ours) as do:
+            for (_, end), _ in zip(tasks, do(tasks), strict=True):
+                tick(end / tasks[-1][1])
+
+    yield ready
+
+
+@contextmanager
+def _beside(
+    source: Path, ours: Path, tasks: list[Piece], _: Alone
+) -> Iterator[Callable[[Tick], None]]:
+    """Return what waits until the pieces of a file are copied, as they are from now on."""
+    stopped, done = Event(), 0
+
+    def run() -> None:
+        nonlocal done
+        with _copying(source, ours) as copy:
+            for task in tasks:
+                if stopped.is_set():
+                    return
+                copy(task)
+                done += 1
+
+    with ThreadPoolExecutor(1, "slideviz-copy") as pool:
+        found = pool.submit(run)
+
+        def ready(tick: Tick) -> None:
+            while not found.done():
+                tick(done / max(len(tasks), 1))
+                wait([found], 0.05)
+            found.result()
+            tick(1.0)
+
+        try:
+            yield ready
+        finally:
+            stopped.set()
+
+
+@contextmanager
+def _copying(source: Path, ours: Path) -> Iterator[Callable[[Piece], None]]:
+    """Return what copies some bytes of a file to the same place of another, and to the disk."""
     with source.open("rb") as given, ours.open("r+b") as file:
 
-        def copy(task: tuple[int, int]) -> None:
+        def copy(task: Piece) -> None:
             at, end = task
             while at < end:
                 at += _copied(given, file, at, end - at)
-            if synced:
-                os.fsync(file.fileno())
+            os.fsync(file.fileno())
 
         yield copy
 
