@@ -65,7 +65,7 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     ),
     "stream": (
         ("--stream",),
-        {"action": "store_true", "help": "for meshes larger than memory (.su2b)"},
+        {"action": "store_true", "help": "for meshes larger than memory (SU2)"},
     ),
     "set": (
         ("--set",),

@@ -49,7 +49,7 @@ def run_shared(argv: Sequence[str], variable: str, run: Callable[[Ranks], int]) 
             return DONE  # mpirun ends all at the first error: rank 0 must have said why
         raise SlidevizError(
             f"{count} processes of one command were started, but only `slideviz run` with --stream "
-            "(for .su2b meshes) shares its work among several; add --stream, or start one "
+            "(for SU2 meshes) shares its work among several; add --stream, or start one "
             f"(unset {variable} where a program with MPI calls slideviz)"
         )
     from slideviz.mesh.ranks import Ranks

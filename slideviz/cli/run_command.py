@@ -52,7 +52,7 @@ def add_run(calls: argparse._SubParsersAction) -> None:
     add_zoom(call)
     add_shared(call, "zone")
     add_shared(
-        call, "stream", help="for meshes larger than memory (.su2b): only the boundary is in memory"
+        call, "stream", help="for meshes larger than memory (SU2): only the boundary is in memory"
     )
     call.add_argument(
         "--resume", action="store_true", help="go on where a streamed run was stopped"
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_streamable(arguments, case, output, kind)
     _require_places(arguments, case, output, qualities)
     if is_to_be_streamed(arguments, case, output, kind):
-        return run_streamed(arguments, case, begin, output, qualities)
+        return run_streamed(arguments, case, begin, output, qualities, kind)
     seconds = {"read": -time.perf_counter()}
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     tell_lost(output, mesh, kind)

@@ -23,9 +23,9 @@ def require_streamable(
     Raises
     ------
     CaseError, MeshError
-        It needs the mesh in memory, or mesh or result are no SU2 binary meshes.
+        It needs the mesh in memory, or mesh or result are no SU2 meshes.
     """
-    from slideviz.deformation.streaming import require_stream
+    from slideviz.deformation.streaming import require_stream, require_text_of
     from slideviz.errors import CaseError
 
     if not (arguments.stream or arguments.resume):
@@ -35,9 +35,14 @@ def require_streamable(
         raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
     if not (arguments.output or case.mesh_out or case.mesh_out_format):
         require_stream(case)  # the name of the result is that of the mesh then
-    if not _is_binary(output, kind):
-        raise CaseError(f"{output}: a streamed run writes SU2 binary meshes; end its name in .su2b")
+    if not _is_su2(output, kind):
+        raise CaseError(
+            f"{output}: a streamed run writes SU2 meshes; end its name in .su2, or .su2b for the "
+            "binary form"
+        )
     require_stream(case)
+    assert case.mesh_file is not None
+    require_text_of(case.mesh_file, case.mesh_format, _is_text(output, kind))
 
 
 def is_to_be_streamed(
@@ -48,8 +53,8 @@ def is_to_be_streamed(
 
     if arguments.stream or arguments.resume:
         return True
-    able = _is_binary(output, kind) and not _needing_memory(arguments)
-    missing = missing_memory(case) if able else ""
+    able = _is_su2(output, kind) and not _needing_memory(arguments)
+    missing = missing_memory(case, is_text=_is_text(output, kind)) if able else ""
     if missing and not arguments.quiet:
         print(f"slideviz: note: {missing}; it is streamed", file=sys.stderr, flush=True)
     return bool(missing)
@@ -59,12 +64,21 @@ def _needing_memory(arguments: argparse.Namespace) -> list[str]:
     return [name for name in ("picture", "steps_dir", "steps_file") if getattr(arguments, name)]
 
 
-def _is_binary(output: Path, kind: FileFormat | None) -> bool:
-    return (kind or output.suffix.lower().removeprefix(".")) == "su2b"
+def _is_su2(output: Path, kind: FileFormat | None) -> bool:
+    return (kind or output.suffix.lower().removeprefix(".")) in ("su2", "su2b")
+
+
+def _is_text(output: Path, kind: FileFormat | None) -> bool:
+    return (kind or output.suffix.lower().removeprefix(".")) == "su2"
 
 
 def run_streamed(
-    arguments: argparse.Namespace, case: Case, begin: float, output: Path, qualities: Path | None
+    arguments: argparse.Namespace,
+    case: Case,
+    begin: float,
+    output: Path,
+    qualities: Path | None,
+    kind: FileFormat | None,
 ) -> int:
     """Deform a mesh from file to file, with the same report as ``run``."""
     from slideviz.cli.progress import Bar
@@ -76,6 +90,7 @@ def run_streamed(
         done = stream(
             case,
             output,
+            file_format=kind,
             tell=bar.phase,
             note=lambda text: print(f"slideviz: note: {text}", file=sys.stderr, flush=True),
             resume=arguments.resume,

@@ -169,13 +169,13 @@ def _in_memory(arguments: argparse.Namespace, case: Case | None) -> _Scene:
 def _streamed(arguments: argparse.Namespace, case: Case | None) -> _Scene:
     from slideviz.cli.section_streamed import cells_near, skins
 
-    mesh, base, reference = skins(arguments, case)
-    chosen, matrices = _section_and_passages(arguments, mesh, base, case)
-    near, before, found = cells_near(
-        mesh, (arguments.mesh, arguments.zone), reference, arguments.metric, chosen, matrices
-    )
-    path = reference[0] if reference else None
-    return _Scene(near, before, found, chosen, matrices, mesh.points, path)
+    with skins(arguments, case) as (seen, base):
+        mesh = seen.skin
+        chosen, matrices = _section_and_passages(arguments, mesh, base, case)
+        near, before, found = cells_near(
+            mesh, seen.mesh, seen.base_zone, arguments.metric, chosen, matrices
+        )
+    return _Scene(near, before, found, chosen, matrices, mesh.points, seen.reference)
 
 
 def _report(arguments: argparse.Namespace, scene: _Scene, shown: Shown) -> int:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from slideviz.cli.progress import Bar
-from slideviz.cli.streamed import reference_file
+from slideviz.cli.streamed import Looked, looked
 from slideviz.deformation.rated import Rated, Zone, rated_blocks
 from slideviz.deformation.steps import Progress
-from slideviz.deformation.streaming import require_binary
 from slideviz.errors import CaseError
 from slideviz.mesh.io.su2b.elements import taken
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
 from slideviz.mesh.quality import Quality
-from slideviz.mesh.skin import read_skin
 from slideviz.sections.model import Section
 from slideviz.session.passages import keeps, moved
 from slideviz.terms import Metric
@@ -27,26 +26,24 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
 
 
-def skins(
-    arguments: argparse.Namespace, case: Case | None
-) -> tuple[Mesh, Mesh | None, Zone | None]:
-    """Return the skin of a mesh, and skin and file of the undeformed one where there is one.
+@contextmanager
+def skins(arguments: argparse.Namespace, case: Case | None) -> Iterator[tuple[Looked, Mesh | None]]:
+    """Return a mesh to be looked at, and the skin of the undeformed one where there is one.
 
     Raises
     ------
     CaseError
         The mesh is 2D.
     MeshError
-        It is no SU2 binary mesh, or has a mistake, or the reference has other cells.
+        As of `slideviz.cli.streamed.looked`.
     """
-    require_binary(arguments.mesh)
-    mesh = read_skin(arguments.mesh, arguments.zone)
-    if mesh.dim == 2:
-        raise CaseError(
-            f"{mesh.name} is 2D, where all cells are shown around the cut; leave out --stream"
-        )
-    reference = reference_file(arguments, mesh, case)
-    return mesh, read_skin(*reference) if reference else None, reference
+    with looked(arguments, case) as seen:
+        if seen.skin.dim == 2:
+            raise CaseError(
+                f"{seen.skin.name} is 2D, where all cells are shown around the cut; leave out "
+                "--stream"
+            )
+        yield seen, None if seen.base is None else seen.base.skin(lambda _: None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,77 @@ import argparse
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
+    from slideviz.deformation.given_mesh import Given
     from slideviz.deformation.rated import Whole, Zone
     from slideviz.mesh.model import Mesh
+    from slideviz.terms import FileFormat
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """A mesh that is looked at block by block: its skin, and the file and zone of its cells.
+
+    Where there is a reference, ``base`` is the same of it, and ``reference`` its file as given.
+    """
+
+    skin: Mesh
+    mesh: Zone
+    base: Given | None = None
+    reference: Path | None = None
+
+    @property
+    def base_zone(self) -> Zone | None:
+        """Return file and zone of the cells of the reference."""
+        return None if self.base is None else (self.base.path, self.base.zone)
+
+
+@contextmanager
+def looked(arguments: argparse.Namespace, case: Case | None) -> Iterator[Looked]:
+    """Return a mesh to be looked at; its reference is as of `slideviz.cli.options.reference_of`.
+
+    Raises
+    ------
+    MeshError
+        It is of no format that can be streamed, or has a mistake, or the reference has other cells.
+    """
+    from slideviz.cli.progress import Bar
+    from slideviz.deformation.given_mesh import given_mesh
+    from slideviz.deformation.rated import has_cells_of
+    from slideviz.deformation.steps import Progress
+    from slideviz.errors import MeshError
+
+    folder = Path(tempfile.gettempdir())
+    with ExitStack() as stack, Bar() as bar:
+
+        def tick(part: float) -> None:
+            bar.phase(Progress(1, 1, "read", part))
+
+        def opened(path: Path, zone: int | None, kind: FileFormat | None = None) -> Given:
+            return stack.enter_context(given_mesh(path, zone, tick, folder, kind))
+
+        one = opened(arguments.mesh, arguments.zone)
+        skin, mesh = one.skin(tick), (one.path, one.zone)
+        found = Looked(skin, mesh)
+        path = getattr(arguments, "reference", None)
+        if path is not None:
+            base = opened(path, arguments.zone)
+            if not has_cells_of(mesh, (base.path, base.zone)):
+                raise MeshError(
+                    f"{path} cannot be the reference of {skin.name}: it must have the same cells; "
+                    "give the undeformed mesh"
+                )
+            found = Looked(skin, mesh, base, path)
+        elif case is not None and case.mesh_file is not None and case.mesh_file.is_file():
+            base = opened(case.mesh_file, arguments.zone or case.zone, case.mesh_format)
+            if has_cells_of(mesh, (base.path, base.zone)):
+                found = Looked(skin, mesh, base, case.mesh_file)
+        yield found
 
 
 @contextmanager
@@ -24,58 +88,24 @@ def rated(
     Raises
     ------
     MeshError
-        It is no SU2 binary mesh, or has a mistake, or the reference has other cells.
+        As of `looked`.
     """
     from slideviz.cli.progress import Bar
     from slideviz.deformation.rated import rated_whole
     from slideviz.deformation.steps import Progress
-    from slideviz.deformation.streaming import require_binary
-    from slideviz.mesh.skin import read_skin
 
-    mesh = arguments.mesh, arguments.zone
-    require_binary(arguments.mesh)
     with ExitStack() as stack:
+        seen = stack.enter_context(looked(arguments, case))
         with Bar() as bar:
-            skin = read_skin(*mesh, lambda part: bar.phase(Progress(1, 1, "read", part)))
-            reference = reference_file(arguments, skin, case)
             whole = rated_whole(
                 stack,
                 Path(tempfile.gettempdir()),
-                mesh,
-                reference,
+                seen.mesh,
+                seen.base_zone,
                 metric=getattr(arguments, "metric", "knupp"),
                 tick=lambda part: bar.phase(Progress(1, 1, "quality", part)),
             )
-        yield skin, whole, reference[0] if reference else None
-
-
-def reference_file(arguments: argparse.Namespace, skin: Mesh, case: Case | None) -> Zone | None:
-    """Return file and zone of the undeformed mesh, as `slideviz.cli.options.reference_of` does.
-
-    Raises
-    ------
-    MeshError
-        ``--reference`` has other cells, or it is no SU2 binary mesh.
-    """
-    from slideviz.deformation.rated import has_cells_of
-    from slideviz.deformation.streaming import require_binary
-    from slideviz.errors import MeshError
-
-    mesh = arguments.mesh, skin.zone
-    given = getattr(arguments, "reference", None)
-    if given is not None:
-        require_binary(given)
-        if not has_cells_of(mesh, (given, arguments.zone)):
-            raise MeshError(
-                f"{given} cannot be the reference of {skin.name}: it must have the same cells; "
-                "give the undeformed mesh"
-            )
-        return given, arguments.zone
-    if case is None or case.mesh_file is None or not case.mesh_file.is_file():
-        return None
-    require_binary(case.mesh_file)
-    zone = arguments.zone or case.zone
-    return (case.mesh_file, zone) if has_cells_of(mesh, (case.mesh_file, zone)) else None
+        yield seen.skin, whole, seen.reference
 
 
 def require_no_file(arguments: argparse.Namespace) -> None:

@@ -17,12 +17,15 @@ from typing import BinaryIO
 
 import numpy as np
 
-from slideviz.case.model import Case
+from slideviz.deformation.given_mesh import Given, text_blocks
 from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
+from slideviz.errors import MeshError
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.file_checks import require_no_input
 from slideviz.mesh.io.su2b.elements import element_block
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
-from slideviz.mesh.io.su2b.partial import Partial, partial_copy
+from slideviz.mesh.io.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.mesh.ranks import Alone
 from slideviz.rbf.problem import Watch
 from slideviz.terms import Metric
@@ -49,37 +52,40 @@ class Output:
     def __init__(
         self,
         stack: ExitStack,
-        case: Case,
+        given: Given,
+        metric: Metric,
         output: Path,
         watch: Watch,
         ranks: Alone,
         about: str,
         *,
+        is_text: bool,
         resume: bool,
         replaces: Path | None,
     ) -> None:
-        assert case.mesh_file is not None
-        self._stack, self._case, self._path, self._watch = stack, case, output, watch
-        self._ranks = ranks
-        self._mesh_file = case.mesh_file
-        source = Source(case.mesh_file, stack.enter_context(case.mesh_file.open("rb")))
-        self._place = find_zone(source, case.zone)
+        self._stack, self._given, self._path, self._watch = stack, given, output, watch
+        self._metric, self._ranks, self._is_text, self._replaces = metric, ranks, is_text, replaces
+        self._mesh_file, self._zone = given.path, given.zone
+        source = Source(given.path, stack.enter_context(given.path.open("rb")))
+        self._place = find_zone(source, given.zone)
         self.files = PointFiles(source, source, self._place)
-        self._partial = stack.enter_context(
-            partial_copy(
-                output,
-                case.mesh_file,
-                f"{about} {parts(self._place.n_points)[0]}",
-                resume=resume,
-                replaces=replaces,
-                ranks=ranks,
+        about = f"{about} {is_text} {parts(self._place.n_points)[0]}"
+        if is_text:
+            require_no_input(output, MeshError, replaces)
+            made = partial_file(output, given.path.stat().st_size, about, resume=resume)
+        else:
+            made = partial_copy(
+                output, given.path, about, resume=resume, replaces=replaces, ranks=ranks
             )
-        )
+        self._partial = stack.enter_context(made)
         self._is_ready = False
         self._rating: Rating | None = None
 
     def _opened(self) -> Partial:
-        """Return the copy that is changed, when it is there."""
+        """Return the file of the points that is changed, when it is there.
+
+        That is a copy of the mesh, or has nothing but points where the output is a text.
+        """
         if not self._is_ready:
             with self._watch.phase("write") as tick:
                 self._partial.ready(tick)
@@ -92,7 +98,7 @@ class Output:
     def _check(self, partial: Partial, tick: Callable[[float], object]) -> None:
         """Forget the parts from the first one on that is not as it was written."""
         done = parts(self._place.n_points)[: partial.done]
-        given = self._mesh_file, self._case.zone, partial.path
+        given = self._mesh_file, self._zone, partial.path
         with self._ranks.sharing(checking, *given) as do:
             for k, found in enumerate(do(done)):
                 if found != partial.sums[k]:
@@ -120,7 +126,7 @@ class Output:
             partial.note([])
         # What others write must be seen by all, and no page be written that has old bytes of it.
         synced = final or self._ranks.size > 1
-        given = self._mesh_file, self._case.zone, partial.path, rest.bare(), synced
+        given = self._mesh_file, self._zone, partial.path, rest.bare(), synced
         with self._watch.phase("evaluate") as tick, self._ranks.sharing(moving, *given) as do:
             todo = parts(total, partial.done)
             for (_, end), checksum in zip(todo, do(todo), strict=True):
@@ -131,16 +137,31 @@ class Output:
     def rating(self, listed: int) -> Rating:
         """Return the quality of all cells; of inverted ones ``listed`` are kept."""
         partial, count = self._opened(), self._place.cells.count
-        metric = self._case.quality_metric
+        metric = self._metric
         if self._rating is None:
             self._rating = Rating(self._stack, self._path.parent, count, metric)
         self._rating.inverted.clear()
-        given = self._mesh_file, self._case.zone, partial.path, metric, listed
+        given = self._mesh_file, self._zone, partial.path, metric, listed
         with self._watch.phase("quality") as tick, self._ranks.sharing(measuring, *given) as do:
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
                 self._rating.add(found, listed)
                 tick(end / count)
         return self._rating
+
+    def finish(self, ffd: bytes | None) -> None:
+        """Write the text, where the output is one; with other boxes where ``ffd`` has some."""
+        if not self._is_text:
+            return
+        partial, written = self._opened(), 0
+        blocks = text_blocks(self._given, self.files.before, self._place, partial.path, ffd)
+        with self._watch.phase("write") as tick:
+            with atomic_write(self._path, replaces=self._replaces) as file:
+                for block in blocks:
+                    file.write(block)
+                    written += len(block)
+                    tick(min(1.0, written / self._given.text_size))
+            tick(1.0)
+        partial.remove()
 
 
 def parts(count: int, done: int = 0) -> list[Part]:

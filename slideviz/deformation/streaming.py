@@ -15,6 +15,7 @@ from pathlib import Path
 
 from slideviz import __version__
 from slideviz.case.model import Case
+from slideviz.deformation.given_mesh import given_for, require_su2
 from slideviz.deformation.measuring import folded_steps
 from slideviz.deformation.output import Output
 from slideviz.deformation.rest import Rest
@@ -32,12 +33,11 @@ from slideviz.mesh.io.files import format_of
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.ranks import ALONE, Alone
-from slideviz.mesh.skin import read_skin
 from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
 from slideviz.terms import FileFormat
 
-NEEDED = 5.0
+NEEDED: dict[FileFormat, float] = {"su2b": 5.0, "su2": 5.0}
 """Memory of a run that is not streamed over the size of its file: 4.2 on hexahedra."""
 Tell = Callable[[Progress], None]
 
@@ -72,6 +72,7 @@ def stream(
     case: Case,
     output: Path,
     *,
+    file_format: FileFormat | None = None,
     tell: Tell = lambda _: None,
     note: Callable[[str], object] = lambda _: None,
     resume: bool = False,
@@ -85,6 +86,8 @@ def stream(
     ----------
     output : Path
         Where the deformed mesh goes: whole or not at all.
+    file_format : {"su2", "su2b"}, optional
+        Its format, whatever its ending.
     tell : callable
         Called often with a ``Progress``; an exception it raises ends the run at once.
     note : callable
@@ -110,11 +113,36 @@ def stream(
     require_stream(case)
     total = max(1, case.steps)
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
+    is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
+    require_text_of(path, case.mesh_format, is_text)
     with ExitStack() as stack:
-        about = _about(case, path)
-        out = Output(stack, case, output, watch, ranks, about, resume=resume, replaces=replaces)
         with watch.phase("read") as tick:
-            skin = read_skin(path, case.zone, tick, ranks)
+            given = stack.enter_context(
+                given_for(
+                    output,
+                    path,
+                    case.zone,
+                    file_format=case.mesh_format,
+                    is_text=is_text,
+                    version=__version__,
+                    resume=resume,
+                    tick=tick,
+                    ranks=ranks,
+                )
+            )
+            out = Output(
+                stack,
+                given,
+                case.quality_metric,
+                output,
+                watch,
+                ranks,
+                _about(case, path),
+                is_text=is_text,
+                resume=resume,
+                replaces=replaces,
+            )
+            skin = given.skin(tick, ranks)
         stack.enter_context(_numbered(skin))
         if resume:
             note(out.found())
@@ -122,6 +150,8 @@ def stream(
         out.displace(rest, final=True)
         rating = out.rating(listed)
         folded = folded_steps(rest, out.files, rating.inverted)
+        moved = rest.steps[-1].mesh.origin.ffd
+        out.finish(None if moved is skin.origin.ffd else moved)
     return Streamed(
         skin,
         _of_whole(rest.steps, skin),
@@ -174,26 +204,28 @@ def require_stream(case: Case) -> None:
             "METHOD= elastic needs the whole mesh at once and cannot be streamed; use METHOD= rbf "
             "or idw, or run it without --stream"
         )
-    require_binary(path, case.mesh_format)
+    require_su2(path, case.mesh_format)
 
 
-def require_binary(path: Path, file_format: FileFormat | None = None) -> None:
-    """Raise where a mesh is of no format that can be streamed.
+def require_text_of(path: Path, file_format: FileFormat | None, is_text: bool) -> None:
+    """Raise where the output is a text, and the mesh is none that it could be made of.
 
     Raises
     ------
     MeshError
-        It is no SU2 binary mesh.
+        It is binary.
     """
-    if file_format == "su2" or format_of(path, None) != "su2b":
+    if is_text and require_su2(path, file_format) == "su2b":
         raise MeshError(
-            f"{path}: only SU2 binary meshes can be streamed; make one with `slideviz convert "
-            f"{path.name} {path.stem}.su2b`"
+            f"{path}: an SU2 binary mesh is streamed to another; end the name of the output in "
+            ".su2b, and make it a text with `slideviz convert` where there is more memory"
         )
 
 
-def missing_memory(case: Case) -> str:
+def missing_memory(case: Case, *, is_text: bool) -> str:
     """Return in words that a mesh that can be streamed needs more memory than is free, or nothing.
+
+    ``is_text`` tells whether the output is a text.
 
     Raises
     ------
@@ -201,11 +233,12 @@ def missing_memory(case: Case) -> str:
         The mesh cannot be read.
     """
     path = case.mesh_file
-    if path is None or case.method == "elastic" or case.mesh_format == "su2":
+    if path is None or case.method == "elastic":
         return ""
-    if format_of(path, case.mesh_format) != "su2b":
+    kind = format_of(path, case.mesh_format)
+    if kind is None or (is_text and kind == "su2b"):
         return ""
-    needed, free = NEEDED * path.stat().st_size, free_memory()
+    needed, free = NEEDED[kind] * path.stat().st_size, free_memory()
     if needed <= free:
         return ""
     return f"{path.name} needs about {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free"

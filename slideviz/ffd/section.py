@@ -178,7 +178,8 @@ class _Reader:
 
     def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
         """Return nodes and parametric coordinates on each marker, sorted by node."""
-        key = "FFD_SURFACE_POINTS"
+        key, part = "FFD_SURFACE_POINTS", self.mesh.part
+        n_points = len(self.mesh.points) if part is None else part.n_points
         rows = self.rows(key, self.count(key))
         on: dict[str, list[list[str]]] = {}
         for words in rows:
@@ -187,10 +188,13 @@ class _Reader:
         for marker, tails in on.items():
             table = self.table(key, tails, 4)
             nodes = table[:, 0].astype(np.int64)
-            bad = (nodes != table[:, 0]) | (nodes < 0) | (nodes >= len(self.mesh.points))
+            bad = (nodes != table[:, 0]) | (nodes < 0) | (nodes >= n_points)
             if bad.any():
                 raise self.error(f"{key} names node {tails[int(np.argmax(bad))][0]}, which is none")
             nodes, first = np.unique(nodes, return_index=True)
+            if part is not None:  # which has all nodes of markers
+                inside = np.isin(nodes, part.points)
+                nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]
             found[marker] = nodes, table[first, 1:]
         return found
 

@@ -143,7 +143,12 @@ def check_size(mesh: Mesh) -> None:
     bad = ((np.abs(mesh.points) > LARGEST) & np.isfinite(mesh.points)).any(axis=1)
     if bad.any():
         k = int(np.argmax(bad))
-        raise MeshError(
-            f"{mesh.name}: point {k} is at {tuple(mesh.points[k].tolist())}; nothing can be "
-            f"computed with coordinates larger than {LARGEST:g}, so correct it or scale the mesh"
-        )
+        raise too_large(mesh.name, k, mesh.points[k])
+
+
+def too_large(name: str, k: int, point: FloatArray) -> MeshError:
+    """Return the error for a point (d,) that is too far away to be computed with."""
+    return MeshError(
+        f"{name}: point {k} is at {tuple(point.tolist())}; nothing can be computed with "
+        f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh"
+    )

@@ -38,7 +38,7 @@ def is_large(path: Path, zone: int | None) -> bool:
     if place.dim == 2:  # all of its cells are what is drawn
         return False
     cells = place.cells.count
-    return cells > LARGE_CELLS or NEEDED * path.stat().st_size > free_memory()
+    return cells > LARGE_CELLS or NEEDED["su2b"] * path.stat().st_size > free_memory()
 
 
 def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object]) -> Mesh:

@@ -38,7 +38,9 @@ import os, signal, sys, time
 rank = int(os.environ.get("OMPI_COMM_WORLD_RANK", 0))
 from slideviz.deformation import output
 from slideviz.mesh import skin
-output.CHUNK, skin.BLOCK = 37, 50
+from slideviz.mesh.io import binary_copy
+from slideviz.mesh.io.su2 import scan
+output.CHUNK, skin.BLOCK, scan.BLOCK_BYTES, binary_copy.PIECES = 37, 50, 700, 2
 move = output.move
 def late(*given):
     time.sleep({pause})
@@ -115,6 +117,18 @@ def test_bits_are_those_of_one_process(square, alone, count):
     assert done(started(square, count, *WORDS)) == (0, "", "")
     assert results(square) == alone
     assert not list(square.glob(".*"))
+
+
+@needs_mpi
+def test_a_text_is_that_of_a_run_in_memory(tmp_path):
+    write_sample("square", tmp_path, 25)
+    case = sv.Case.read(tmp_path / "square.cfg")
+    *_, last = sv.deform(case, sv.read(case.mesh_file))
+    sv.write(tmp_path / "memory.su2", last.mesh)
+    words = ("--stream", "-o", "out.su2")
+    assert done(started(tmp_path, 3, *words)) == (0, "", "")
+    assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "memory.su2").read_bytes()
+    assert not list(tmp_path.glob(".*"))
 
 
 class Sent(ranks.Alone):

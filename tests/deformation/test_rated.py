@@ -52,9 +52,18 @@ def meshes(folder, kind):
         text = (folder / "a.su2").read_text()
         (folder / "two.su2").write_text(f"NZONE= 2\nIZONE= 1\n{text}IZONE= 2\n{text}")
         sv.convert(folder / "two.su2", folder / f"{name}.su2b")
+        (folder / "two.su2").replace(folder / f"{name}.su2")
 
 
-@pytest.mark.parametrize("kind", ["mixed", "tetrahedron"])
+@pytest.mark.parametrize(
+    ("ending", "kind"),
+    [
+        ("su2b", "mixed"),
+        ("su2b", "tetrahedron"),
+        ("su2", "mixed"),
+        pytest.param("su2", "tetrahedron", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize(
     "words",
     [
@@ -72,8 +81,9 @@ def meshes(folder, kind):
         ("section", "base.su2b", "--plane", "z=99", "-o", "a.png"),
     ],
 )
-def test_what_is_told_is_the_same(small, capsys, kind, words):
+def test_what_is_told_is_the_same(small, capsys, ending, kind, words):
     meshes(small, kind)
+    words = [word.replace(".su2b", f".{ending}") for word in words]
     one, other = both(capsys, *words)
     assert one == other
     assert one[0] in ((0, 3) if "z=99" not in words else (1,))
@@ -93,12 +103,13 @@ def test_what_cannot_be_streamed_is_told(small, capsys):
     meshes(small, "mixed")
     sv.write("flat.su2b", grid((4, 4)))
     sv.write("other.su2b", grid((5, 4, 4)))
-    Path("case.cfg").write_text("MESH_FILENAME= a.su2\n")
+    sv.convert("a.su2", "a.vtu")
+    Path("case.cfg").write_text("MESH_FILENAME= a.vtu\n")
     for words, said in (
-        (["info", "a.su2"], "a.su2: only SU2 binary meshes can be streamed; make one with"),
+        (["info", "a.vtu"], "a.vtu: only SU2 meshes, text or binary, can be streamed; make one"),
         (["quality", "moved.su2b", "-o", "a.vtu"], "-o needs the mesh in memory; leave it out"),
-        (["quality", "moved.su2b", "--reference", "a.su2"], "a.su2: only SU2 binary meshes"),
-        (["quality", "moved.su2b", "--case", "case.cfg"], "a.su2: only SU2 binary meshes"),
+        (["quality", "moved.su2b", "--reference", "a.vtu"], "a.vtu: only SU2 meshes, text or"),
+        (["quality", "moved.su2b", "--case", "case.cfg"], "a.vtu: only SU2 meshes, text or"),
         (
             ["quality", "moved.su2b", "--reference", "other.su2b"],
             "other.su2b cannot be the reference of moved.su2b: it must have the same cells",

@@ -258,11 +258,11 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     out = tmp_path / "out.su2b"
     with pytest.raises(CaseError, match="METHOD= elastic needs the whole mesh at once"):
         stream(case.change(method="elastic"), out)
-    sv.convert("mesh.su2b", "mesh.su2")
-    with pytest.raises(MeshError, match="only SU2 binary meshes can be streamed; make one with"):
-        stream(case.change(mesh_file=tmp_path / "mesh.su2"), out)
+    sv.convert("mesh.su2b", "mesh.vtu")
+    with pytest.raises(MeshError, match="only SU2 meshes, text or binary, can be streamed; make"):
+        stream(case.change(mesh_file=tmp_path / "mesh.vtu"), out)
     for more, words in (
-        (["-o", "out.su2"], "a streamed run writes SU2 binary meshes"),
+        (["-o", "out.su2"], "mesh.su2b: an SU2 binary mesh is streamed to another; end the name"),
         (["--picture", "a.png"], "--picture needs the mesh in memory"),
         (["--steps-dir", "steps"], "--steps-dir needs the mesh in memory"),
         (["--steps-file", "a.vtkhdf"], "--steps-file needs the mesh in memory"),
@@ -270,13 +270,13 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
         assert run(["run", "square.cfg", "--stream", *more]) == 1
         assert words in capsys.readouterr().err
     assert not Path("steps").exists()
-    text = ["run", "square.cfg", "--stream", "--set", "MESH_FILENAME=mesh.su2"]
+    other = ["run", "square.cfg", "--stream", "--set", "MESH_FILENAME=mesh.vtu"]
     for more, words in (
-        ([], "mesh.su2: only SU2 binary meshes can be streamed"),
-        (["-o", "out.vtu"], "out.vtu: a streamed run writes SU2 binary meshes"),
-        (["-o", "out.su2b"], "mesh.su2: only SU2 binary meshes can be streamed"),
+        ([], "mesh.vtu: only SU2 meshes, text or binary, can be streamed"),
+        (["-o", "out.vtu"], "out.vtu: a streamed run writes SU2 meshes"),
+        (["-o", "out.su2b"], "mesh.vtu: only SU2 meshes, text or binary, can be streamed"),
     ):
-        assert run([*text, *more]) == 1
+        assert run([*other, *more]) == 1
         assert words in capsys.readouterr().err
 
 
@@ -435,7 +435,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED * size - 1)
+    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2b"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2b"]) == 0
     told = capsys.readouterr().err
@@ -445,10 +445,9 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     for more in (["-o", "out.su2"], ["-o", "b.su2b", "--steps-dir", "steps"]):
         assert run([*call, *more, "-q"]) == 0
     assert run([*call, "-q", "-o", "c.su2b", "--set", "METHOD=elastic"]) == 3  # done, with folds
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED * size)
+    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2b"] * size)
     assert run([*call, "-q", "-o", "d.su2b"]) == 0
-    assert streaming.missing_memory(sv.Case()) == ""
-    assert streaming.missing_memory(case.change(mesh_format="su2")) == ""
+    assert streaming.missing_memory(sv.Case(), is_text=False) == ""
 
 
 def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):

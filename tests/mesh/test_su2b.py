@@ -378,6 +378,6 @@ def test_a_file_that_changes_or_fails_while_it_is_read_is_told(tmp_path, monkeyp
 def test_four_bytes_hold_only_so_many(monkeypatch):
     found = replace(made(TWO_D))
     form = su2b.BinaryForm(4, "<", b"", b"", None, (), found.cells)
-    monkeypatch.setattr(su2b_write, "_LARGEST_4", 10)
+    monkeypatch.setattr(su2b_write, "LARGEST_4", 10)
     with pytest.raises(MeshError, match="more cells than a file with counts of 4 bytes can hold"):
         b"".join(su2b_blocks(replace(found, origin=form)))

@@ -101,6 +101,10 @@ class Lines:
             begin = line_end(self.raw, begin)
         return begin
 
+    def bytes_of(self, *ranges: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+        """Return the bounds in bytes of ranges of lines."""
+        return tuple((self.byte(a), self.byte(b)) for a, b in ranges)
+
     def line(self, index: int) -> bytes:
         """Return the text of a line without comment."""
         begin = self.byte(index)

@@ -115,6 +115,20 @@ def scan_block(text, runs):  # type: ignore[no-untyped-def]
     return n, line
 
 
+@njit(**OPTIONS)
+def count_types(text, counts):  # type: ignore[no-untyped-def]
+    """Count the rows of a text by the element type (257,) that they begin with.
+
+    The last is for all types that are none.
+    """
+    at = 0
+    while at < len(text):
+        at = _first_word(text, at)
+        if is_numeric(text[at]):
+            counts[_type_of(text, at)] += 1
+        at = _next_line(text, at)
+
+
 @njit(inline="always", **OPTIONS)
 def _whole_number(text, at):  # type: ignore[no-untyped-def]
     """Return a whole number of plain digits and where they end; -1 where there is none.

@@ -43,27 +43,46 @@ def parse_cells(lines: Lines, rows: Rows, dim: int, n_points: int, progress: Pro
     MeshError
         An element is not what it should be; the message has its line.
     """
-    from slideviz.mesh.io.su2.loops import cell_block
-
     types = np.empty(number_of(rows), np.uint8)
     nodes = np.empty(rows[-1].node + rows[-1].nodes if rows else 0, np.int64)
 
     def parsed(piece: Piece) -> None:
-        text = lines.text(piece)
         mine = types[piece.row : piece.row + piece.rows]
         flat = nodes[piece.node : piece.node + piece.nodes]
-        odd = np.empty((piece.rows, 3), np.int64)
-        found, n_odd = cell_block(np.frombuffer(text, np.uint8), dim, n_points, mine, flat, odd)
-        if found != piece.rows:
-            raise lines.raw.changed()
-        for row, begin, node in odd[:n_odd].tolist():
-            vtk, its = _element(*_line_at(lines, piece, text, begin), dim, n_points)
-            mine[row] = vtk
-            flat[node : node + len(its)] = its
+        fill_cells(lines, piece, mine, flat, dim=dim, n_points=n_points)
 
     _each(parsed, rows, progress)
     nodes.flags.writeable = False
     return Cells.from_types(types, nodes)
+
+
+def fill_cells(
+    lines: Lines,
+    piece: Piece,
+    types: NDArray[np.uint8],
+    nodes: IntArray,
+    *,
+    dim: int,
+    n_points: int,
+) -> None:
+    """Fill types (m,) and nodes (k,) with the elements of a piece, of which there are m.
+
+    Raises
+    ------
+    MeshError
+        An element is not what it should be; the message has its line.
+    """
+    from slideviz.mesh.io.su2.loops import cell_block
+
+    text = lines.text(piece)
+    odd = np.empty((piece.rows, 3), np.int64)
+    found, n_odd = cell_block(np.frombuffer(text, np.uint8), dim, n_points, types, nodes, odd)
+    if found != piece.rows:
+        raise lines.raw.changed()
+    for row, begin, node in odd[:n_odd].tolist():
+        vtk, its = _element(*_line_at(lines, piece, text, begin), dim, n_points)
+        types[row] = vtk
+        nodes[node : node + len(its)] = its
 
 
 def _each(work: Callable[[Piece], None], rows: Rows, progress: Progress) -> None:
@@ -163,38 +182,66 @@ def parse_points(lines: Lines, rows: Rows, dim: int, progress: Progress) -> Floa
     MeshError
         A point is not what it should be; the message has its line.
     """
-    from slideviz.mesh.io.su2.loops import point_block
-
     points = np.empty((number_of(rows), dim))
-    # Of each piece: the most numbers on a row, and the first row that may have lost a coordinate.
-    found = np.full((len(rows), 2), [0, number_of(rows)])
+    found = np.empty((len(rows), 2), np.int64)
     place = {piece.row: k for k, piece in enumerate(rows)}
 
     def parsed(piece: Piece) -> None:
-        text = lines.text(piece)
         mine = points[piece.row : piece.row + piece.rows]
-        odd = np.empty((piece.rows, 2), np.int64)
-        extra = found[place[piece.row]]
-        n_rows, n_odd = point_block(
-            np.frombuffer(text, np.uint8), piece.row, mine.view(np.uint64), extra, odd
-        )
-        if n_rows != piece.rows:
-            raise lines.raw.changed()
-        for row, begin in odd[:n_odd].tolist():
-            numbers = _point(*_line_at(lines, piece, text, begin), dim)
-            mine[row] = numbers[:dim]
-            extra[0] = max(extra[0], len(numbers))
-            if len(numbers) == dim and numbers[-1] == piece.row + row:
-                extra[1] = min(extra[1], piece.row + row)
+        found[place[piece.row]] = fill_points(lines, piece, mine)
 
     _each(parsed, rows, progress)
-    # Where other lines end with an index, a line that has just enough numbers and also ends with
-    # its index has lost a coordinate.
+    require_all_coordinates(lines, rows, dim, found)
+    points.flags.writeable = False
+    return points
+
+
+def fill_points(lines: Lines, piece: Piece, points: FloatArray) -> IntArray:
+    """Fill an array (m, d) with the coordinates of a piece, of which there are m.
+
+    Returns
+    -------
+    (2,) int64
+        The most numbers on a row, and the first row that may have lost a coordinate.
+
+    Raises
+    ------
+    MeshError
+        A point is not what it should be; the message has its line.
+    """
+    from slideviz.mesh.io.su2.loops import point_block
+
+    text, dim = lines.text(piece), points.shape[1]
+    odd = np.empty((piece.rows, 2), np.int64)
+    extra = np.array([0, np.iinfo(np.int64).max])
+    n_rows, n_odd = point_block(
+        np.frombuffer(text, np.uint8), piece.row, points.view(np.uint64), extra, odd
+    )
+    if n_rows != piece.rows:
+        raise lines.raw.changed()
+    for row, begin in odd[:n_odd].tolist():
+        numbers = _point(*_line_at(lines, piece, text, begin), dim)
+        points[row] = numbers[:dim]
+        extra[0] = max(extra[0], len(numbers))
+        if len(numbers) == dim and numbers[-1] == piece.row + row:
+            extra[1] = min(extra[1], piece.row + row)
+    return extra
+
+
+def require_all_coordinates(lines: Lines, rows: Rows, dim: int, found: IntArray) -> None:
+    """Raise where a point has lost a coordinate, by what `fill_points` found in each piece (p, 2).
+
+    Where other lines end with an index, a line that has just enough numbers and also ends with
+    its index has lost a coordinate.
+
+    Raises
+    ------
+    MeshError
+        It has; the message has its line.
+    """
     lost = int(found[:, 1].min())
     if found[:, 0].max() > dim and lost < number_of(rows):
         raise _wrong_count(lines, lines.row(rows, lost), dim, dim)
-    points.flags.writeable = False
-    return points
 
 
 def _point(lines: Lines, index: int, row: bytes, dim: int) -> FloatArray:

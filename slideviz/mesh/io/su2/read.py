@@ -8,7 +8,7 @@ from itertools import pairwise
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.source import Source
 from slideviz.mesh.io.su2.halo import find_halo
-from slideviz.mesh.io.su2.lines import Lines, Rows, number_of
+from slideviz.mesh.io.su2.lines import Rows, number_of
 from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.sections import find_bounds, find_sections
@@ -92,9 +92,9 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         points=points,
         cells=cells,
         markers=markers,
-        zone=_bytes(lines, ((found.bounds.begin, found.bounds.end),))[0],
-        sends=_bytes(lines, tuple((part.begin, part.end) for part in found.sends)),
-        kept=_bytes(lines, tuple((part.line, part.stop) for part in found.kept)),
+        zone=lines.bytes_of((found.bounds.begin, found.bounds.end))[0],
+        sends=lines.bytes_of(*((part.begin, part.end) for part in found.sends)),
+        kept=lines.bytes_of(*((part.line, part.stop) for part in found.kept)),
     )
     mesh = Mesh(
         points=points,
@@ -108,11 +108,6 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
     )
     halo, remarks = find_halo(lines, found, mesh)
     return replace(mesh, halo=halo, remarks=remarks)
-
-
-def _bytes(lines: Lines, ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-    """Return the bounds in bytes of ranges of lines."""
-    return tuple((lines.byte(a), lines.byte(b)) for a, b in ranges)
 
 
 def _shares(sizes: list[int], progress: Progress) -> list[Progress]:

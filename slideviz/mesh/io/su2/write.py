@@ -5,7 +5,7 @@ Numbers are written with as few digits as identify the float64, so that nothing 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh, check_points
 from slideviz.mesh.io.in_order import in_order
-from slideviz.mesh.io.su2.lines import Piece
+from slideviz.mesh.io.source import Source
+from slideviz.mesh.io.su2.lines import Piece, Rows
 from slideviz.mesh.io.su2.read import Document
 from slideviz.mesh.io.su2.scan import BLOCK_BYTES
 from slideviz.mesh.io.su2.sections import is_ffd
@@ -24,6 +25,8 @@ from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh
 _BLOCK_ROWS = 20_000
 _NUMBER_BYTES = 20
 """No index has more digits, with the blank after it."""
+Edit = tuple[int, int, bytes]
+"""First byte and end of what is replaced in a file, and by what."""
 
 
 def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
@@ -76,36 +79,59 @@ def _only_points_differ(mesh: Mesh, document: Document) -> bool:
 
 def _patched(document: Document, points: FloatArray) -> Iterator[bytes]:
     """Yield the file with every coordinate that changed, in any bit, and other boxes in place."""
-    raw = document.raw
+
+    def text(piece: Piece) -> bytes:
+        mine = slice(piece.row, piece.row + piece.rows)
+        return moved_rows(raw, piece, document.points[mine], points[mine])
+
+    raw, ffd = document.raw, document.ffd
+    edits = [] if ffd is None else box_edits(raw, document.kept, document.zone[1], ffd)
+    yield from patched_blocks(raw, document.rows, text, edits)
+
+
+def patched_blocks(
+    raw: Source, rows: Rows, rows_text: Callable[[Piece], bytes], edits: Sequence[Edit]
+) -> Iterator[bytes]:
+    """Yield a file with other texts in place of the pieces of points, and of the bytes of edits.
+
+    Raises
+    ------
+    MeshError
+        The file was changed since it was read.
+    """
     raw.require_same()
-    edits = [] if document.ffd is None else _edits(document, document.ffd)
     done = 0
     tasks: list[tuple[int, int] | Piece | bytes] = []
-    for piece in document.rows:
+    for piece in rows:
         tasks += [*_around(edits, done, piece.begin), piece]
         done = piece.end
 
     def text(task: tuple[int, int] | Piece | bytes) -> bytes:
         if isinstance(task, bytes):
             return task
-        return raw[slice(*task)] if isinstance(task, tuple) else _piece(document, points, task)
+        return raw[slice(*task)] if isinstance(task, tuple) else rows_text(task)
 
     yield from in_order(text, [*tasks, *_around(edits, done, raw.size + 1)])
     raw.require_same()
 
 
-def _edits(document: Document, ffd: bytes) -> list[tuple[int, int, bytes]]:
-    """Return the bytes ``begin:end`` of a file and what stands there instead: other boxes."""
-    raw, end = document.raw, document.zone[1]
-    old = [(a, b) for a, b in document.kept if is_ffd(raw[a:b])]
+def box_edits(raw: Source, kept: Sequence[tuple[int, int]], end: int, ffd: bytes) -> list[Edit]:
+    """Return what puts other boxes into a file.
+
+    Parameters
+    ----------
+    kept : sequence of (int, int)
+        First byte and end of each unknown section.
+    end : int
+        Where the zone ends.
+    """
+    old = [(a, b) for a, b in kept if is_ffd(raw[a:b])]
     if old:
         return [(a, b, b"" if at else ffd) for at, (a, b) in enumerate(old)]
     return [(end, end, ffd if raw[end - 1 : end] == b"\n" else b"\n" + ffd)]
 
 
-def _around(
-    edits: list[tuple[int, int, bytes]], begin: int, end: int
-) -> Iterator[tuple[int, int] | bytes]:
+def _around(edits: Sequence[Edit], begin: int, end: int) -> Iterator[tuple[int, int] | bytes]:
     """Yield blocks of a range of bytes, and the texts that stand in place of some."""
     for first, after, text in edits:
         if begin <= first < end:
@@ -120,21 +146,26 @@ def _ranges(begin: int, end: int) -> list[tuple[int, int]]:
     return [(i, min(i + BLOCK_BYTES, end)) for i in range(begin, end, BLOCK_BYTES)]
 
 
-def _piece(document: Document, points: FloatArray, piece: Piece) -> bytes:
-    """Return some rows of points with every coordinate that changed in its place."""
+def moved_rows(raw: Source, piece: Piece, before: FloatArray, now: FloatArray) -> bytes:
+    """Return some rows of points with every coordinate that changed in its place.
+
+    Parameters
+    ----------
+    before, now : (m, d) float64
+        The points of these rows.
+    """
     from slideviz.mesh.io.su2.digits import print_changed
 
-    text = document.raw[piece.begin : piece.end]
-    mine = slice(piece.row, piece.row + piece.rows)
-    changed = points[mine].view(np.int64) != document.points[mine].view(np.int64)
+    text = raw[piece.begin : piece.end]
+    changed = now.view(np.int64) != before.view(np.int64)
     if not changed.any():
         return text
     broken = text if text.endswith(b"\n") else text + b"\n"
-    numbers = _digits(points[mine])
+    numbers = _digits(now)
     out = np.empty(len(broken) + len(numbers), np.uint8)
     rows, size = print_changed(np.frombuffer(broken, np.uint8), numbers, changed, out)
     if rows != piece.rows:
-        raise document.raw.changed()
+        raise raw.changed()
     return out[: size - len(broken) + len(text)].tobytes()
 
 

@@ -1,8 +1,8 @@
 """A large file that is made in place over some time, and can be gone on with after a stop.
 
-It is a copy of another one, which is changed part by part, under a hidden name beside what it is
-to become. Until the end its first bytes are zeros, so that nothing reads it; then they are put
-back, and it takes the place of the target in one step of the file system.
+It has a hidden name beside what it is to become, or helps to make. A mesh is a copy of another one,
+which is changed part by part; until the end its first bytes are zeros, so that nothing reads it.
+Then they are put back, and it takes the place of the target in one step of the file system.
 """
 
 from __future__ import annotations
@@ -42,6 +42,8 @@ class Partial:
         Its name meanwhile.
     sums : list of int
         The checksums of the parts that are made, of those that the caller counts.
+    mode : int or None
+        The permissions of the file that is there already.
     ready : callable
         Waits until the copy is made, and is to be called before anything is written to it.
     """
@@ -49,14 +51,19 @@ class Partial:
     file: BinaryIO
     path: Path
     sums: list[int]
-    ready: Callable[[Tick], None]
+    mode: int | None
     _note: Path
     _about: str
+    ready: Callable[[Tick], None] = lambda _: None
 
     @property
     def done(self) -> int:
         """Return how many parts are made."""
         return len(self.sums)
+
+    def remove(self) -> None:
+        """Remove it and its note, at the end of its use."""
+        _removed(self.path, self._note)
 
     def note(self, sums: Iterable[int]) -> None:
         """Keep that parts with these checksums are made, after they are on the disk."""
@@ -69,10 +76,59 @@ class Partial:
             keep(self.path, _kept_words(self.path))
 
 
-def names_of(path: Path) -> tuple[Path, Path]:
-    """Return what the file in the making is called, and the note of how far it is."""
+def names_of(path: Path, more: str = "") -> tuple[Path, Path]:
+    """Return what a file in the making is called, and the note of how far it is."""
     real = Path(os.path.realpath(path))
-    return real.with_name(f".{real.name}.partial"), real.with_name(f".{real.name}.partial.json")
+    name = f".{real.name}.partial{more}"
+    return real.with_name(name), real.with_name(f"{name}.json")
+
+
+@contextmanager
+def partial_file(
+    path: Path, size: int, about: str, *, resume: bool, more: str = ""
+) -> Iterator[Partial]:
+    """Return a file of some size, which has zeros or what a stopped process has put there.
+
+    After an error nothing is left; after the end of the process it stays once a part of it is
+    noted as done, so that ``resume`` can go on with it. Else it is the caller who removes it.
+
+    Parameters
+    ----------
+    path : Path
+        What it is to become, or for which it is made.
+    about : str
+        What is made of what: another text begins anew.
+    more : str
+        What its name ends with, where several files are made for one.
+
+    Raises
+    ------
+    MeshError
+        It cannot be written, or another process is making it.
+    """
+    ours, note = names_of(path, more)
+    try:
+        mode = mode_of(Path(os.path.realpath(path)))
+        sums = _noted(note, about) if resume else []
+        with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
+            _lock(file, path)
+            with removed_at_stop(ours):
+                try:
+                    if sums and os.fstat(file.fileno()).st_size == size:
+                        keep(ours, _kept_words(ours))
+                    else:
+                        sums = []
+                        note.unlink(missing_ok=True)
+                        os.ftruncate(file.fileno(), 0)
+                        os.ftruncate(file.fileno(), size)
+                    yield Partial(file, ours, sums, mode, note, about)
+                except Exception:
+                    _removed(ours, note)
+                    raise
+    except OSError as problem:
+        if problem.filename is not None and Path(str(problem.filename)) not in (ours, note, path):
+            raise
+        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
 
 
 @contextmanager
@@ -89,13 +145,10 @@ def partial_copy(
 
     One process makes the copy beside its other work, ranks make it when it has to be ready.
 
-    After an error nothing is left; after the end of the process the copy and the note of what is
-    done stay, so that ``resume`` can go on with them.
-
     Parameters
     ----------
-    about : str
-        What is made of what: another text begins anew.
+    about, resume
+        As of `partial_file`.
     ranks : Alone or Ranks
         Those that copy.
 
@@ -105,42 +158,26 @@ def partial_copy(
         It cannot be written, or another process is making it.
     """
     require_no_input(path, MeshError, replaces)
-    ours, note = names_of(path)
-    try:
-        mode = mode_of(Path(os.path.realpath(path)))
-        sums = _noted(note, about) if resume else []
-        with open(os.open(ours, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:  # noqa: PTH123
-            _lock(file, path)
-            with removed_at_stop(ours):
-                try:
-                    size = source.stat().st_size
-                    if sums and os.fstat(file.fileno()).st_size == size:
-                        keep(ours, _kept_words(ours))
-                        tasks = []
-                    else:
-                        sums, tasks = [], _pieces(size)
-                        note.unlink(missing_ok=True)
-                        os.ftruncate(file.fileno(), 0)
-                        os.ftruncate(file.fileno(), size)
-                    with source.open("rb") as given:
-                        head = given.read(HEAD)
-                    copying = _beside if ranks.size == 1 else _together
-                    with copying(source, ours, tasks, ranks) as ready:
-                        yield Partial(file, ours, sums, ready, note, about)
-                    file.seek(0)
-                    file.write(head)
-                    file.flush()
-                    os.fsync(file.fileno())
-                except Exception:
-                    _removed(ours, note)
-                    raise
-                ours.chmod(0o644 & ~_umask() if mode is None else mode)
-                ours.replace(os.path.realpath(path))
-                note.unlink(missing_ok=True)
-    except OSError as problem:
-        if problem.filename is not None and Path(str(problem.filename)) not in (ours, note, path):
-            raise
-        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
+    size = source.stat().st_size
+    with partial_file(path, size, about, resume=resume) as partial:
+        with source.open("rb") as given:
+            head = given.read(HEAD)
+        copying = _beside if ranks.size == 1 else _together
+        tasks = [] if partial.done else _pieces(size)
+        with copying(source, partial.path, tasks, ranks) as partial.ready:
+            yield partial
+        finish_head(partial.file, head)
+        partial.path.chmod(0o644 & ~_umask() if partial.mode is None else partial.mode)
+        partial.path.replace(os.path.realpath(path))
+        _removed(partial._note)  # not its name, which may be another's by now
+
+
+def finish_head(file: BinaryIO, head: bytes) -> None:
+    """Write what a mesh begins with, when all else of it is there."""
+    file.seek(0)
+    file.write(head)
+    file.flush()
+    os.fsync(file.fileno())
 
 
 def _kept_words(ours: Path) -> str:

@@ -23,9 +23,9 @@ from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.io.su2b.read import BinaryForm
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
-_SORTED = (3, 5, 9, 10, 12, 13, 14)
+SORTED = (3, 5, 9, 10, 12, 13, 14)
 """SU2's order of the types of elements."""
-_LARGEST_4 = 2**32 - 1
+LARGEST_4 = 2**32 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +139,11 @@ def zone_blocks(zone: Zone, number: int, form: BinaryForm | None = None) -> Iter
         ends = start + np.cumsum(SIZES[zone.types(i, j)] + 2)
         yield np.concatenate([[start], ends[:-1]]).astype(conn).tobytes()
         start = int(ends[-1])
-    if width == 4 and max(start, zone.n_points) > _LARGEST_4:
+    if width == 4 and max(start, zone.n_points) > LARGEST_4:
         raise MeshError("the mesh has more cells than a file with counts of 4 bytes can hold")
     yield np.array([start], conn).tobytes()
     for i, j in _parts(zone.n_cells):
-        yield _rows(*zone.cells(i, j)).astype(conn, copy=False).tobytes()
+        yield rows_of(*zone.cells(i, j)).astype(conn, copy=False).tobytes()
     yield np.array([zone.n_points], conn).tobytes()
     kind = np.dtype([("x", f"{sign}f8", (zone.dim,)), ("i", conn)])
     for i, j in _parts(zone.n_points):
@@ -154,11 +154,18 @@ def zone_blocks(zone: Zone, number: int, form: BinaryForm | None = None) -> Iter
     raw = {} if form is None else {name.partition(b"\0")[0]: name for name in form.names}
     for marker in zone.markers:
         name = marker.name.encode()
-        yield raw.get(name, name.ljust(NAME_BYTES, b"\0"))
-        ends = np.cumsum(SIZES[marker.cells.types] + 1)
-        head = np.concatenate([[len(marker.cells), 0], ends])
-        rows = _rows(marker.cells.types, marker.cells.connectivity)
-        yield np.concatenate([head, rows]).astype(conn).tobytes()
+        yield raw.get(name, padded(name)) + marker_table(marker.cells, conn)
+
+
+def padded(name: bytes) -> bytes:
+    """Return the name of a marker as it stands in a file."""
+    return name.ljust(NAME_BYTES, b"\0")
+
+
+def marker_table(cells: Cells, conn: np.dtype) -> bytes:
+    """Return the elements of a marker as they stand in a file, after its name."""
+    head = np.concatenate([[len(cells), 0], np.cumsum(SIZES[cells.types] + 1)])
+    return np.concatenate([head, rows_of(cells.types, cells.connectivity)]).astype(conn).tobytes()
 
 
 def _parts(count: int) -> Iterator[tuple[int, int]]:
@@ -166,7 +173,7 @@ def _parts(count: int) -> Iterator[tuple[int, int]]:
         yield first, min(first + BLOCK, count)
 
 
-def _rows(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
+def rows_of(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None) -> IntArray:
     """Return elements as a list: type, nodes and, where there is one, index of each."""
     sizes = SIZES[types]
     more = 1 if ids is None else 2
@@ -192,7 +199,7 @@ def _rows(types: NDArray[np.uint8], nodes: IntArray, ids: IntArray | None = None
 def _by_type(cells: Cells) -> IntArray | None:
     """Return the cells in the order in which SU2 writes them, None where they are in it."""
     rank = np.zeros(256, np.int64)
-    rank[list(_SORTED)] = np.arange(len(_SORTED))
+    rank[list(SORTED)] = np.arange(len(SORTED))
     ranks = rank[cells.types]
     return None if (np.diff(ranks) >= 0).all() else np.argsort(ranks, kind="stable")
 

@@ -1,0 +1,223 @@
+"""The mesh that is streamed: an SU2 binary one as it is, a text one by a binary copy of it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.errors import MeshError
+from slideviz.mesh.io.binary_copy import Plan, fill, planned
+from slideviz.mesh.io.cleanup import draft
+from slideviz.mesh.io.files import format_of
+from slideviz.mesh.io.su2.lines import Piece
+from slideviz.mesh.io.su2.text import Text, find_text
+from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace
+from slideviz.mesh.io.su2b.partial import finish_head, partial_file
+from slideviz.mesh.model import Mesh
+from slideviz.mesh.ranks import ALONE, Alone
+from slideviz.mesh.skin import Tick, read_skin
+from slideviz.mesh.text_skin import skin_of_text, told_of
+from slideviz.terms import FileFormat
+
+SCANNED, COPIED = 0.15, 0.8
+"""Where, of the time for reading a text, its lines are found, and its binary is made."""
+RATED = 18
+"""Bytes of disk for each cell while a run lasts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A mesh that is streamed.
+
+    Attributes
+    ----------
+    path : Path
+        The binary file.
+    zone : int or None
+        The zone in it.
+    text : Text or None
+        What it is the binary form of.
+    """
+
+    path: Path
+    zone: int | None
+    text: Text | None = None
+
+    @property
+    def text_size(self) -> int:
+        """Return how many bytes the text has."""
+        assert self.text is not None
+        return self.text.lines.raw.size
+
+    def skin(self, tick: Tick, ranks: Alone = ALONE) -> Mesh:
+        """Return the boundary and the cells at it; the whole mesh is read and checked.
+
+        Raises
+        ------
+        MeshError
+            The file has a mistake.
+        """
+        if self.text is None:
+            return read_skin(self.path, self.zone, tick, ranks)
+        return skin_of_text(self.text, self.path, _from(tick, COPIED), ranks)
+
+
+def _from(tick: Tick, begin: float, end: float = 1.0) -> Tick:
+    return lambda done: tick(begin + (end - begin) * done)
+
+
+def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat:
+    """Return the format of a mesh that can be streamed.
+
+    Raises
+    ------
+    MeshError
+        It is of no such format.
+    """
+    kind = format_of(path, file_format)
+    if kind is None:
+        raise MeshError(
+            f"{path}: only SU2 meshes, text or binary, can be streamed; make one with `slideviz "
+            f"convert {path.name} {path.stem}.su2b`"
+        )
+    return kind
+
+
+@contextmanager
+def given_mesh(
+    path: Path,
+    zone: int | None,
+    tick: Tick,
+    folder: Path,
+    file_format: FileFormat | None = None,
+) -> Iterator[Given]:
+    """Return a mesh to look at; the binary copy of a text is in ``folder`` meanwhile.
+
+    Raises
+    ------
+    MeshError
+        It is of no format that can be streamed, or has a mistake.
+    """
+    if require_su2(path, file_format) == "su2b":
+        yield Given(path, zone)
+        return
+    plan = planned(find_text(path, zone, _from(tick, 0.0, SCANNED)), is_result=False)
+    with draft(folder) as ours:
+        ours.touch(mode=0o600)
+        require_room(ours, path, plan.size)
+        os.truncate(ours, plan.size)
+        head = fill(plan, ours, _from(tick, SCANNED, COPIED))
+        with ours.open("r+b") as file:
+            file.write(head)
+        with told_of(plan.text, ours):
+            yield Given(ours, None, plan.text)
+
+
+@contextmanager
+def given_for(
+    output: Path,
+    path: Path,
+    zone: int | None,
+    *,
+    file_format: FileFormat | None,
+    is_text: bool,
+    version: str,
+    resume: bool,
+    tick: Tick,
+    ranks: Alone,
+) -> Iterator[Given]:
+    """Return a mesh to be deformed; the binary copy of a text stands beside the output meanwhile.
+
+    Parameters
+    ----------
+    is_text : bool
+        Whether the output is a text.
+    version : str
+        Of the program: a copy that another one has left is made anew.
+    resume : bool
+        Whether to use the copy that a stopped run has left.
+
+    Raises
+    ------
+    MeshError
+        It is of no format that can be streamed, or has a mistake; the disk has no room.
+    """
+    if require_su2(path, file_format) == "su2b":
+        yield Given(path, zone)
+        return
+    text = find_text(path, zone, _from(tick, 0.0, SCANNED))
+    plan = planned(text, is_result=not is_text)
+    state = path.stat()
+    about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
+    with partial_file(output, plan.size, about, resume=resume, more=".binary") as copy:
+        if not copy.done:
+            require_room(output, output, plan.size + _later(plan, is_text))
+            head = fill(plan, copy.path, _from(tick, SCANNED, COPIED), ranks)
+            finish_head(copy.file, head)
+            copy.note([1])
+        with told_of(text, copy.path):
+            yield Given(copy.path, None, text)
+        copy.remove()
+
+
+def _later(plan: Plan, is_text: bool) -> int:
+    """Return how many bytes a run needs on the disk, beside the copy of a text."""
+    points = plan.markers - plan.points
+    result = points + plan.text.lines.raw.size if is_text else plan.size
+    return result + RATED * plan.text.n_cells
+
+
+def require_room(place: Path, path: Path, size: int) -> None:
+    """Raise where the disk has no room for so many bytes.
+
+    Raises
+    ------
+    MeshError
+        It has not; it is said of ``path``.
+    """
+    folder = Path(os.path.realpath(place)).parent
+    free = shutil.disk_usage(folder).free
+    if size > free:
+        raise MeshError(
+            f"{path}: {size / 1e9:.1f} GB of disk are needed in {folder} while this lasts, but "
+            f"{free / 1e9:.1f} GB are free; free some space or choose another disk"
+        )
+
+
+def text_blocks(
+    given: Given, source: Source, place: ZonePlace, after: Path, ffd: bytes | None
+) -> Iterator[bytes]:
+    """Yield a text with other coordinates: those that stand in ``after`` as in its binary copy.
+
+    Parameters
+    ----------
+    source, place
+        The binary copy.
+    ffd : bytes or None
+        The boxes for free-form deformation that stand in place of those it has.
+    """
+    text = given.text
+    assert text is not None
+    raw, kind = text.lines.raw, source.point(place.dim)
+    edits: Sequence[tuple[int, int, bytes]] = ()
+    if ffd is not None:
+        bounds = text.zone.bounds
+        edits = box_edits(raw, text.kept, text.lines.byte(bounds.end), ffd)
+    with given.path.open("rb") as old, after.open("rb") as new:
+
+        def rows(piece: Piece) -> bytes:
+            at, size = place.points + piece.row * kind.itemsize, piece.rows * kind.itemsize
+            before, now = (
+                np.frombuffer(os.pread(file.fileno(), size, at), kind)["x"].astype(np.float64)
+                for file in (old, new)
+            )
+            return moved_rows(raw, piece, before, now)
+
+        yield from patched_blocks(raw, text.zone.points, rows, edits)

@@ -1,0 +1,261 @@
+"""An SU2 text mesh as SU2's binary, made piece by piece: what reads parts of a mesh reads that.
+
+Where a number stands in a text is known only after all before it, in the binary at once. Nothing
+but the boundary is ever in memory, and every mistake of the text is found, as by its reader.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.check import LARGEST, too_large, within
+from slideviz.mesh.io.in_order import in_order
+from slideviz.mesh.io.su2.lines import Piece, number_of
+from slideviz.mesh.io.su2.numbers import (
+    fill_cells,
+    fill_points,
+    parse_cells,
+    require_all_coordinates,
+)
+from slideviz.mesh.io.su2.scan import Progress
+from slideviz.mesh.io.su2.text import Text
+from slideviz.mesh.io.su2b.elements import SIZES, taken
+from slideviz.mesh.io.su2b.layout import NAME_BYTES
+from slideviz.mesh.io.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
+from slideviz.mesh.model import Cells, IntArray
+from slideviz.mesh.ranks import ALONE, Alone
+
+PIECES = 16
+"""Pieces of a text, each about a megabyte, that are one part of the work."""
+_Task = tuple[str, int, int]
+"""``cells`` or ``points``, the first of their pieces, and the one after the last."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Where a text mesh stands in its binary form.
+
+    Attributes
+    ----------
+    text : Text
+    width : int
+        Bytes of a count or an index, 4 or 8.
+    named : bool
+        Whether the markers have their names, and not numbers, which always fit.
+    before : (p + 1, t) int64
+        How many elements of each type stand before each piece, and in all.
+    """
+
+    text: Text
+    width: int
+    named: bool
+    before: IntArray
+
+    @property
+    def conn(self) -> np.dtype:
+        """Return the type of counts and indices."""
+        return np.dtype(f"<u{self.width}")
+
+    @property
+    def point(self) -> np.dtype:
+        """Return the type of a point."""
+        return np.dtype([("x", "<f8", (self.text.zone.dim,)), ("i", self.conn)])
+
+    @property
+    def offsets(self) -> int:
+        """Return the first byte of the offsets of the elements."""
+        return 16 + self.width
+
+    @property
+    def entries(self) -> int:
+        """Return the first byte of the list of the elements."""
+        return self.offsets + self.width * (self.text.n_cells + 1)
+
+    @property
+    def length(self) -> int:
+        """Return the numbers in the list of the elements."""
+        return int(self.before[-1] @ _WIDTHS)
+
+    @property
+    def points(self) -> int:
+        """Return the first byte of the points."""
+        return self.entries + self.width * (self.length + 1)
+
+    @property
+    def markers(self) -> int:
+        """Return the first byte of the markers."""
+        return self.points + self.text.n_points * self.point.itemsize
+
+    @property
+    def size(self) -> int:
+        """Return the size of the file."""
+        sizes = (
+            NAME_BYTES + self.width * (2 + 2 * piece_rows + nodes)
+            for piece_rows, nodes in (
+                (number_of(m.rows), sum(piece.nodes for piece in m.rows))
+                for m in self.text.zone.markers
+            )
+        )
+        return self.markers + 4 + sum(sizes)
+
+    def names(self) -> list[bytes]:
+        """Return the names of the markers as they stand in the file."""
+        markers = self.text.zone.markers
+        return [padded((m.name if self.named else str(k)).encode()) for k, m in enumerate(markers)]
+
+
+_WIDTHS = SIZES[list(SORTED)] + 2
+"""Numbers of an element in the list, by type in SU2's order."""
+
+
+def planned(text: Text, *, is_result: bool) -> Plan:
+    """Return where a text mesh stands in its binary form.
+
+    Parameters
+    ----------
+    is_result : bool
+        Whether the binary is to be a mesh of its own, as `slideviz.convert` makes it; if not, it
+        is as short as can be.
+    """
+    pieces = text.zone.elements
+    before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
+    np.cumsum(_counted(text), axis=0, out=before[1:])
+    length = int(before[-1] @ _WIDTHS)
+    short = not is_result and max(length, text.n_points) <= LARGEST_4
+    return Plan(text, 4 if short else 8, is_result, before)
+
+
+def _counted(text: Text) -> IntArray:
+    """Return the number of elements of each type in each piece, (p, t)."""
+    from slideviz.mesh.io.su2.loops import count_types
+
+    pieces, rows = text.zone.elements, text.n_cells
+    out = np.zeros((len(pieces), len(SORTED)), np.int64)
+    # The smallest and the largest element of a dimension: if all are that, nothing need be read.
+    for vtk in (5, 9) if text.zone.dim == 2 else (10, 12):
+        if sum(piece.nodes for piece in pieces) == rows * SIZES[vtk]:
+            out[:, SORTED.index(vtk)] = [piece.rows for piece in pieces]
+            return out
+
+    def count(piece: Piece) -> IntArray:
+        counts = np.zeros(257, np.int64)
+        count_types(np.frombuffer(text.lines.text(piece), np.uint8), counts)
+        return counts[list(SORTED)]
+
+    out[:] = list(in_order(count, pieces))
+    return out
+
+
+def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> bytes:
+    """Write the binary form of a text into a file of its size; return its head, which is left out.
+
+    Raises
+    ------
+    MeshError
+        The text has a mistake; the message has its line.
+    """
+    text, conn = plan.text, plan.conn
+    zone, lines = text.zone, text.lines
+    tasks: list[_Task] = [
+        (kind, first, min(first + PIECES, len(pieces)))
+        for kind, pieces in (("cells", zone.elements), ("points", zone.points))
+        for first in range(0, len(pieces), PIECES)
+    ]
+    found: list[IntArray] = []
+    with ranks.sharing(_filling, plan, path, ranks.size > 1) as do:
+        for k, (task, lost) in enumerate(zip(tasks, do(tasks), strict=True)):
+            if task[0] == "points":
+                found.append(lost)
+            progress((k + 1) / len(tasks))
+    require_all_coordinates(lines, zone.points, zone.dim, np.concatenate(found))
+    markers = [
+        name + marker_table(parse_cells(lines, m.rows, zone.dim - 1, text.n_points, _silent), conn)
+        for name, m in zip(plan.names(), zone.markers, strict=True)
+    ]
+    lines.raw.require_same()
+    with path.open("r+b") as file:
+        for at, content in (
+            (8, np.array([1, zone.dim], "<i4").tobytes() + np.array(text.n_cells, conn).tobytes()),
+            (plan.entries - plan.width, np.array(plan.length, conn).tobytes()),
+            (plan.points - plan.width, np.array(text.n_points, conn).tobytes()),
+            (plan.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),
+        ):
+            file.seek(at)
+            file.write(content)
+    return np.array([plan.width, 1], "<i4").tobytes()
+
+
+def _silent(_: float) -> None:
+    pass
+
+
+@contextmanager
+def _filling(plan: Plan, path: Path, synced: bool) -> Iterator[Callable[[_Task], IntArray]]:
+    """Return what writes the pieces of a task."""
+    out = os.open(path, os.O_WRONLY)
+
+    def work(task: _Task) -> IntArray:
+        kind, first, end = task
+        put = _put_cells if kind == "cells" else _put_points
+        found = list(in_order(partial(put, plan, out), range(first, end)))
+        if synced:
+            os.fsync(out)
+        return np.array(found)
+
+    try:
+        yield work
+    finally:
+        os.close(out)
+
+
+def _put_cells(plan: Plan, out: int, k: int) -> int:
+    """Write the elements of a piece, those of each type to their like."""
+    text = plan.text
+    piece = text.zone.elements[k]
+    types, nodes = np.empty(piece.rows, np.uint8), np.empty(piece.nodes, np.int64)
+    fill_cells(text.lines, piece, types, nodes, dim=text.zone.dim, n_points=text.n_points)
+    cells = Cells.from_types(types, nodes)
+    totals = plan.before[-1]
+    for column, (vtk, width) in enumerate(zip(SORTED, _WIDTHS.tolist(), strict=True)):
+        mine = np.flatnonzero(types == vtk)
+        if not len(mine):
+            continue
+        before = int(plan.before[k, column])
+        row = int(totals[:column].sum()) + before
+        start = int(totals[:column] @ _WIDTHS[:column]) + before * width
+        some = cells if len(mine) == len(types) else taken(cells, mine)
+        table = rows_of(some.types, some.connectivity, piece.row + mine)
+        offsets = start + width * np.arange(len(mine))
+        _put(out, plan.offsets + row * plan.width, offsets.astype(plan.conn))
+        _put(out, plan.entries + start * plan.width, table.astype(plan.conn))
+    return 0
+
+
+def _put_points(plan: Plan, out: int, k: int) -> IntArray:
+    """Write the points of a piece; return what `fill_points` does."""
+    text = plan.text
+    piece = text.zone.points[k]
+    points = np.empty((piece.rows, text.zone.dim))
+    found = fill_points(text.lines, piece, points)
+    if not within(points, LARGEST):
+        at = int(np.argmax((np.abs(points) > LARGEST).any(axis=1)))
+        raise too_large(text.lines.name, piece.row + at, points[at])
+    block = np.empty(piece.rows, plan.point)
+    block["x"], block["i"] = points, np.arange(piece.row, piece.row + piece.rows)
+    _put(out, plan.points + piece.row * plan.point.itemsize, block)
+    return found
+
+
+def _put(out: int, at: int, content: NDArray) -> None:
+    left = content.view(np.uint8).data
+    while left:
+        written = os.pwrite(out, left, at)
+        at, left = at + written, left[written:]

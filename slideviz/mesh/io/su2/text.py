@@ -1,0 +1,65 @@
+"""A zone of an SU2 text file whose parts are found, and not read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from slideviz.mesh.io.source import open_source
+from slideviz.mesh.io.su2.lines import Lines, number_of
+from slideviz.mesh.io.su2.scan import Progress, scan
+from slideviz.mesh.io.su2.sections import find_bounds, find_sections, is_ffd
+from slideviz.mesh.io.su2.zone import Zone, find_zone
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """One zone of an SU2 text file: its lines, and where its parts are."""
+
+    lines: Lines
+    zone: Zone
+
+    @property
+    def path(self) -> Path:
+        """Return the file."""
+        return self.lines.raw.path
+
+    @property
+    def n_cells(self) -> int:
+        """Return the number of cells."""
+        return number_of(self.zone.elements)
+
+    @property
+    def n_points(self) -> int:
+        """Return the number of points."""
+        return number_of(self.zone.points)
+
+    @property
+    def kept(self) -> tuple[tuple[int, int], ...]:
+        """Return first byte and end of each section that is kept as it is."""
+        return self.lines.bytes_of(*((part.line, part.stop) for part in self.zone.kept))
+
+    def boxes(self) -> bytes | None:
+        """Return the sections of the boxes for free-form deformation, where there are some."""
+        parts = (self.lines.raw[a:b] for a, b in self.kept)
+        return b"".join(part for part in parts if is_ffd(part)) or None
+
+
+def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None) -> Text:
+    """Return a zone of an SU2 text file, of which nothing but the lines is looked at.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake, or the zone a halo, whose copies are no boundary.
+    """
+    lines = scan(open_source(path), progress)
+    sections = find_sections(lines)
+    found = find_zone(lines, sections, find_bounds(lines, sections, zone))
+    if found.sends:
+        raise lines.error(
+            found.sends[0].begin,
+            "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
+            "halo, or run it without --stream",
+        )
+    return Text(lines, found)

@@ -1,0 +1,46 @@
+"""The skin of an SU2 text mesh, read from its binary form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from slideviz.errors import MeshError
+from slideviz.mesh.check import printable
+from slideviz.mesh.io.su2.text import Text
+from slideviz.mesh.model import Mesh, Origin
+from slideviz.mesh.ranks import ALONE, Alone
+from slideviz.mesh.skin import Tick, read_skin
+
+
+def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Mesh:
+    """Return the skin of a text mesh, whose binary form is at ``path``."""
+    zone = text.zone
+    with told_of(text, path):
+        skin = read_skin(path, None, tick, ranks)
+    return replace(
+        skin,
+        markers=tuple(
+            replace(marker, name=given.name)
+            for marker, given in zip(skin.markers, zone.markers, strict=True)
+        ),
+        name=printable(text.path.name),
+        zone=zone.bounds.number,
+        zones=zone.bounds.zones,
+        source=text.path.resolve(),
+        origin=Origin(ffd=text.boxes()),
+    )
+
+
+@contextmanager
+def told_of(text: Text, path: Path) -> Iterator[None]:
+    """Return a context whose errors name a text, and not its binary form at ``path``."""
+    try:
+        yield
+    except MeshError as problem:
+        said = str(problem).replace(printable(path), text.lines.name)
+        if said == str(problem):
+            raise
+        raise MeshError(said) from problem
