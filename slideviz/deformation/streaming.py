@@ -37,8 +37,8 @@ from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
 from slideviz.terms import FileFormat
 
-NEEDED: dict[FileFormat, float] = {"su2b": 5.0, "su2": 5.0}
-"""Memory of a run that is not streamed over the size of its file: 4.2 on hexahedra."""
+NEEDED: dict[FileFormat, float] = {"su2b": 5.0, "su2": 4.0}
+"""Memory of a run that is not streamed over the size of its file: 4.2 and 3.1 on hexahedra."""
 Tell = Callable[[Progress], None]
 
 
