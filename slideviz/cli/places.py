@@ -173,14 +173,12 @@ def tell_lost(output: Path, mesh: Mesh, file_format: FileFormat | None = None) -
             remedy = f"write a {ending} file to keep them"
             print(f"slideviz: warning: {words}; {remedy}", file=sys.stderr, flush=True)
         return
-    from slideviz.mesh.io.su2b.write import lost_in_binary, require_binary
+    from slideviz.mesh.io.su2b.write import lost_in_binary, require_binary, sentence_of_lost
 
     require_binary(mesh)
-    lost = lost_in_binary(mesh)
-    if lost:
-        words = f"{output} is an SU2 binary mesh and will not have {' and '.join(lost)}"
-        remedy = f"of {mesh.name}; write a .su2 file to keep them"
-        print(f"slideviz: warning: {words} {remedy}", file=sys.stderr, flush=True)
+    words = sentence_of_lost(output, mesh.name, lost_in_binary(mesh))
+    if words:
+        print(f"slideviz: warning: {words}", file=sys.stderr, flush=True)
 
 
 def make_folder(folder: Path) -> None:

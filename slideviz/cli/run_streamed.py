@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,7 +57,7 @@ def is_to_be_streamed(
     able = _is_su2(output, kind) and not _needing_memory(arguments)
     missing = missing_memory(case, is_text=_is_text(output, kind)) if able else ""
     if missing and not arguments.quiet:
-        print(f"slideviz: note: {missing}; it is streamed", file=sys.stderr, flush=True)
+        _say("note", f"{missing}; it is streamed")
     return bool(missing)
 
 
@@ -70,6 +71,11 @@ def _is_su2(output: Path, kind: FileFormat | None) -> bool:
 
 def _is_text(output: Path, kind: FileFormat | None) -> bool:
     return (kind or output.suffix.lower().removeprefix(".")) == "su2"
+
+
+def _say(what: str, text: str) -> None:
+    if text:
+        print(f"slideviz: {what}: {text}", file=sys.stderr, flush=True)
 
 
 def run_streamed(
@@ -92,7 +98,8 @@ def run_streamed(
             output,
             file_format=kind,
             tell=bar.phase,
-            note=lambda text: print(f"slideviz: note: {text}", file=sys.stderr, flush=True),
+            note=partial(_say, "note"),
+            warn=partial(_say, "warning"),
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from slideviz.errors import MeshError
+from slideviz.mesh.check import printable
 from slideviz.mesh.io.binary_copy import Plan, fill, planned
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.files import format_of
@@ -20,6 +21,7 @@ from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace
 from slideviz.mesh.io.su2b.partial import finish_head, partial_file
+from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.ranks import ALONE, Alone
 from slideviz.mesh.skin import Tick, read_skin
@@ -130,6 +132,7 @@ def given_for(
     is_text: bool,
     version: str,
     resume: bool,
+    warn: Callable[[str], object],
     tick: Tick,
     ranks: Alone,
 ) -> Iterator[Given]:
@@ -143,6 +146,8 @@ def given_for(
         Of the program: a copy that another one has left is made anew.
     resume : bool
         Whether to use the copy that a stopped run has left.
+    warn : callable
+        Called with a sentence on what the output will not have of the file; "" for nothing.
 
     Raises
     ------
@@ -153,6 +158,10 @@ def given_for(
         yield Given(path, zone)
         return
     text = find_text(path, zone, _from(tick, 0.0, SCANNED))
+    if not is_text:
+        require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
+        lost = lost_of_text((part.key for part in text.zone.kept), text.zone.bounds.zones)
+        warn(sentence_of_lost(output, printable(path.name), lost))
     plan = planned(text, is_result=not is_text)
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"

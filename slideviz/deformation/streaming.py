@@ -75,6 +75,7 @@ def stream(
     file_format: FileFormat | None = None,
     tell: Tell = lambda _: None,
     note: Callable[[str], object] = lambda _: None,
+    warn: Callable[[str], object] = lambda _: None,
     resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
@@ -92,6 +93,8 @@ def stream(
         Called often with a ``Progress``; an exception it raises ends the run at once.
     note : callable
         Called with a sentence on what ``resume`` found.
+    warn : callable
+        Called with a sentence on what a binary output will not have of a text; "" for nothing.
     resume : bool
         Whether to go on where a run that was ended did.
     replaces : Path, optional
@@ -126,6 +129,7 @@ def stream(
                     is_text=is_text,
                     version=__version__,
                     resume=resume,
+                    warn=warn,
                     tick=tick,
                     ranks=ranks,
                 )

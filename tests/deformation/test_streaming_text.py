@@ -144,6 +144,24 @@ def test_all_else_of_the_file_stays(tmp_path, small, kind, zones):
         assert (tmp_path / "out.su2b").read_bytes() == in_memory(case, tmp_path / "memory.su2b")
 
 
+def test_what_a_binary_mesh_has_no_place_for_is_told(tmp_path, capsys):
+    case = odd_mesh(tmp_path / "mesh.su2", "prism", zones=2)
+    case.write(tmp_path / "case.cfg")
+    call = ["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / "out.su2b")]
+    told = []
+    for more in ([], ["--stream"]):
+        assert run([*call, *more]) in (0, 3)
+        told.append([one for one in capsys.readouterr().err.splitlines() if "warning" in one])
+    assert told[0] == told[1]
+    assert "will not have its other sections (FFD_NBOX, " in told[0][0]
+    text = (tmp_path / "mesh.su2").read_text().replace("x_m", "x" * 33)
+    (tmp_path / "mesh.su2").write_text(text)
+    for more in ([], ["--stream"]):
+        assert run([*call, *more]) == 1
+        assert "x' cannot stand in an SU2 binary file" in capsys.readouterr().err
+        assert run([*call[:2], "-q", "-o", str(tmp_path / "out.su2"), *more]) == 0
+
+
 @pytest.mark.parametrize("others", [False, True])
 def test_boxes_move_as_in_memory(tmp_path, small, others):
     case = odd_mesh(tmp_path / "mesh.su2", "mixed")

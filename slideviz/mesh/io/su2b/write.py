@@ -8,9 +8,10 @@ is read back with its cells in the order that it had.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,11 +98,22 @@ def require_binary(mesh: Mesh) -> None:
             f"{mesh.name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot "
             "hold; write a .su2 file, or make the mesh without its halo"
         )
-    for name in mesh.marker_names:
+    require_binary_names(mesh.name, mesh.marker_names)
+
+
+def require_binary_names(mesh: str, names: Iterable[str]) -> None:
+    """Raise where a boundary of a mesh has a name that cannot stand in an SU2 binary file.
+
+    Raises
+    ------
+    MeshError
+        One has.
+    """
+    for name in names:
         size = len(name.encode("utf-8", "replace"))
         if not name or not name.isprintable() or size >= NAME_BYTES or name.upper() == SEND_RECEIVE:
             raise MeshError(
-                f"{mesh.name}: the marker name {name!r} cannot stand in an SU2 binary file, which "
+                f"{mesh}: the marker name {name!r} cannot stand in an SU2 binary file, which "
                 f"has room for {NAME_BYTES - 1} bytes ({size} given) and has no {SEND_RECEIVE}; "
                 "rename the marker"
             )
@@ -114,9 +126,24 @@ def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
     if not isinstance(document, Document):
         return boxes
     keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
+    return lost_of_text(keys, mesh.zones) if keys else (*boxes, *lost_of_text((), mesh.zones))
+
+
+def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
+    """Return what is lost of a text of so many zones, with unknown sections of these keys."""
     named = ", ".join(dict.fromkeys(key.upper() for key in keys))
-    lost = [f"its other sections ({named})"] if keys else [*boxes]
-    return (*lost, "its other zones") if mesh.zones > 1 else tuple(lost)
+    lost = (f"its other sections ({named})",) if named else ()
+    return (*lost, "its other zones") if zones > 1 else lost
+
+
+def sentence_of_lost(output: Path, name: str, lost: Sequence[str]) -> str:
+    """Return in words what a binary file will not have of a mesh; nothing where it has all."""
+    if not lost:
+        return ""
+    return (
+        f"{output} is an SU2 binary mesh and will not have {' and '.join(lost)} of {name}; write a "
+        ".su2 file to keep them"
+    )
 
 
 def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
