@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
-from slideviz.mesh.periodic import axis_basis
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf import evaluate as sums
 from tests import builders
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from slideviz.baselines.shapes import Block
 from slideviz.baselines.stiffness import Conditions
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.periodic import axis_basis
 from slideviz.rbf.classify import RANK_TOLERANCE
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.frames import Frame

@@ -36,9 +36,9 @@ from slideviz.case.model import (
     moves,
 )
 from slideviz.errors import CaseError
+from slideviz.mesh.axis_frame import ordered_sum
 from slideviz.mesh.check import LARGEST, within
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
-from slideviz.mesh.periodic import ordered_sum
 
 __all__ = [
     "Displacements",

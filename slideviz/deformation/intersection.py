@@ -8,12 +8,13 @@ from math import ceil, floor, pi
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.caching import njit
 from slideviz.mesh.crossing import Crossing, first_crossing, swept_crossing
 from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
-from slideviz.mesh.periodic import axis_basis, in_axis_frame, pair_up
+from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.threads import PART, in_parts
 from slideviz.mesh.topology import components, facet_vectors, unit
 

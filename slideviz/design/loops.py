@@ -9,9 +9,9 @@ import numpy as np
 from numba import prange
 from scipy.sparse import csr_array
 
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.periodic import axis_basis
 from slideviz.rbf.compiled import one_at_a_time
 from slideviz.rbf.frames import Frame
 

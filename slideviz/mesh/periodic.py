@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import combinations
+from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from slideviz.errors import MeshError
+from slideviz.mesh.axis_frame import Z_AXIS, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
 from slideviz.terms import PeriodicKind, PeriodicType
@@ -22,9 +22,11 @@ from slideviz.terms import PeriodicKind, PeriodicType
 TOLERANCE = 1e-5
 """Largest mismatch of a node and its image, as a fraction of the mesh's largest extent."""
 
-Vector = Sequence[float] | FloatArray
-
-_Z = (0.0, 0.0, 1.0)
+_KINDS: dict[PeriodicType, tuple[PeriodicKind, ...]] = {
+    "auto": ("translational", "rotational"),
+    "translational": ("translational",),
+    "rotational": ("rotational",),
+}
 _AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
@@ -68,65 +70,9 @@ class Pair:
     def describe(self) -> str:
         """Return the transformation in words, for people."""
         if self.kind == "rotational":
-            return f"{np.degrees(abs(self.angle)):.6g}° about {_axis_word(self.axis)}"
+            return f"{np.degrees(abs(self.angle)):.6g}° about {axis_text(self.axis)}"
         exact = np.where(np.abs(self.vector) > 1e-9 * self.period, self.vector, 0.0)
         return f"{self.period:.6g} along ({', '.join(f'{v:.4g}' for v in exact)})"
-
-
-def _axis_word(axis: Vector) -> str:
-    for word, unit in zip("xyz", np.eye(3), strict=True):
-        if np.allclose(axis, unit):
-            return word
-    return f"({', '.join(f'{v:.4g}' for v in axis)})"
-
-
-def axis_basis(axis: Vector) -> FloatArray:
-    """Return rows e1, e2, e3 (3, 3), right-handed, with e3 along ``axis``.
-
-    Raises
-    ------
-    MeshError
-        The axis has length zero.
-    """
-    return _basis_of(*map(float, axis)).copy()
-
-
-@lru_cache(16)
-def _basis_of(*axis: float) -> FloatArray:
-    direction = np.array(axis)
-    length = np.linalg.norm(direction)
-    if not length > 0:
-        raise MeshError("the axis of rotation has length zero; give a direction such as 0, 0, 1")
-    e3 = direction / length
-    # The cyclic next axis after the largest component: for z this gives e1 = x, e2 = y exactly.
-    start = np.eye(3)[(int(np.argmax(np.abs(e3))) + 1) % 3]
-    e1 = start - (start @ e3) * e3
-    e1 /= np.linalg.norm(e1)
-    return np.stack([e1, np.cross(e3, e1), e3])
-
-
-def ordered_sum(values: NDArray) -> NDArray:
-    """Return the sum (d,) of rows (n, d), the same bits in whatever order they are given."""
-    return np.asarray(np.sort(values, axis=0).sum(axis=0))
-
-
-def along(rows: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the components (n, k) of points (n, d) along rows (k, d).
-
-    Added up one by one: a matrix product rounds a point by its place among the others, so that
-    renumbered nodes would have other bits.
-    """
-    parts = [sum(x * value for x, value in zip(points.T, row, strict=True)) for row in rows]
-    return np.stack(parts, axis=1)
-
-
-def in_axis_frame(
-    points: FloatArray, axis: Vector = _Z, origin: Vector = (0.0, 0.0, 0.0)
-) -> FloatArray:
-    """Return points (n, d) as coordinates (n, 3) along e1, e2, e3 of the axis from the origin."""
-    padded = np.zeros((len(points), 3))
-    padded[:, : points.shape[1]] = points
-    return along(axis_basis(axis), padded - np.asarray(origin, float))
 
 
 def match(
@@ -134,7 +80,7 @@ def match(
     first: str,
     second: str,
     kind: PeriodicType = "auto",
-    axis: Sequence[float] = _Z,
+    axis: Sequence[float] = Z_AXIS,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Pair:
     """Return how marker ``second`` is the image of ``first``.
@@ -154,21 +100,19 @@ def match(
             f"{where}: {len(a)} and {len(b)} nodes; periodic boundaries need the same nodes, so "
             "choose other markers or remesh one of them"
         )
-    kinds = ("translational", "rotational") if kind == "auto" else (kind,)
     allowed = TOLERANCE * mesh.extent
-    best: tuple[float, Pair] | None = None
-    for one in kinds:
+    tried = []
+    for one in _KINDS[kind]:
         pair, worst = _match_kind(mesh, first, second, one, axis=axis, origin=origin)
         assert pair is not None
         if worst <= allowed:
             return pair
-        if best is None or worst < best[0]:
-            best = worst, pair
-    assert best is not None
+        tried.append((worst, pair))
+    worst, best = min(tried, key=itemgetter(0))
     raise MeshError(
-        f"{where}: with the best {best[1].kind} transformation ({best[1].describe()}) a node is "
-        f"{best[0]:.3g} from its image, allowed is {allowed:.3g}; check the "
-        "markers, PERIODIC_TYPE, PERIODIC_AXIS and PERIODIC_ORIGIN"
+        f"{where}: with the best {best.kind} transformation ({best.describe()}) a node is "
+        f"{worst:.3g} from its image, allowed is {allowed:.3g}; check the markers, PERIODIC_TYPE, "
+        "PERIODIC_AXIS and PERIODIC_ORIGIN"
     )
 
 
@@ -176,7 +120,7 @@ def _match_kind(
     mesh: Mesh,
     first: str,
     second: str,
-    kind: str,
+    kind: PeriodicKind,
     *,
     axis: Sequence[float],
     origin: Sequence[float],
@@ -189,7 +133,7 @@ def _match_kind(
     """
     a, b = (mesh.marker(name).nodes for name in (first, second))
     xa, xb = mesh.points[a], mesh.points[b]
-    axis = _Z if mesh.dim == 2 else axis
+    axis = Z_AXIS if mesh.dim == 2 else axis
     vector, angle = np.zeros(mesh.dim), 0.0
     if kind == "translational":
         vector = ordered_sum(xb) / len(b) - ordered_sum(xa) / len(a)
@@ -213,7 +157,7 @@ def _match_kind(
     pair = Pair(
         first=first,
         second=second,
-        kind="translational" if kind == "translational" else "rotational",
+        kind=kind,
         vector=frozen_array(vector, np.float64),
         angle=angle,
         axis=tuple(float(v) for v in axis),  # type: ignore[arg-type]
@@ -228,7 +172,7 @@ def pair_up(
     mesh: Mesh,
     names: Sequence[str],
     kind: PeriodicType = "auto",
-    axis: Sequence[float] = _Z,
+    axis: Sequence[float] = Z_AXIS,
     origin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> tuple[Pair, ...]:
     """Return the pairs that the named markers form, whatever their order.
@@ -286,10 +230,9 @@ def _left_over(
 
     Without any pair, the error is ``first``.
     """
-    kinds: tuple[PeriodicType, ...] = ("translational", "rotational") if kind == "auto" else (kind,)
     good: list[Pair] = []
     alone, why = list(names), "they are no images of each other; choose other markers"
-    for each in kinds:
+    for each in _KINDS[kind]:
         for one, other in combinations(names, 2):
             if one in alone and other in alone:
                 try:
@@ -328,11 +271,7 @@ def _differ(mesh: Mesh, one: Pair, other: Pair) -> MeshError:
     )
 
 
-def find_pairs(
-    mesh: Mesh,
-    names: Sequence[str] | None = None,
-    going_on: Callable[[], object] = lambda: None,
-) -> tuple[Pair, ...]:
+def find_pairs(mesh: Mesh, going_on: Callable[[], object] = lambda: None) -> tuple[Pair, ...]:
     """Return pairs of markers that match, each marker in one pair at most.
 
     Translations are tried first, then rotations about z, x and y through 0. A guess, to be
@@ -345,15 +284,13 @@ def find_pairs(
         Coordinates are too large to be computed with.
     """
     check_size(mesh)
-    chosen = list(names or mesh.marker_names)
-    count = {name: len(mesh.marker(name).nodes) for name in chosen}
-    axes = _AXES[:1] if mesh.dim == 2 else _AXES
-    tries: list[tuple[PeriodicType, tuple[float, float, float]]] = [("translational", _Z)]
-    tries += [("rotational", axis) for axis in axes]
+    count = {name: len(mesh.marker(name).nodes) for name in mesh.marker_names}
+    tries: list[tuple[PeriodicKind, tuple[float, float, float]]] = [("translational", Z_AXIS)]
+    tries += [("rotational", axis) for axis in (_AXES[:1] if mesh.dim == 2 else _AXES)]
     found: list[Pair] = []
     allowed = TOLERANCE * mesh.extent
     for kind, axis in tries:
-        for first, second in combinations(chosen, 2):
+        for first, second in combinations(mesh.marker_names, 2):
             taken = {name for pair in found for name in (pair.first, pair.second)}
             if count[first] != count[second] or taken & {first, second}:
                 continue

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from slideviz.errors import SlidevizError
+from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.mesh.periodic import in_axis_frame
 from slideviz.plots.style import PRINT, Style, add_legend, dress, place
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
-from slideviz.mesh.periodic import axis_basis, in_axis_frame
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.axis import ON_AXIS
 from slideviz.rbf.frames import Frame, _across

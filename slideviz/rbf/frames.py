@@ -20,8 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
-from slideviz.mesh.periodic import Pair, along, axis_basis, in_axis_frame
+from slideviz.mesh.periodic import Pair
 from slideviz.mesh.threads import in_parts
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from slideviz.errors import CaseError
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
-from slideviz.mesh.periodic import axis_basis
 from slideviz.mesh.surfaces import padded
 from slideviz.mesh.threads import in_parts
 from slideviz.sections.cone import Cone

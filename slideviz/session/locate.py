@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slideviz.mesh.axis_frame import in_axis_frame
 from slideviz.mesh.model import FloatArray, Marker, Mesh
-from slideviz.mesh.periodic import in_axis_frame
 from slideviz.session.state import Session
 
 NEAR = 4

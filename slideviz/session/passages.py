@@ -10,8 +10,9 @@ import numpy as np
 
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.periodic import Pair, axis_basis, find_pairs, pair_up
+from slideviz.mesh.periodic import Pair, find_pairs, pair_up
 from slideviz.mesh.surfaces import padded
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section

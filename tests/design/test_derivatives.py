@@ -11,7 +11,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.mesh.periodic import axis_basis
+from slideviz.mesh.axis_frame import axis_basis
 from tests import builders
 from tests.test_halo import MESHES, both, case_of
 from tests.test_laws import METHODS, box, box_case, sector, sector_case

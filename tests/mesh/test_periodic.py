@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.errors import MeshError
+from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.periodic import axis_basis, find_pairs, in_axis_frame, match, pair_up
+from slideviz.mesh.periodic import find_pairs, match, pair_up
 from tests import builders
 
 

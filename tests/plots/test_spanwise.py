@@ -50,7 +50,7 @@ def test_any_direction_of_any_length():
 
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (3.0, 0.0, 0.0), (1.0, 1.0, 0.0)])
 def test_radius_is_counted_about_any_axis(axis):
-    from slideviz.mesh.periodic import axis_basis
+    from slideviz.mesh.axis_frame import axis_basis
 
     # Three cubes on top of each other, 2, 4 and 6 away from the axis, along e1.
     e1, e2, e3 = axis_basis(axis)

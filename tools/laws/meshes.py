@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.mesh.periodic import axis_basis
 from tests import builders
 from tools.laws import shapes
 from tools.laws.draw import Rng

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from slideviz.case.model import Case, FromFile, Motion, Radial, Rotate, Scale
+from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray, Marker, Mesh
-from slideviz.mesh.periodic import axis_basis
 from tools.laws.made import Period
 
 
