@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,6 +16,7 @@ from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
 from slideviz.deformation.prescribed import alikeness, displaced, prescribed
+from slideviz.deformation.reduction import find_reduction, loose_warnings
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
@@ -35,15 +36,6 @@ from slideviz.rbf.projection import Tracks, find_tracks
 
 if TYPE_CHECKING:
     from slideviz.baselines.idw import Weights
-
-EXACT_NODES = 2000
-"""Control candidates up to which DATA_REDUCTION= AUTO takes them all."""
-
-AUTO_TOLERANCE = 1e-3
-"""The tolerance of DATA_REDUCTION= AUTO, as a part of the largest displacement."""
-
-LOOSE = 0.1
-"""A tolerance above this part of the largest displacement leaves much to the correction."""
 
 REACH = 1.5
 """How far surfaces are continued at moving boundaries, in largest displacements."""
@@ -190,8 +182,8 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     candidates = _candidates(classes, known)
-    reduction = _reduction(case, mesh.extent, largest, candidates)
-    loose = _loose(case, reduction, largest, mesh.extent)
+    reduction = find_reduction(case, mesh.extent, largest, candidates)
+    loose = loose_warnings(case, reduction, largest, mesh.extent)
     tracks = find_tracks(
         boundary,
         fans,
@@ -287,54 +279,3 @@ def _candidates(classes: Classes, known: IntArray) -> int:
     """Return how many nodes could be control nodes."""
     nodes = np.concatenate([known, classes.edge, classes.surface])
     return int((classes.stands[nodes] == nodes).sum())
-
-
-def _reduction(case: Case, extent: float, largest: float, candidates: int) -> Reduction | None:
-    """Return the settings of the selection in the solver's terms; None for the exact method.
-
-    Parameters
-    ----------
-    extent, largest : float
-        Of the mesh, and the largest displacement.
-    candidates : int
-        Nodes that could be control nodes.
-    """
-    given = case.reduction
-    if given is None or case.method != "rbf":
-        return None
-    if given.auto:
-        if candidates <= EXACT_NODES or not largest > 0.0:
-            return None
-        given = replace(given, tolerance=AUTO_TOLERANCE * largest, relative=None)
-    level: Literal["none", "size", "ratio"] = "none"
-    if given.multilevel:
-        level = "size" if given.criterion == "size" else "ratio"
-    return Reduction(
-        tolerance=given.relative * extent if given.relative else given.tolerance,
-        pick=given.selection,
-        level=level,
-        level_size=given.level_size,
-        level_ratio=given.level_tolerance,
-        max_nodes=given.max_nodes,
-        gamma=given.gamma,
-    )
-
-
-def _loose(case: Case, reduction: Reduction | None, largest: float, extent: float) -> list[str]:
-    """Return a warning about a tolerance that is not far below the largest displacement."""
-    if reduction is None or not largest > 0.0 or reduction.tolerance <= LOOSE * largest:
-        return []
-    assert case.reduction is not None
-    whole, part = f"{largest / 100:.2g}", f"{largest / extent / 100:.2g}"
-    remedy = f"use DATA_RED_RELATIVE= {part} or less"
-    if not case.reduction.relative:
-        remedy = f"use DATA_RED_TOLERANCE= {whole} or less (or DATA_RED_RELATIVE= {part})"
-    is_, so = "not below", "no control node is needed to meet it, and only the cells"
-    if reduction.tolerance < largest:
-        is_, so = "more than a tenth of", "control nodes follow the motion roughly, and the cells"
-    sentence = (
-        f"the tolerance of the data reduction is {reduction.tolerance:.3g}, {is_} the largest "
-        f"displacement, {largest:.3g}: {so} near the boundary take up what is left, which may "
-        f"invert them; {remedy}, a hundredth of the displacement"
-    )
-    return [sentence]

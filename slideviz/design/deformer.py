@@ -13,7 +13,8 @@ from slideviz.case.model import Case, Translate
 from slideviz.case.motion import ROUNDING, displacements
 from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
 from slideviz.deformation.prescribed import displaced
-from slideviz.deformation.setup import AUTO_TOLERANCE, Setup, make_setup
+from slideviz.deformation.reduction import AUTO_TOLERANCE
+from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
 from slideviz.design.frozen_fit import BADLY_CONDITIONED

@@ -5,7 +5,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.case.model import AUTO, Reduction
-from slideviz.deformation import setup
+from slideviz.deformation import reduction, setup
 from slideviz.deformation.solver import Step
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
@@ -31,16 +31,16 @@ def test_up_to_its_limit_it_is_the_exact_method_to_the_bit(passage):
 
 def test_the_limit_counts_periodic_images_once(passage, monkeypatch):
     count = _last(passage.case.change(steps=1), passage.mesh).candidates
-    monkeypatch.setattr(setup, "EXACT_NODES", count)
+    monkeypatch.setattr(reduction, "EXACT_NODES", count)
     assert setup.make_setup(passage.case, passage.mesh).reduction is None
-    monkeypatch.setattr(setup, "EXACT_NODES", count - 1)
+    monkeypatch.setattr(reduction, "EXACT_NODES", count - 1)
     assert setup.make_setup(passage.case, passage.mesh).reduction is not None
 
 
 def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeypatch):
     case, mesh = passage.case.change(steps=2), passage.mesh
     exact = _last(case.change(reduction=None), mesh)
-    monkeypatch.setattr(setup, "EXACT_NODES", 10)
+    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
     found = _last(case, mesh)
     prepared = setup.make_setup(case, mesh)
     largest = np.linalg.norm(prepared.target, axis=1).max()
@@ -54,7 +54,7 @@ def test_beyond_its_limit_it_follows_the_motion_to_a_thousandth(passage, monkeyp
 
 
 def test_a_motion_of_nothing_changes_no_bit(passage, monkeypatch):
-    monkeypatch.setattr(setup, "EXACT_NODES", 10)
+    monkeypatch.setattr(reduction, "EXACT_NODES", 10)
     blade = passage.case.markers_with("moving")[0]
     still = passage.case.change(motions=(sv.Translate(blade, (0.0, 0.0)),))
     assert np.array_equal(_last(still, passage.mesh).mesh.points, passage.mesh.points)
