@@ -12,6 +12,7 @@ from slideviz.mesh.periodic import Pair
 from slideviz.mesh.quality import INVERTED
 from slideviz.plots.section_paint import Paint
 from slideviz.scene import pick
+from slideviz.scene.camera import Camera
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
@@ -50,12 +51,15 @@ class FlatScene:
         Its cells, flat.
     session : Session
         The state that is shown.
+    camera : Camera
     beside : FlatScene or None
         Another scene with the same camera: both are seen whole.
     """
 
     def __init__(self, plotter: Any, cuts: Cuts, scheme: ColorScheme = LIGHT) -> None:
         self.stage = Stage(plotter, scheme)
+        self.stage.has_legend = False
+        self.camera = Camera(self.stage, list)
         self.cuts = cuts
         self.beside: FlatScene | None = None
         self.section: Section | None = None
@@ -245,32 +249,6 @@ class FlatScene:
         camera.parallel_projection = True
         camera.parallel_scale = half
         self.stage.plotter.renderer.ResetCameraClippingRange()
-
-    def take_camera(self, other: FlatScene) -> None:
-        """Show the same part of the plane as another flat scene."""
-        camera, theirs = self.stage.plotter.camera, other.stage.plotter.camera
-        camera.parallel_projection = True
-        camera.focal_point, camera.position = theirs.focal_point, theirs.position
-        camera.up, camera.parallel_scale = theirs.up, theirs.parallel_scale
-        self.stage.plotter.renderer.ResetCameraClippingRange()
-
-    def looks_like(self, other: FlatScene) -> bool:
-        """Tell whether another flat scene shows the same part of the plane."""
-        cameras = (self.stage.plotter.camera, other.stage.plotter.camera)
-        one, two = ((*c.focal_point, *c.position, *c.up, c.parallel_scale) for c in cameras)
-        return one == two
-
-    def zoom_at(self, x: float, y: float, factor: float) -> None:
-        """Enlarge by ``factor``; the pixel (x, y) from the lower left keeps what it shows."""
-        (left, right), (below, above) = self.ranges()
-        width, height = self.stage.plotter.window_size
-        camera = self.stage.plotter.camera
-        at = np.array([left + (right - left) * x / width, below + (above - below) * y / height])
-        way = (at - np.asarray(camera.focal_point)[:2]) * (1.0 - 1.0 / factor)
-        shift = np.array([*way, 0.0])
-        camera.focal_point = np.asarray(camera.focal_point) + shift
-        camera.position = np.asarray(camera.position) + shift
-        camera.parallel_scale = camera.parallel_scale / factor
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the ranges of the view from left to right, and from bottom to top."""

@@ -123,8 +123,8 @@ class FlatView(QWidget):
         self._sync_rulers()
         partner = self._partner
         # Drawing moves the near and far planes, which is no movement.
-        if partner is not None and not partner.scene.looks_like(self.scene):
-            partner.scene.take_camera(self.scene)
+        if partner is not None and not partner.scene.camera.looks_like(self.scene.camera):
+            partner.scene.camera.take(self.scene.camera)
             partner.view.render_soon()
 
     def set_scheme(self, scheme: ColorScheme) -> None:
@@ -144,7 +144,7 @@ class FlatView(QWidget):
 
     def _zoomed(self, where: QPoint, factor: float) -> None:
         x, y = self.view.to_pixels(where)
-        self.scene.zoom_at(x, y, factor)
+        self.scene.camera.zoom_at(x, y, factor)
         self.view.render()
 
     def _sync_rulers(self) -> None:
