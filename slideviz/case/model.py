@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from slideviz.case.words import nearest
 from slideviz.errors import CaseError
 from slideviz.mesh.model import frozen_array
 from slideviz.terms import (
@@ -191,16 +192,15 @@ class Case:
 
     Every marker of the mesh that ``roles`` does not name is fixed. Defaults are those of the
     thesis. Paths are absolute, or relative to the current folder; the formats of the meshes are
-    None where their endings tell. ``direction`` is the
-    component of the frame in which the mesh repeats (0, 1, 2 for x, y, z or r, theta, z), None
-    where none is given; it and ``curved`` are RBF-SliDe's and without effect, since the matching
-    of the periodic markers and the shape of the boundaries tell both; ``steps`` is 0, or "auto",
-    for as many as it takes (see ``steps_gain`` in ``slideviz keys``); ``reduction`` is None where
-    all boundary nodes are control nodes, however many, ``idw_power`` where it is the number of
-    dimensions. ``view`` has how a window showed the case, by key: it changes no result.
-    ``ffd_boxes`` are boxes for free-form deformation that the mesh does not have: their names and
-    8 corners (24 numbers; in 2D the first 4 count), ``ffd_degrees`` their degrees, ``ffd_orders``
-    the orders of B-splines.
+    None where their endings tell. ``direction`` is the component of the frame in which the mesh
+    repeats (0, 1, 2 for x, y, z or r, theta, z), None where none is given; it and ``curved`` are
+    RBF-SliDe's and without effect, since the matching of the periodic markers and the shape of the
+    boundaries tell both; ``steps`` is 0, or "auto", for as many as it takes (see ``steps_gain`` in
+    ``slideviz keys``); ``reduction`` is None where all boundary nodes are control nodes, however
+    many, ``idw_power`` where it is the number of dimensions. ``view`` has how a window showed the
+    case, by key: it changes no result. ``ffd_boxes`` are boxes for free-form deformation that the
+    mesh does not have: their names and 8 corners (24 numbers; in 2D the first 4 count),
+    ``ffd_degrees`` their degrees, ``ffd_orders`` the orders of B-splines.
 
     Examples
     --------
@@ -265,8 +265,6 @@ class Case:
         CaseError
             A case has no such value.
         """
-        from slideviz.case.words import nearest
-
         names = [each.name for each in fields(self)]
         for name in values:
             if name not in names:

@@ -5,15 +5,11 @@ The exact closest point on the node's own piece, not the thesis's nearest-midpoi
 undeformed boundary, in the working frame, so an arc about the axis stays an arc, and a slid
 node never leaves its curve or surface however many steps are made. With periodic displacement
 they go on beyond the periodic boundaries: on what begins at the other one.
-
-A blade that moves along its hub leaves the place where it stood, and nodes of the hub follow into
-it; but the hub has no facets there. So at the rim of a moving boundary a surface is extended
-flat, in the plane of its last facet, as far as the boundary moves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,11 +18,10 @@ from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
+from slideviz.rbf.extension import Place, edge_extension, surface_extension
 from slideviz.terms import ROLES
 
 ROLE_NUMBER: dict[str, int] = {role: number for number, role in enumerate(ROLES)}
-
-Place = Callable[[IntArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +69,7 @@ def find_tracks(
     boundary: Boundary,
     fans: Fans,
     classes: Classes,
-    place: Callable[[IntArray], FloatArray],
+    place: Place,
     *,
     roles: Mapping[str, str],
     feature_angle_deg: float,
@@ -261,52 +256,3 @@ def _edge_chains(
         if len(segments):
             chains.append((classes.edge[node_label == value], segments))
     return chains
-
-
-def surface_extension(
-    boundary: Boundary, member: np.ndarray, moving: np.ndarray, place: Place, reach: float
-) -> FloatArray:
-    """Return simplices (s, c, d) beyond the moving rim of a surface (3D) or curve (2D).
-
-    Parameters
-    ----------
-    member : (f,) bool
-        Facets of the surface.
-    moving : (n,) bool
-        Nodes of the moving boundaries.
-    place : callable
-        Corners of facets, segments or single nodes (m, k) in the undeformed frame.
-    reach : float
-        How far the extension goes.
-    """
-    inside = member[boundary.joints]
-    rim = (inside.sum(axis=1) == 1) & moving[boundary.joint_nodes].all(axis=1)
-    facet = np.where(inside[:, 0], boundary.joints[:, 0], boundary.joints[:, 1])[rim]
-    ends = place(boundary.joint_nodes[rim])
-    sides = place(boundary.facets[facet])
-    if not len(facet):
-        return np.empty((0, boundary.dim, boundary.dim))
-    out = ends.mean(axis=1) - sides.mean(axis=1)
-    if boundary.dim == 2:
-        return np.concatenate([ends, ends + reach * unit(out)[:, None]], axis=1)
-    along = unit(ends[:, 1] - ends[:, 0])
-    out -= np.einsum("ed,ed->e", out, along)[:, None] * along
-    far = ends + reach * unit(out)[:, None]
-    first = np.stack([ends[:, 0], ends[:, 1], far[:, 1]], axis=1)
-    second = np.stack([ends[:, 0], far[:, 1], far[:, 0]], axis=1)
-    return np.concatenate([first, second])
-
-
-def edge_extension(
-    segments: IntArray, moving: np.ndarray, place: Place, reach: float
-) -> FloatArray:
-    """Return segments (s, 2, d) beyond the moving ends of a chain of segments (m, 2)."""
-    node, count = np.unique(segments, return_counts=True)
-    last = node[(count == 1) & moving[node]]
-    corners = place(segments)
-    found = []
-    for column in (0, 1):
-        rows = np.isin(segments[:, column], last)
-        end, before = corners[rows, column], corners[rows, 1 - column]
-        found.append(np.stack([end, end + reach * unit(end - before)], axis=1))
-    return np.concatenate(found)
