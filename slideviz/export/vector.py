@@ -113,6 +113,8 @@ class _Paint:
         """Draw cells."""
         if self.values is None:
             style["facecolors"] = PAPER.cell
+        else:  # folded cells overlap: inverted ones are to be seen
+            cells = cells.with_last(np.isnan(self.values[cells.cells]))
         values = None if self.values is None else self.values[cells.cells]
         draw_cells(axes, cells, values, self.colors, edges=self.edge, **style)
 

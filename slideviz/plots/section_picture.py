@@ -284,8 +284,8 @@ def _laid_beside(
         flat, labels = laid_flat(one.drawn, section, style.in_space, near)
         if near is None:
             near = section.shape.middle(section, one.drawn[min(one.drawn, key=abs)])
-        if not section.whole:
+        if not section.whole or not flat.points[:, 2].any():
             # Nothing is in front of another, but folded cells overlap: show them.
-            flat = flat.take(np.argsort(one.paint.inverted[flat.cells], kind="stable"))
+            flat = flat.with_last(one.paint.inverted[flat.cells])
         flats.append(flat)
     return flats, labels

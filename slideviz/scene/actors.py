@@ -76,6 +76,15 @@ def cell_shape(mesh: Mesh) -> Any:
     return shape
 
 
+def set_order(shape: Any, mesh: Mesh, order: IntArray) -> None:
+    """Give the data set of the cells of a 2D mesh its cells in another order, (m,)."""
+    sizes = np.diff(mesh.cells.offsets)[order]
+    offsets = np.concatenate(([0], np.cumsum(sizes)))
+    starts = np.repeat(mesh.cells.offsets[order] - offsets[:-1], sizes)
+    corners = mesh.cells.connectivity[starts + np.arange(offsets[-1])]
+    shape.SetPolys(pv.CellArray.from_arrays(offsets, corners))  # type: ignore[arg-type]
+
+
 def part_shape(mesh: Mesh, cells: IntArray) -> Any:
     """Return some cells (k,) of a mesh as PolyData: the cells in 2D, their outside in 3D.
 

@@ -117,8 +117,7 @@ class FlatScene:
         if not section.whole and len(flat):
             # Nothing is in front of another, but folded cells overlap: they are drawn last.
             status = cut_frame(session.frame, section).quality.status
-            folded = status[flat.cells] == INVERTED
-            flat = flat.take(np.argsort(folded, kind="stable")) if folded.any() else flat
+            flat = flat.with_last(status[flat.cells] == INVERTED)
             flat = flat.with_points(flat.points * (1.0, 1.0, 0.0))
         self.polygons = flat
         self._shown.show(flat)

@@ -10,11 +10,12 @@ import numpy as np
 from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.mesh.enclosing import enclosing_of
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
 from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn, see_through
 from slideviz.scene.stage import Layer, Stage
-from slideviz.session.state import Session
+from slideviz.session.state import Frame, Session
 from slideviz.terms import ROLES
 
 FADED = 0.3
@@ -42,11 +43,14 @@ class CellLayer(Layer):
     ----------
     part : (k,) int64 or None
         The cells of a 3D mesh that are drawn; None is all of them.
+    order : (m,) int64 or None
+        In which the cells of a 2D mesh are drawn; None is that of the mesh.
     """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.part: IntArray | None = None
+        self.order: IntArray | None = None
         self.shape: Any = None
         self.actor: Any = None
 
@@ -71,7 +75,16 @@ class CellLayer(Layer):
 
     def clear(self) -> None:
         """Forget the mesh."""
-        self.shape = self.actor = None
+        self.shape = self.actor = self.order = None
+
+    def _stack(self, frame: Frame) -> None:
+        """Draw inverted cells last: folded cells overlap, and of these they are to be seen."""
+        folded = frame.quality.status == INVERTED
+        order = np.argsort(folded, kind="stable") if folded.any() else None
+        if not np.array_equal(order, self.order):  # type: ignore[arg-type]  # None is equal to None
+            self.order = order
+            every = np.arange(len(folded)) if order is None else order
+            actors.set_order(self.shape, frame.mesh, every)
 
     def shapes(self) -> list[Any]:
         """Return the data set of the cells."""
@@ -90,11 +103,14 @@ class CellLayer(Layer):
         by_value = new.view.colour_by != "role"
         if old is None or old.frame is not new.frame:
             actors.place(self.shape, self.points(new.frame.mesh))
+            if new.mesh.dim == 2:
+                self._stack(new.frame)
         if by_value and recoloured(old, new):
             if new.mesh.dim == 3:
                 values = self.stage.values_of(new, self.shape.cell_data[CELL])
             else:
                 values = self.stage.values(new)
+                values = values if self.order is None else values[self.order]
             self.shape.cell_data[VALUES] = values
         self.actor.mapper.scalar_visibility = by_value
         self.actor.prop.color = self.stage.scheme.cell

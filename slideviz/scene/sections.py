@@ -10,6 +10,7 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.quality import INVERTED
 from slideviz.scene.mesh import recoloured
 from slideviz.scene.passages import Period, matrices
 from slideviz.scene.polygon_actor import Instances, PolygonActor, plain_colour
@@ -180,6 +181,9 @@ class SectionLayer(Layer):
             one = self.drawn[name] = SectionDrawn(PolygonActor(self.stage, name))
         if one.made_of != key:
             polygons = self.cuts.of(frame.mesh, section, matrix, only)
+            if frame.mesh.dim == 2 or not section.whole:
+                # Folded cells overlap in one plane: show them.
+                polygons = polygons.with_last(cut.quality.status[polygons.cells] == INVERTED)
             one.shown.show(polygons, LIFTS[kind] * self.stage.lift(frame.mesh))
             one.made_of, one.frame, one.of, again = key, cut, frame.mesh, True
         if not by_value:

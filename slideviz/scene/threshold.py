@@ -32,7 +32,7 @@ class ThresholdLayer(Layer):
     Attributes
     ----------
     cells : (k,) int64 or None
-        Which these are, None without a threshold.
+        Which these are, in 2D the inverted ones last, None without a threshold.
     shape : pyvista.PolyData or None
         What is drawn; ``owner`` tells whose sides its polygons are.
     """
@@ -96,6 +96,8 @@ class ThresholdLayer(Layer):
         assert threshold is not None
         mesh, values = frame.mesh, self.stage.values(session)
         cells = cells_in_range(values, threshold)
+        if mesh.dim == 2:
+            cells = cells[np.argsort(np.isnan(values[cells]), kind="stable")]  # see `CellLayer`
         if self.cells is None or self.shape is None or not np.array_equal(cells, self.cells):
             self.shape = part_shape(mesh, cells)
             self.cells = cells

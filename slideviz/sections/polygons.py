@@ -53,6 +53,10 @@ class Polygons:
         corners = self.connectivity[np.repeat(self.offsets[order], sizes) + _ramps(sizes)]
         return Polygons(self.points, offsets_of(sizes), corners, self.cells[order])
 
+    def with_last(self, chosen: np.ndarray) -> Polygons:
+        """Return the polygons with the chosen ones (q,) last: drawn above others in their plane."""
+        return self.take(np.argsort(chosen, kind="stable")) if chosen.any() else self
+
     def by_depth(self) -> Polygons:
         """Return the polygons in the order of the z of their middles, the nearest last."""
         depth = np.add.reduceat(self.points[self.connectivity, 2], self.offsets[:-1]) / self.sizes
