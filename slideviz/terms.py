@@ -344,7 +344,9 @@ POINTS_SHOWN: dict[PointsShown, Term] = {
     "control": Term("control nodes"),
 }
 
-Shown = Literal["edges", "undeformed", "motion_ghost", "legend", "triad", "perspective"]
+Shown = Literal[
+    "edges", "undeformed", "motion_ghost", "legend", "triad", "ffd_boxes", "perspective"
+]
 
 
 @dataclass(frozen=True)
@@ -391,6 +393,12 @@ SHOWN: dict[Shown, ShownTerm] = {
         "Draw the directions of the axes in a corner.",
         shortcut="T",
         at_first=True,
+        in_bar=False,
+    ),
+    "ffd_boxes": ShownTerm(
+        "FFD boxes",
+        "Draw the control points of the boxes for free-form deformation.",
+        shortcut="B",
         in_bar=False,
     ),
     "perspective": ShownTerm(

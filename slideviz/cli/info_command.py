@@ -10,6 +10,7 @@ from slideviz.cli.options import add_shared
 
 if TYPE_CHECKING:
     from slideviz.cli.report import Counts
+    from slideviz.ffd.box import Box
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
 
@@ -50,6 +51,16 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Qual
     from slideviz.mesh.periodic import find_pairs
 
     report = info_report(mesh, find_pairs(mesh), counts, found)
+    boxes, fault = _boxes(mesh)
+    if boxes:
+        report["ffd_boxes"] = [
+            {
+                "name": box.name,
+                "degrees": box.degrees[: mesh.dim],
+                "orders": box.orders and box.orders[: mesh.dim],
+            }
+            for box in boxes
+        ]
     if save_json(arguments.json, report):
         return DONE
     zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""
@@ -68,5 +79,21 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Qual
         print(table([(m["name"], m["elements"], "elements") for m in report["markers"]]))
     for pair in report["periodic_pairs"]:
         print(f"  {' and '.join(pair['markers'])} match: {pair['type']}, {pair['description']}")
+    if boxes:
+        print("FFD boxes:")
+        print(table([(box.name, box.describe(mesh.dim)) for box in boxes]))
+    if fault:
+        print(f"FFD boxes: {fault}")
     print(f"quality: min {found.min:.6g}, mean {found.mean:.6g}, {found.inverted} inverted")
     return DONE
+
+
+def _boxes(mesh: Mesh) -> tuple[tuple[Box, ...], str]:
+    """Return the boxes for free-form deformation, or what is wrong with them."""
+    from slideviz.errors import MeshError
+    from slideviz.ffd.section import boxes_of
+
+    try:
+        return boxes_of(mesh), ""
+    except MeshError as problem:
+        return (), str(problem)

@@ -17,6 +17,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, Drawn
+from slideviz.scene.boxes import BoxLayer
 from slideviz.scene.camera import SLACK, Camera
 from slideviz.scene.coarse import CoarseLayer
 from slideviz.scene.ghosts import GhostLayer
@@ -65,6 +66,7 @@ class Scene:
             self.sections,
             MarkLayer(self.stage),
             self._ghosts,
+            BoxLayer(self.stage),
             PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
             LegendLayer(self.stage),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Case, FromFile, Motion, named
-from slideviz.session.opening import with_periodicity
+from slideviz.session.opening import has_ffd, with_periodicity
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Place, Session
 from slideviz.session.undoable import undoable
@@ -67,13 +67,21 @@ def add_motion(session: Session, motion: Motion, index: int | None = None) -> Se
     """Return the session with one more motion, performed last or as the one of that index."""
     motions = list(session.case.motions)
     motions.insert(len(motions) if index is None else index, motion)
-    return set_case(session, motions=tuple(motions))
+    return _with_motions(session, motions)
+
+
+def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
+    """Return the session with other motions; the first one of a box has the boxes drawn."""
+    found = set_case(session, motions=tuple(motions))
+    if has_ffd(found.case) and not has_ffd(session.case):
+        return replace(found, view=found.view.with_drawn({"ffd_boxes": True}))
+    return found
 
 
 @undoable("motion")
 def replace_motion(session: Session, index: int, motion: Motion) -> Session:
     """Return the session with another motion at that place."""
-    return set_case(session, motions=replaced(session.case.motions, index, motion))
+    return _with_motions(session, replaced(session.case.motions, index, motion))
 
 
 @undoable("removing a motion")

@@ -150,5 +150,9 @@ def mark_cell(session: Session, cell: int | None) -> Session:
 
 
 def fresh_view(session: Session, old: ViewState) -> Session:
-    """Return a session just opened with things drawn and colour map of the view before."""
-    return set_view(session, drawn=old.drawn, colour_map=old.colour_map)
+    """Return a session just opened with things drawn and colour map of the view before.
+
+    Its boxes are drawn if it has motions of them.
+    """
+    drawn = old.with_drawn({"ffd_boxes": "ffd_boxes" in session.view.drawn}).drawn
+    return set_view(session, drawn=drawn, colour_map=old.colour_map)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from slideviz.case.model import Case, Reduction
+from slideviz.case.model import Case, Ffd, Reduction
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.changes_view import flat_one
@@ -29,6 +29,8 @@ def open_mesh(
     others = {name: role for name, role in chosen.roles.items() if name not in listed}
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
     view = kept_view(chosen, ViewState(), mesh.marker_names)
+    if has_ffd(chosen) and "VIEW_SHOW" not in chosen.view:
+        view = view.with_drawn({"ffd_boxes": True})
     flat = flat_one(view.sections)
     if mesh.part is not None:
         view = replace(view, threshold=None)  # it would choose among all cells
@@ -36,6 +38,11 @@ def open_mesh(
     # From here on the view is the session's; it goes back into the case when that is saved.
     chosen = chosen.change(view={})
     return Session(mesh, path, chosen, guesses, tuple(pairs), first, saved=chosen, view=view)
+
+
+def has_ffd(case: Case) -> bool:
+    """Tell whether a motion moves control points of a box."""
+    return any(isinstance(motion, Ffd) for motion in case.motions)
 
 
 def suggested_reduction(mesh: Mesh) -> Reduction:
