@@ -129,7 +129,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     from slideviz import write
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import tell_lost
-    from slideviz.cli.report import save_json
+    from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2_surface import set_boxes
 
     case: Case = config.case
@@ -153,8 +153,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
         for name, count in counts.items():
             print(f"FFD box {name}: {count} surface nodes")
         print(f"mesh: {case.mesh_out}")
-    for warning in case.warnings:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    print_remarks(case.warnings)
     for name, count in counts.items():
         if not count:
             words = f"no node of {', '.join(config.markers)} is in the FFD box {name}"

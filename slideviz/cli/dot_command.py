@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -30,7 +29,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, require_places
     from slideviz.cli.progress import Bar
-    from slideviz.cli.report import save_json
+    from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2_gradients import find_gradients
     from slideviz.design.su2_sensitivities import sensitivity_file
     from slideviz.design.su2_surface import make_surface
@@ -69,8 +68,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
     }
     if not save_json(arguments.json, report) and not arguments.quiet:
         _print(report, sensitivities, gradient)
-    for warning in report["warnings"]:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    print_remarks(report["warnings"])
     return DONE
 
 

@@ -164,6 +164,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Fram
     """Return every step with its quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
+    from slideviz.cli.report import print_remarks
     from slideviz.session.state import Frame
 
     frames = []
@@ -171,8 +172,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Fram
         for step in deform(case, mesh, bar):
             found = quality(step.mesh, reference=mesh, metric=case.quality_metric)
             frames.append(Frame(step.mesh, found, step))
-    for warning in step.warnings:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    print_remarks(step.warnings)
     return tuple(frames)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -12,7 +13,7 @@ from typing import Any
 from slideviz.case.model import Case
 from slideviz.case.reduction_keys import get_reduction
 from slideviz.deformation.solver import Step, folded_at
-from slideviz.errors import CaseError
+from slideviz.errors import CaseError, Note
 from slideviz.mesh.check import unused_nodes
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.atomic import atomic_write
@@ -189,6 +190,13 @@ def info_report(
 def counted(number: int, what: str) -> str:
     """Return a number of things in words: 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def print_remarks(remarks: Iterable[str]) -> None:
+    """Print warnings, and what is harmless as notes, where errors go."""
+    for text in remarks:
+        kind = "note" if isinstance(text, Note) else "warning"
+        print(f"slideviz: {kind}: {text}", file=sys.stderr)
 
 
 def save_json(path: Path | None, report: Mapping[str, Any]) -> bool:

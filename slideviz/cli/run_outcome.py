@@ -27,7 +27,7 @@ def tell(
 ) -> int:
     """Write and print the report of a run, and return the exit code."""
     from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.report import save_history, save_json
+    from slideviz.cli.report import print_remarks, save_history, save_json
 
     if arguments.history:
         save_history(arguments.history, report)
@@ -36,8 +36,7 @@ def tell(
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
-    for warning in report["warnings"]:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    print_remarks(report["warnings"])
     if found.inverted:
         print(f"slideviz: {_inverted_sentence(found, report, folded)}", file=sys.stderr)
         return INVERTED

@@ -239,8 +239,9 @@ def _print_sweep(report: dict[str, Any]) -> None:
 
 def _warn(warnings: Sequence[str], rows: Sequence[Row]) -> None:
     """Print the warnings of the case, and why designs failed, each reason once."""
-    for warning in warnings:
-        print(f"slideviz: warning: {warning}", file=sys.stderr)
+    from slideviz.cli.report import print_remarks
+
+    print_remarks(warnings)
     reasons: dict[str, list[int]] = {}
     for row in sorted(rows, key=_number):
         if row.problem:

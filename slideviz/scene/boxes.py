@@ -37,11 +37,11 @@ class BoxLayer(Layer):
         shown = "ffd_boxes" in new.view.drawn
         case = new.case
         definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
-        key = (new.mesh, _ffd_motions(case), definition, self.stage.look) if shown else ()
+        key = (new.mesh, _ffd_motions(case), definition, self.stage.scheme) if shown else ()
         if key == self._key:
             return
         self._key = key
-        colours = self.stage.look.text, ROLES["moving"].colour
+        colours = self.stage.scheme.text, ROLES["moving"].colour
         drawn = lattices(case, new.mesh) if shown else ([], [])
         for name, colour, found in zip(NAMES, colours, drawn, strict=True):
             self.stage.remove(name)

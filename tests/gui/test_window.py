@@ -780,13 +780,19 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert not banner.isVisible()
 
 
-def test_what_is_harmless_goes_to_the_log_and_the_tooltip_and_not_over_the_view(ready, caplog):
+def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(ready, caplog):
     caplog.set_level("INFO")
     note = Note("24 nodes are no control nodes, so this does no harm")
     ended_badly(ready, [note], inverted=0)
     assert not ready.window.banner.isVisible()
     assert [r.levelname for r in caplog.records if "no harm" in r.message] == ["INFO"]
     assert "24 nodes are no control nodes" in described(ready.session.runs[-1])
+    text = ready.window.run_panel.text
+    assert text.text() == "Done. <a href='notes'>1 note</a>"
+    assert "24 nodes are no control nodes" in text.toolTip()
+    text.linkActivated.emit("notes")
+    assert ready.window.banner.text.text() == f"Note: {note}"
+    ready.window.banner.hide()
     ended_badly(ready, [note, "the solver stopped early"], inverted=0)
     assert ready.window.banner.isVisible()
     assert ready.window.banner.property("calm")

@@ -18,13 +18,20 @@ from slideviz.gui.widgets.services import main_window
 from slideviz.session import changes
 from slideviz.session.changes import run_requirements
 from slideviz.session.jobs import Doing
-from slideviz.session.run_messages import Requirement, ended, exact_cost, help_for, inverted_words
+from slideviz.session.run_messages import (
+    Requirement,
+    ended,
+    exact_cost,
+    help_for,
+    inverted_words,
+    notes_of,
+)
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 
 LONG = 100
-SETTINGS = "settings"
-"""What the link stands for that takes the settings of the run that is shown."""
+SETTINGS, NOTES = "settings", "notes"
+"""What the links stand for: to take the settings of the run shown, and to tell its notes."""
 
 
 class RunPanel(Panel):
@@ -112,9 +119,11 @@ class RunPanel(Panel):
             self.text.setText(f"Ready. {self._cost}".rstrip())
         elif not session.outdated:
             bad = inverted_words(run)
-            text = html.escape(ended(run))
-            self.text.setText(f"<b>{text}</b>" if bad else text)
-            self.text.setToolTip(wrapped(help_for(run.case)) if bad else "")
+            text, notes = html.escape(ended(run)), notes_of(run)
+            count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
+            link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
+            self.text.setText((f"<b>{text}</b>" if bad else text) + link)
+            self.text.setToolTip(wrapped("\n".join([help_for(run.case)] * bool(bad) + [*notes])))
         elif run is session.runs[-1]:
             text = "Settings changed since the last run."
             self.text.setText(f"{text} {self._cost}".rstrip())
@@ -124,7 +133,12 @@ class RunPanel(Panel):
         set_style(self.text, "bad", bool(bad))
 
     def _link(self, target: str) -> None:
-        if target == SETTINGS:
+        if target == NOTES:
+            run = self.store.session.run_shown
+            if run is not None:
+                text = "\n".join(f"Note: {note}" for note in notes_of(run))
+                main_window(self).banner.tell(text)
+        elif target == SETTINGS:
             self.store.change(changes.take_settings, self.store.session.shown)
         else:
             self.place_wanted.emit(self._missing[0])
