@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.deformation.solver import Step
     from slideviz.mesh.model import Mesh
-    from slideviz.terms import FileFormat
+    from slideviz.terms import FileFormat, Metric
 
 KEPT_BYTES = 1_000_000_000
 """Meshes of steps are kept up to this size, to tell when cells were inverted."""
@@ -118,7 +120,6 @@ def _require_places(
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
     from slideviz.cli.places import Output, require_places
-    from slideviz.cli.steps_file import require_series
     from slideviz.mesh.io.file_checks import same_file
 
     assert case.mesh_file is not None
@@ -133,7 +134,7 @@ def _require_places(
         + (", or say --force to write over it" if may_force else ""),
     )
     if arguments.steps_file:
-        require_series(arguments.steps_file)
+        _require_series(arguments.steps_file)
     if arguments.picture:
         from slideviz.export.offscreen import check_png, check_size
         from slideviz.export.picture import SIZE
@@ -155,6 +156,18 @@ def _require_places(
             files=rf"{re.escape(case.mesh_file.stem)}_\d+\.(su2b?|cgns)",
         ),
     )
+
+
+def _require_series(path: Path) -> None:
+    """Raise CaseError where the name of the file is not one that all steps can be in."""
+    from slideviz.errors import CaseError
+    from slideviz.mesh.io.vtkhdf import VTKHDF
+
+    if path.suffix.lower() != VTKHDF:
+        raise CaseError(
+            f"{path}: only {VTKHDF} files hold all steps; end the name of --steps-file with it, or "
+            "use --steps-dir"
+        )
 
 
 def _default_output(case: Case) -> Path:
@@ -182,12 +195,11 @@ def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
     """Return all steps; of very many only the last keeps its mesh."""
     from slideviz import deform, write
     from slideviz.cli.progress import Bar
-    from slideviz.cli.steps_file import steps_file
     from slideviz.mesh.io.files import usual_ending
 
     steps: list[Step] = []
     folder = arguments.steps_dir
-    series = steps_file(arguments.steps_file, mesh, case.quality_metric)
+    series = _series(arguments.steps_file, mesh, case.quality_metric)
     with series as add, Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             if folder:
@@ -200,3 +212,31 @@ def pull(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> list[Step]:
             if len(steps) * mesh.points.nbytes > KEPT_BYTES and len(steps) > 1:
                 steps[-2] = replace(steps[-2], mesh=mesh)
     return steps
+
+
+@contextmanager
+def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[[Mesh], object]]:
+    """Return what takes the mesh of each step, after the undeformed one; nothing without a file.
+
+    Each step has the quality of its cells and the displacement of its points.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be written; none is left.
+    """
+    from slideviz import quality
+    from slideviz.cli.report import cell_data
+    from slideviz.mesh.io.vtkhdf import vtkhdf_series
+
+    if path is None:
+        yield lambda _: None
+        return
+    with vtkhdf_series(path, mesh) as series:
+
+        def add(now: Mesh) -> None:
+            values = cell_data(path, quality(now, reference=mesh, metric=metric))
+            series.add(now.points, values or {}, {"displacement": now.points - mesh.points})
+
+        add(mesh)
+        yield add

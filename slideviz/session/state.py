@@ -287,11 +287,7 @@ def round_above(value: float) -> float:
     if not value > 0:
         return 0.0
     power = float(10.0 ** np.floor(np.log10(value)))
-    fit = (
-        digits
-        for digits in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
-        if digits * power >= value
-    )
+    fit = (n for n in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if n * power >= value)
     return float(f"{next(fit, 10.0) * power:.3g}")
 
 
