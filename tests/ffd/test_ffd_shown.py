@@ -85,7 +85,7 @@ def test_lattices_are_drawn_where_they_are_wanted(boxed, scene):
     assert moved.n_points == 8
     assert np.flatnonzero(shift.any(axis=1)).tolist() == [5]
     assert shift[5] == pytest.approx([0.0, 0.5])
-    scene.set_look(DARK)
+    scene.set_scheme(DARK)
     assert scene.plotter.actors[NAMES[0]].prop.color.hex_rgb != "#000000"
     scene.update(changes.set_view(session, ffd_boxes=False))
     assert not set(NAMES) & set(scene.plotter.actors)
