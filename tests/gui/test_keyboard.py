@@ -259,3 +259,21 @@ def test_the_menu_of_the_motions_offers_what_can_be_done(opened):
     able = {name for name, act in panel.actions_.items() if act.isEnabled()}
     assert able == {"duplicate", "copy", "paste", "later", "remove"}
     assert [act.text() for act in panel.list.actions()][:3] == ["Duplicate", "Copy", "Paste"]
+
+
+def test_arrows_change_no_role_after_a_click_on_one(driver, passage_file, qtbot):
+    window = driver.window
+    driver.open(passage_file)
+    table, roles = window.boundaries.table, dict(driver.session.case.roles)
+    choice = table.cellWidget(driver.row("inflow"), 2)
+    QTest.mouseClick(choice, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: choice.view().isVisible())
+    QTest.keyClick(choice.view(), Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: not choice.view().isVisible())
+    assert QApplication.focusWidget() is table
+    driver.click_row("inflow")
+    QTest.mouseClick(choice, Qt.MouseButton.LeftButton)
+    QTest.keyClick(choice.view(), Qt.Key.Key_Escape)
+    QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Down)
+    assert driver.session.case.roles == roles
+    assert driver.session.view.selected == ("outflow",)
