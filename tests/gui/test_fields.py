@@ -44,6 +44,33 @@ def test_every_digit_is_there_to_be_edited(field):
     assert (field.value, told[-1]) == (2.5, 2.5)
 
 
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [("360*2", 720.0), ("360/7 + 1", 360 / 7 + 1), ("-(1,5 - 4)*2e1", 50.0), ("007", 7.0)],
+)
+def test_sums_and_products_are_worked_out(qtbot, typed, value):
+    made, told = NumberField(1.0), []
+    qtbot.addWidget(made)
+    made.changed.connect(told.append)
+    made.selectAll()
+    QTest.keyClicks(made, typed)
+    assert not made.problem
+    QTest.keyClick(made, Qt.Key.Key_Return)
+    assert (made.value, told[-1]) == (value, value)
+    made.focusOutEvent(QFocusEvent(QFocusEvent.Type.FocusOut))
+    assert made.text() == short_text(value)
+
+
+@pytest.mark.parametrize("typed", ["2**9", "1/0", "(" * 300, "1e999*0", "9" * 400 + "*9", "1 2"])
+def test_what_has_no_value_is_not_worked_out(qtbot, typed):
+    made = NumberField(1.0)
+    qtbot.addWidget(made)
+    made.setText(typed)
+    made.textEdited.emit(typed)
+    assert "number" in made.problem
+    assert made.value == 1.0
+
+
 @pytest.mark.parametrize("typed", ["0.0.945", "12e", "", "-"])
 def test_a_malformed_number_goes_back_to_what_was_there_before(qtbot, typed):
     made, other, told = NumberField(0.949), NumberField(1.0), []

@@ -17,6 +17,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from slideviz.gui.widgets.arithmetic import typed_number
 from slideviz.gui.widgets.build import set_style
 from slideviz.gui.widgets.labels import wrapped
 
@@ -52,7 +53,9 @@ def is_stray(event: QEvent, letters: str = "eE") -> bool:
 
 
 class NumberField(QLineEdit):
-    """A field for a number; an invalid one is marked at once, with the reason as tooltip.
+    """A field for a number, or a sum or product of some, whose value stands there when it is left.
+
+    An invalid one is marked at once, with the reason as tooltip.
 
     ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
     while it is edited; the value keeps them all. What is not valid when the field is left goes
@@ -97,8 +100,7 @@ class NumberField(QLineEdit):
         if not self.text().strip():
             return "a number is needed"
         try:
-            # A decimal comma is what many people type; thousands are not separated here.
-            value = float(self.text().strip().replace(",", "."))
+            value = typed_number(self.text())
         except ValueError:
             return f"“{self.text()}” is not a number"
         if not math.isfinite(value):
@@ -180,7 +182,7 @@ class NumberField(QLineEdit):
 
     def _edited(self) -> None:
         if not self.problem:
-            self._value = float(self.text().strip().replace(",", "."))
+            self._value = typed_number(self.text())
             # First the number, then that it is valid: who hears of that would show the one before.
             self.changed.emit(self._value)
         self.mark()

@@ -1,0 +1,51 @@
+"""Numbers as people type them into a field: with a decimal comma, or as a sum or product."""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+from collections.abc import Callable
+
+_ALLOWED = re.compile(r"[\d.eE+\-*/() ]+\Z")
+_SIGNS: dict[type[ast.unaryop], Callable[[float], float]] = {
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+}
+_OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def typed_number(text: str) -> float:
+    """Return the number that a text is, as ``2.5``, ``2,5`` or ``360/7 + 1``.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    plain = text.strip().replace(",", ".")
+    try:
+        return float(plain)
+    except ValueError:
+        if not _ALLOWED.match(plain):
+            raise
+    try:
+        return _value(ast.parse(plain, mode="eval").body)
+    except (SyntaxError, ArithmeticError, RecursionError, MemoryError) as problem:
+        raise ValueError(f"{text!r} is not a number") from problem
+
+
+def _value(node: ast.expr) -> float:
+    """Return the value of a part of what was typed."""
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]  # only digits came here
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:
+        return _SIGNS[type(node.op)](_value(node.operand))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+        return _OPERATIONS[type(node.op)](_value(node.left), _value(node.right))
+    raise ValueError("is not a number")
