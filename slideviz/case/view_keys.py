@@ -25,12 +25,15 @@ SectionText = tuple[str, tuple[float, ...], bool, bool, bool]
 """Form, numbers, and whether whole cells are shown, it is laid flat, and it is drawn."""
 
 
-def numbers(count: int, allowed: str, rising: bool = False) -> Kind:
-    """Return the kind of a list of so many numbers, each larger than the one before if rising."""
+def numbers(count: int, allowed: str, rising: bool = False, more: int = 0) -> Kind:
+    """Return the kind of a list of so many numbers, each larger than the one before if rising.
+
+    There may be ``more`` of them.
+    """
 
     def read(text: str) -> tuple[float, ...]:
         values = tuple(number(item.text) for item in list_of(text))
-        if len(values) != count:
+        if not count <= len(values) <= count + more:
             raise CaseError(f"{shown(text)} has {len(values)} numbers; needed is {allowed}")
         if rising and any(a >= b for a, b in pairwise(values)):
             raise CaseError(f"{shown(text)} does not rise; needed is {allowed}")
@@ -142,7 +145,8 @@ VIEW_ROWS = (
     _row("VIEW_SECTIONS", SECTIONS, f"Sections of the mesh, each by a {names()}."),
     _row(
         "VIEW_CAMERA",
-        numbers(10, "ten numbers"),
-        "Where the eye is, what it looks at, what is up, and half the height that it sees.",
+        numbers(10, "ten or eleven numbers", more=1),
+        "Where the eye is, what it looks at, what is up, half the height that it sees; and how "
+        "much wider than high that view was, for one that is narrower.",
     ),
 )

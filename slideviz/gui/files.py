@@ -254,7 +254,7 @@ class Files(QObject):
         if self._saved_to is not None and self._saved_to.suffix in (".su2", ".su2b", ".cgns"):
             case = case.change(mesh_out=self._saved_to)
         try:
-            keep_view(replace(session, case=case), self.window.scene.camera.place).write(path)
+            keep_view(replace(session, case=case), self.window.scene.camera.view).write(path)
         except (OSError, SlidevizError) as error:
             self.window.banner.tell_error(error)
             return False

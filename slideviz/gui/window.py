@@ -210,7 +210,7 @@ class MainWindow(Services):
         self.autosave: Autosave | None = None
         self.recovery: SessionRecovery | None = None
         if folder is not None:
-            self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.place, self)
+            self.autosave = Autosave(self.store, folder, lambda: self.scene.camera.view, self)
             self.recovery = SessionRecovery(self, self.offer, self.autosave)
 
     # The session -----------------------------------------------------------------------

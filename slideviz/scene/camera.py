@@ -185,12 +185,15 @@ class Camera:
 
     def show_width_of(self, other: Camera) -> None:
         """Show as much of the width as another camera does, in a view that may be less wide."""
-        free = []
-        for stage in (self.stage, other.stage):
-            width, height = stage.plotter.window_size
-            free.append(max(width - stage.strip(), 1.0) / max(height, 1))
+        free = [self._ratio(stage) for stage in (self.stage, other.stage)]
         if self._camera.parallel_projection and free[0] < free[1]:
             self._camera.parallel_scale *= free[1] / free[0]
+
+    @staticmethod
+    def _ratio(stage: Stage) -> float:
+        """Return the width of a view without the legend's strip by its height."""
+        width, height = stage.plotter.window_size
+        return float(max(width - stage.strip(), 1.0) / max(height, 1))
 
     def sees_all(self, slack: float = SLACK) -> bool:
         """Tell whether the boxes around all data sets to be seen are within the view.
@@ -240,10 +243,19 @@ class Camera:
         numbers = (*camera.position, *camera.focal_point, *camera.up, camera.parallel_scale)
         return tuple(float(number) for number in numbers)
 
+    @property
+    def view(self) -> tuple[float, ...]:
+        """Return `place`, and the width of the view without the legend's strip by its height."""
+        return (*self.place, self._ratio(self.stage))
+
     def go(self, place: tuple[float, ...]) -> None:
-        """Put the camera where `place` was read."""
+        """Put the camera where `place` was read, or where `view` was: all its width is seen."""
         camera = self._camera
         camera.position, camera.focal_point, camera.up = place[:3], place[3:6], place[6:9]
         camera.parallel_scale = place[9]
+        wider = max(place[10] / self._ratio(self.stage), 1.0) if len(place) > 10 else 1.0
+        camera.parallel_scale *= wider
+        if not camera.parallel_projection:
+            camera.Dolly(1.0 / wider)
         self.shift()
         self.stage.plotter.renderer.ResetCameraClippingRange()

@@ -13,7 +13,8 @@ from slideviz.session.state import Session, ViewState
 from slideviz.terms import SHOWN
 
 Camera = tuple[float, ...]
-"""Position, focal point, direction up, and half the height seen, in parallel projection."""
+"""Position, focal point, direction up, and half the height seen, in parallel projection; then
+perhaps how much wider than high the view was."""
 
 
 def keep_view(session: Session, camera: Camera | None = None) -> Case:

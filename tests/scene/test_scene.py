@@ -371,6 +371,22 @@ def test_a_camera_comes_back(scene, session):
     assert np.allclose(scene.camera.place, place)
 
 
+@pytest.mark.parametrize("perspective", [False, True])
+def test_a_view_that_was_kept_is_not_cut_in_a_narrower_one(scene, session, cube, perspective):
+    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    opened(scene, changes.set_view(solid, perspective=True) if perspective else session)
+    view, width = scene.camera.view, scene.plotter.window_size[0]
+    scene.plotter.window_size = [260, scene.plotter.window_size[1]]
+    scene.camera.go(view[:10])
+    assert scene.camera.loses_some()
+    scene.camera.go(view)
+    assert not scene.camera.loses_some()
+    # In one that is as wide, or wider, it is what it was.
+    scene.plotter.window_size = [width, scene.plotter.window_size[1]]
+    scene.camera.go(view)
+    assert scene.camera.place == pytest.approx(view[:10])
+
+
 def culling(scene):
     return {one.actor.prop.culling for one in scene.drawn.values()}
 
