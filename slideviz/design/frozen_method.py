@@ -242,7 +242,7 @@ class Method:
             rows = np.flatnonzero(label == index)
             found, which = tracks.tracks[index].nearest(at[rows])
             anchor[rows] = found
-            matrix[rows] = primitives(tracks.tracks[index].corners[which], at[rows], found)
+            matrix[rows] = primitives(tracks.tracks[index].simplices(which), at[rows], found)
         return anchor, matrix
 
     def _ties(self, nodes: IntArray) -> tuple[IntArray, IntArray, FloatArray]:

@@ -46,9 +46,17 @@ def _part(keys, items, start, half, stop):  # type: ignore[no-untyped-def]
             return
 
 
+@njit(inline="always", **_OPTIONS)
+def _image(item, count):  # type: ignore[no-untyped-def]
+    """Return which image of one of ``count`` triangles an item is; faster than to divide."""
+    return 0 if item < count else 1 if item < 2 * count else 2
+
+
 @njit(**_OPTIONS)
-def _build(corners, order, bounds):  # type: ignore[no-untyped-def]
-    """Part ``order`` (n,) into the leaves of a balanced tree and fill ``bounds`` (m, 6).
+def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
+    """Part ``order`` (q,) into the leaves of a balanced tree and fill ``bounds`` (m, 6).
+
+    Item k is the image k // n of the triangle k % n, moved by ``shifts`` (3, 3).
 
     Node k has the children 2 k + 1 and 2 k + 2; the range of a node follows from halving its
     parent's, so no ranges are stored.
@@ -57,8 +65,9 @@ def _build(corners, order, bounds):  # type: ignore[no-untyped-def]
     starts = np.zeros(nodes, np.int64)
     stops = np.zeros(nodes, np.int64)
     stops[0] = len(order)
-    middle, low, high = np.empty(len(order)), np.empty((len(order), 3)), np.empty((len(order), 3))
-    for i in range(len(order)):
+    count = len(corners)
+    middle, low, high = np.empty(len(order)), np.empty((count, 3)), np.empty((count, 3))
+    for i in range(count):
         for axis in range(3):
             one, two, three = corners[i, 0, axis], corners[i, 1, axis], corners[i, 2, axis]
             low[i, axis], high[i, axis] = min(one, two, three), max(one, two, three)
@@ -67,14 +76,18 @@ def _build(corners, order, bounds):  # type: ignore[no-untyped-def]
         for axis in range(3):
             lowest, highest = np.inf, -np.inf
             for i in range(a, b):
-                lowest = min(lowest, low[order[i], axis])
-                highest = max(highest, high[order[i], axis])
+                image = _image(order[i], count)
+                one, by = order[i] - image * count, shifts[image, axis]
+                lowest = min(lowest, low[one, axis] + by)
+                highest = max(highest, high[one, axis] + by)
             bounds[k, axis], bounds[k, 3 + axis] = lowest, highest
         if 2 * k + 2 >= nodes:
             continue
         longest = np.argmax(bounds[k, 3:] - bounds[k, :3])
         for i in range(a, b):
-            middle[i] = low[order[i], longest] + high[order[i], longest]
+            image = _image(order[i], count)
+            one, by = order[i] - image * count, shifts[image, longest]
+            middle[i] = (low[one, longest] + by) + (high[one, longest] + by)
         half = a + (b - a + 1) // 2
         _part(middle, order, a, half, b)
         starts[2 * k + 1], stops[2 * k + 1] = a, half
@@ -143,10 +156,10 @@ def _before(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(parallel=True, **_OPTIONS)
-def _query(x, corners, order, bounds, out, which):  # type: ignore[no-untyped-def]
+def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-untyped-def]
     """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
 
-    And into ``which`` (m,) the triangles that they are on.
+    And into ``which`` (m,) the items that they are on, numbered as for ``_build``.
 
     Of several equally near ones the position decides, not the order of the triangles.
     """
@@ -156,7 +169,7 @@ def _query(x, corners, order, bounds, out, which):  # type: ignore[no-untyped-de
         stack = np.empty(64, np.int64)
         first = np.empty(64, np.int64)
         last = np.empty(64, np.int64)
-        point, trial = np.empty(3), np.empty(3)
+        point, trial, t = np.empty(3), np.empty(3), np.empty((3, 3))
         best, top = np.inf, 1
         stack[0], first[0], last[0] = 0, 0, len(order)
         while top > 0:
@@ -166,7 +179,13 @@ def _query(x, corners, order, bounds, out, which):  # type: ignore[no-untyped-de
                 continue
             if k >= inner:
                 for j in range(a, b):
-                    t = corners[order[j]]
+                    image = _image(order[j], len(corners))
+                    one = order[j] - image * len(corners)
+                    for corner in range(3):
+                        for axis in range(3):
+                            t[corner, axis] = corners[one, corner, axis]
+                            if image > 0:  # adding zero would turn -0.0 into 0.0
+                                t[corner, axis] += shifts[image, axis]
                     gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
                     tied = abs(gap - best) <= TIE * best
                     if gap < best * (1.0 - TIE) or (tied and _before(point, out[i])):
@@ -187,21 +206,23 @@ def _query(x, corners, order, bounds, out, which):  # type: ignore[no-untyped-de
 
 
 class ClosestPoints:
-    """A tree over simplices, for queries of closest points.
+    """A tree over simplices, and their images one period before and after, for closest points.
 
     Attributes
     ----------
     corners : (n, c, d) float64
-        The simplices.
+        The simplices, without their images: these are found when they are needed, for the memory.
     """
 
-    def __init__(self, corners: FloatArray) -> None:
+    def __init__(self, corners: FloatArray, shift: FloatArray | None = None) -> None:
         """Build the tree.
 
         Parameters
         ----------
         corners : (n, c, d)
             Segments (c = 2) or triangles (c = 3) in d = 2 or 3 dimensions.
+        shift : (d,), optional
+            One period; None: there are no images.
         """
         self.corners = corners
         n, count, dim = corners.shape
@@ -210,21 +231,36 @@ class ClosestPoints:
             self._corners = np.zeros((n, 3, 3))
             self._corners[:, :count, :dim] = corners
             self._corners[:, count:] = self._corners[:, count - 1 : count]
-        depth = max(0, int(np.ceil(np.log2(max(1, n / LEAF)))))
+        self._shifts: FloatArray = np.zeros((3, 3))
+        items = n
+        if shift is not None:
+            items, self._shifts[1, :dim], self._shifts[2, :dim] = 3 * n, -shift, shift
+        depth = max(0, int(np.ceil(np.log2(max(1, items / LEAF)))))
         self._bounds: FloatArray = np.empty((2 ** (depth + 1) - 1, 6))
-        self._order: IntArray = np.arange(n)
-        _build(self._corners, self._order, self._bounds)
+        self._order: IntArray = np.arange(items)
+        _build(self._corners, self._shifts, self._order, self._bounds)
+
+    def simplices(self, which: IntArray) -> FloatArray:
+        """Return the simplices (k, c, d) of numbers as `nearest` gives them, images too."""
+        image, one = np.divmod(which, len(self.corners))
+        moved = self.corners[one]
+        there = image > 0
+        moved[there] += self._shifts[image[there], None, : moved.shape[2]]
+        return moved
 
     def query(self, x: FloatArray) -> FloatArray:
         """Return the closest point on the simplices for each x, (m, d)."""
         return self.nearest(x)[0]
 
     def nearest(self, x: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the closest point for each x, (m, d), and the simplex that it is on, (m,)."""
+        """Return the closest point for each x, (m, d), and the simplex that it is on, (m,).
+
+        For its corners see `simplices`.
+        """
         dim = x.shape[1]
         targets = np.zeros((len(x), 3))
         targets[:, :dim] = x
         out, which = np.empty_like(targets), np.zeros(len(x), np.int64)
         with one_at_a_time(50 * len(x)):
-            _query(targets, self._corners, self._order, self._bounds, out, which)
+            _query(targets, self._corners, self._shifts, self._order, self._bounds, out, which)
         return out[:, :dim], which

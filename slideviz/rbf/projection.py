@@ -108,14 +108,14 @@ def find_tracks(
         curved |= _bends(corner_vectors(sides[member]))
         beyond = surface_extension(boundary, member, moving, place, reach)
         corners = np.concatenate([_simplices(sides[member]), beyond])
-        tracks.append(ClosestPoints(_continued(corners, shift)))
+        tracks.append(ClosestPoints(corners, shift))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
             of_node[nodes] = len(tracks)
             corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
             corners = np.concatenate([corners, edge_extension(ends, moving, place, reach)])
-            tracks.append(ClosestPoints(_continued(corners, shift)))
+            tracks.append(ClosestPoints(corners, shift))
     return Tracks(tuple(tracks), of_node, bool(curved))
 
 
@@ -198,13 +198,6 @@ def _simplices(sides: FloatArray) -> FloatArray:
         return sides
     quad = sides[np.any(sides[:, 2] != sides[:, 3], axis=1)]
     return np.concatenate([sides[:, :3], quad[:, [0, 2, 3]]])
-
-
-def _continued(corners: FloatArray, shift: FloatArray | None) -> FloatArray:
-    """Return the simplices with their images one period before and after."""
-    if shift is None:
-        return corners
-    return np.concatenate([corners, corners - shift, corners + shift])
 
 
 def _bends(vectors: FloatArray, either_way: bool = False) -> bool:
