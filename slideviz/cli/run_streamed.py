@@ -26,7 +26,7 @@ def require_streamable(
     CaseError, MeshError
         It needs the mesh in memory, or mesh or result are no SU2 meshes.
     """
-    from slideviz.deformation.streaming import require_stream, require_text_of
+    from slideviz.deformation.streaming import require_stream
     from slideviz.errors import CaseError
 
     if not (arguments.stream or arguments.resume):
@@ -42,8 +42,6 @@ def require_streamable(
             "binary form"
         )
     require_stream(case)
-    assert case.mesh_file is not None
-    require_text_of(case.mesh_file, case.mesh_format, _is_text(output, kind))
 
 
 def is_to_be_streamed(
@@ -55,7 +53,7 @@ def is_to_be_streamed(
     if arguments.stream or arguments.resume:
         return True
     able = _is_su2(output, kind) and not _needing_memory(arguments)
-    missing = missing_memory(case, is_text=_is_text(output, kind)) if able else ""
+    missing = missing_memory(case) if able else ""
     if missing and not arguments.quiet:
         _say("note", f"{missing}; it is streamed")
     return bool(missing)
@@ -67,10 +65,6 @@ def _needing_memory(arguments: argparse.Namespace) -> list[str]:
 
 def _is_su2(output: Path, kind: FileFormat | None) -> bool:
     return (kind or output.suffix.lower().removeprefix(".")) in ("su2", "su2b")
-
-
-def _is_text(output: Path, kind: FileFormat | None) -> bool:
-    return (kind or output.suffix.lower().removeprefix(".")) == "su2"
 
 
 def _say(what: str, text: str) -> None:

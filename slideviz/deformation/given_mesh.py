@@ -18,8 +18,8 @@ from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.lines import Piece
 from slideviz.mesh.io.su2.text import Text, find_text
-from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace
+from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import finish_head, partial_file
 from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
 from slideviz.mesh.model import Mesh
@@ -52,11 +52,11 @@ class Given:
     zone: int | None
     text: Text | None = None
 
-    @property
-    def text_size(self) -> int:
-        """Return how many bytes the text has."""
-        assert self.text is not None
-        return self.text.lines.raw.size
+    def text_size(self, place: ZonePlace) -> int:
+        """Return about how many bytes the mesh, whose binary form stands there, has as a text."""
+        if self.text is not None:
+            return self.text.lines.raw.size
+        return 8 * (place.cells.length + (2 * place.dim + 1) * place.n_points)
 
     def skin(self, tick: Tick, ranks: Alone = ALONE) -> Mesh:
         """Return the boundary and the cells at it; the whole mesh is read and checked.
@@ -147,7 +147,7 @@ def given_for(
     resume : bool
         Whether to use the copy that a stopped run has left.
     warn : callable
-        Called with a sentence on what the output will not have of the file; "" for nothing.
+        Called with a sentence on what the output will not have of the mesh; "" for nothing.
 
     Raises
     ------
@@ -155,6 +155,8 @@ def given_for(
         It is of no format that can be streamed, or has a mistake; the disk has no room.
     """
     if require_su2(path, file_format) == "su2b":
+        if is_text:
+            warn(_lost_in_text(output, path, zone))
         yield Given(path, zone)
         return
     text = find_text(path, zone, _from(tick, 0.0, SCANNED))
@@ -174,6 +176,27 @@ def given_for(
         with told_of(text, copy.path):
             yield Given(copy.path, None, text)
         copy.remove()
+
+
+def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
+    """Return in words what a text will not have of a binary mesh; "" for nothing.
+
+    Raises
+    ------
+    MeshError
+        The name of a boundary cannot stand in a text.
+    """
+    with path.open("rb") as file:
+        source = Source(path, file)
+        place = find_zone(source, zone)
+    name = printable(path.name)
+    require_text_names(name, (marker.name for marker in place.markers))
+    if source.zones == 1:
+        return ""
+    return (
+        f"{output} will have zone {place.number} alone, not the others of {name}; write a .su2b "
+        "file to keep them"
+    )
 
 
 def _later(plan: Plan, is_text: bool) -> int:

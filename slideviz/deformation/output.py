@@ -20,6 +20,7 @@ import numpy as np
 from slideviz.deformation.given_mesh import Given, text_blocks
 from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
+from slideviz.deformation.text_of_binary import text_of_binary
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_no_input
@@ -153,13 +154,18 @@ class Output:
         if not self._is_text:
             return
         partial, written = self._opened(), 0
-        blocks = text_blocks(self._given, self.files.before, self._place, partial.path, ffd)
+        before, after = self.files.before, self.files.after
+        if self._given.text is None:
+            folder = Path(os.path.realpath(self._path)).parent
+            blocks = text_of_binary(before, self._place, after, folder)
+        else:
+            blocks = text_blocks(self._given, before, self._place, partial.path, ffd)
         with self._watch.phase("write") as tick:
             with atomic_write(self._path, replaces=self._replaces) as file:
                 for block in blocks:
                     file.write(block)
                     written += len(block)
-                    tick(min(1.0, written / self._given.text_size))
+                    tick(min(1.0, written / self._given.text_size(self._place)))
             tick(1.0)
         partial.remove()
 

@@ -28,7 +28,7 @@ from slideviz.deformation.solver import (
     require_memory,
 )
 from slideviz.deformation.stepping import Stepping
-from slideviz.errors import CaseError, MeshError, NodeError
+from slideviz.errors import CaseError, NodeError
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
@@ -94,7 +94,7 @@ def stream(
     note : callable
         Called with a sentence on what ``resume`` found.
     warn : callable
-        Called with a sentence on what a binary output will not have of a text; "" for nothing.
+        Called with a sentence on what the output will not have of the mesh; "" for nothing.
     resume : bool
         Whether to go on where a run that was ended did.
     replaces : Path, optional
@@ -117,7 +117,6 @@ def stream(
     total = max(1, case.steps)
     watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
-    require_text_of(path, case.mesh_format, is_text)
     with ExitStack() as stack:
         with watch.phase("read") as tick:
             given = stack.enter_context(
@@ -211,25 +210,8 @@ def require_stream(case: Case) -> None:
     require_su2(path, case.mesh_format)
 
 
-def require_text_of(path: Path, file_format: FileFormat | None, is_text: bool) -> None:
-    """Raise where the output is a text, and the mesh is none that it could be made of.
-
-    Raises
-    ------
-    MeshError
-        It is binary.
-    """
-    if is_text and require_su2(path, file_format) == "su2b":
-        raise MeshError(
-            f"{path}: an SU2 binary mesh is streamed to another; end the name of the output in "
-            ".su2b, and make it a text with `slideviz convert` where there is more memory"
-        )
-
-
-def missing_memory(case: Case, *, is_text: bool) -> str:
+def missing_memory(case: Case) -> str:
     """Return in words that a mesh that can be streamed needs more memory than is free, or nothing.
-
-    ``is_text`` tells whether the output is a text.
 
     Raises
     ------
@@ -240,7 +222,7 @@ def missing_memory(case: Case, *, is_text: bool) -> str:
     if path is None or case.method == "elastic":
         return ""
     kind = format_of(path, case.mesh_format)
-    if kind is None or (is_text and kind == "su2b"):
+    if kind is None:
         return ""
     needed, free = NEEDED[kind] * path.stat().st_size, free_memory()
     if needed <= free:

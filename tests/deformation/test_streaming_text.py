@@ -16,11 +16,11 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import output, streaming
+from slideviz.deformation import output, streaming, text_of_binary
 from slideviz.deformation.streaming import stream
 from slideviz.errors import MeshError
 from slideviz.mesh.io import binary_copy
-from slideviz.mesh.io.su2 import scan
+from slideviz.mesh.io.su2 import scan, write
 from slideviz.mesh.io.su2b.layout import MAGIC
 from slideviz.mesh.io.su2b.partial import names_of
 from slideviz.samples.table import write_sample
@@ -142,6 +142,45 @@ def test_all_else_of_the_file_stays(tmp_path, small, kind, zones):
     if zones == 1:
         stream(case, tmp_path / "out.su2b")
         assert (tmp_path / "out.su2b").read_bytes() == in_memory(case, tmp_path / "memory.su2b")
+
+
+@pytest.mark.parametrize("kind", ["mixed", "prism", "turned"])
+def test_a_binary_mesh_becomes_the_text_that_memory_gives(tmp_path, monkeypatch, small, kind):
+    monkeypatch.setattr(write, "_BLOCK_ROWS", 17)
+    monkeypatch.setattr(text_of_binary, "NEAR", 5)
+    mesh = grid((5, 4, 4), kind="mixed" if kind == "turned" else kind)
+    sv.write(tmp_path / "mesh.su2b", mesh)
+    if kind == "turned":
+        again = sv.read(tmp_path / "mesh.su2b")
+        order = np.random.default_rng(2).permutation(len(mesh.cells))
+        sv.write(
+            tmp_path / "mesh.su2b", replace(again, origin=replace(again.origin, order=order)), True
+        )
+        assert sv.read(tmp_path / "mesh.su2b").cells.same_as(mesh.cells)
+    case = replace(odd_mesh(tmp_path / "odd.su2", "prism"), mesh_file=tmp_path / "mesh.su2b")
+    stream(case, tmp_path / "out.su2")
+    assert (tmp_path / "out.su2").read_bytes() == in_memory(case, tmp_path / "memory.su2")
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_what_a_text_of_a_binary_mesh_will_not_have_is_told(tmp_path, capsys):
+    case = odd_mesh(tmp_path / "odd.su2", "prism", zones=2)
+    sv.convert(tmp_path / "odd.su2", tmp_path / "mesh.su2b")
+    case.change(mesh_file=tmp_path / "mesh.su2b").write(tmp_path / "case.cfg")
+    call = ["run", str(tmp_path / "case.cfg"), "-o", str(tmp_path / "out.su2")]
+    told, texts = [], []
+    for more in ([], ["--stream"]):
+        assert run([*call, *more]) == 0
+        told.append([one for one in capsys.readouterr().err.splitlines() if "warning" in one])
+        texts.append((tmp_path / "out.su2").read_bytes())
+    assert told[0] == told[1]
+    assert "will have zone 2 alone" in told[0][0]
+    assert texts[0] == texts[1]
+    data = (tmp_path / "mesh.su2b").read_bytes().replace(b"x_m\0", b"x%m\0")
+    (tmp_path / "mesh.su2b").write_bytes(data)
+    for more in ([], ["--stream"]):
+        assert run([*call, *more]) == 1
+        assert "'x%m' cannot stand in an SU2 file" in capsys.readouterr().err
 
 
 def test_what_a_binary_mesh_has_no_place_for_is_told(tmp_path, capsys):
@@ -278,7 +317,7 @@ SCRIPT = """
 import sys, time
 from pathlib import Path
 import slideviz as sv
-from slideviz.deformation import output, streaming
+from slideviz.deformation import output, streaming, text_of_binary
 from slideviz.mesh.io import binary_copy
 from slideviz.mesh.io.su2 import scan
 def late(what):
@@ -332,9 +371,6 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     case = made(tmp_path, "square", 8, ("STEPS=1",))
     text = case.mesh_file.read_text()
     out = tmp_path / "out.su2"
-    sv.convert("mesh.su2", "mesh.su2b")
-    with pytest.raises(MeshError, match="an SU2 binary mesh is streamed to another"):
-        stream(case.change(mesh_file=tmp_path / "mesh.su2b"), out)
     marks = int(text.partition("NMARK= ")[2].split()[0])
     halo = text.replace(f"NMARK= {marks}", f"NMARK= {marks + 1}")
     halo += "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"

@@ -5,7 +5,7 @@ Numbers are written with as few digits as identify the float64, so that nothing 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -47,17 +47,16 @@ def su2_blocks(mesh: Mesh) -> Iterator[bytes]:
         yield from _patched(document, mesh.points)
         return
     check_mesh(mesh)
-    for marker in mesh.markers:
-        _check_name(mesh, marker.name)
+    require_text_names(mesh.name, mesh.marker_names)
     if not isinstance(document, Document):
-        yield from _zone(mesh)
+        yield from _whole_zone(mesh)
         yield from _markers(mesh.markers, 0)
         yield boxes or b""
         return
     raw, (begin, end) = document.raw, document.zone
     raw.require_same()
     yield from (raw[a:b] for a, b in _ranges(0, begin))
-    yield from _zone(mesh)
+    yield from _whole_zone(mesh)
     yield from _markers(mesh.markers, len(document.sends))
     kept = (_whole(raw[a:b]) for a, b in (*document.sends, *document.kept))
     yield from (text for text in kept if boxes is None or not is_ffd(text))
@@ -176,64 +175,108 @@ def _digits(points: FloatArray) -> NDArray[np.uint8]:
     return np.frombuffer(orjson.dumps(points, option=orjson.OPT_SERIALIZE_NUMPY), np.uint8)
 
 
-def _check_name(mesh: Mesh, name: str) -> None:
-    """Raise when reading the file again would give another name."""
-    if not name or name != name.strip() or not name.isprintable() or "%" in name:
-        raise MeshError(
-            f"{mesh.name}: the marker name {name!r} cannot stand in an SU2 file; rename it without "
-            "percent sign, line break or blanks around it"
-        )
-    if name.upper() == SEND_RECEIVE:
-        raise MeshError(
-            f"{mesh.name}: a boundary cannot be named {name}, which SU2 uses for halos; rename it"
-        )
+def require_text_names(mesh: str, names: Iterable[str]) -> None:
+    """Raise where a marker of a mesh would have another name if a text were read again.
+
+    Raises
+    ------
+    MeshError
+        One would.
+    """
+    for name in names:
+        if not name or name != name.strip() or not name.isprintable() or "%" in name:
+            raise MeshError(
+                f"{mesh}: the marker name {name!r} cannot stand in an SU2 file; rename it without "
+                "percent sign, line break or blanks around it"
+            )
+        if name.upper() == SEND_RECEIVE:
+            raise MeshError(
+                f"{mesh}: a boundary cannot be named {name}, which SU2 uses for halos; rename it"
+            )
 
 
-def _zone(mesh: Mesh) -> Iterator[bytes]:
+CellsOf = Callable[[int, int], Cells]
+"""Returns the cells ``i`` to ``j``."""
+PointsOf = Callable[[int, int], FloatArray]
+"""Returns the points ``i`` to ``j``, (j - i, d)."""
+
+
+def text_of_parts(
+    dim: int,
+    cells: tuple[int, CellsOf],
+    points: tuple[int, PointsOf],
+    markers: Sequence[Marker],
+) -> Iterator[bytes]:
+    """Yield the SU2 file of a mesh of which parts are given on demand, from several threads.
+
+    Parameters
+    ----------
+    cells, points : (int, callable)
+        How many there are, and what returns some.
+    """
+    yield from _zone(dim, cells, points)
+    yield from _markers(markers, 0)
+
+
+def _zone(dim: int, cells: tuple[int, CellsOf], points: tuple[int, PointsOf]) -> Iterator[bytes]:
     """Yield dimension, elements and points."""
-    yield f"NDIME= {mesh.dim}\nNELEM= {len(mesh.cells)}\n".encode()
-    yield from _elements(mesh.cells, numbered=True)
-    yield f"NPOIN= {len(mesh.points)}\n".encode()
-    yield from in_order(partial(_point_rows, mesh.points), _starts(len(mesh.points)))
+    yield f"NDIME= {dim}\nNELEM= {cells[0]}\n".encode()
+    yield from _elements(*cells, numbered=True)
+    yield f"NPOIN= {points[0]}\n".encode()
+    yield from in_order(partial(_point_rows, points[1]), _blocks(points[0]))
 
 
-def _starts(count: int) -> range:
-    """Return the first row of each block."""
-    return range(0, count, _BLOCK_ROWS)
+def _whole_zone(mesh: Mesh) -> Iterator[bytes]:
+    """Yield dimension, elements and points of a mesh in memory."""
+    yield from _zone(
+        mesh.dim,
+        (len(mesh.cells), partial(_some, mesh.cells)),
+        (len(mesh.points), lambda i, j: mesh.points[i:j]),
+    )
 
 
-def _point_rows(points: FloatArray, first: int) -> bytes:
+def _some(cells: Cells, i: int, j: int) -> Cells:
+    """Return the cells ``i`` to ``j``; their offsets are those of the whole."""
+    offsets = cells.offsets[i : j + 1]
+    return Cells(cells.types[i:j], offsets, cells.connectivity[offsets[0] : offsets[-1]])
+
+
+def _blocks(count: int) -> list[tuple[int, int]]:
+    """Return the first row of each block, and the one after the last."""
+    return [(i, min(i + _BLOCK_ROWS, count)) for i in range(0, count, _BLOCK_ROWS)]
+
+
+def _point_rows(points: PointsOf, block: tuple[int, int]) -> bytes:
     """Return a line for each point of a block: coordinates and index."""
     from slideviz.mesh.io.su2.digits import print_points
 
-    mine = points[first : first + _BLOCK_ROWS]
+    mine = points(*block)
     numbers = _digits(mine)
     out = np.empty(len(numbers) + _NUMBER_BYTES * len(mine), np.uint8)
-    return out[: print_points(numbers, mine.shape[1], first, out)].tobytes()
+    return out[: print_points(numbers, mine.shape[1], block[0], out)].tobytes()
 
 
-def _markers(markers: tuple[Marker, ...], sends: int) -> Iterator[bytes]:
+def _markers(markers: Sequence[Marker], sends: int) -> Iterator[bytes]:
     yield f"NMARK= {len(markers) + sends}\n".encode()
     for marker in markers:
         yield f"MARKER_TAG= {marker.name}\nMARKER_ELEMS= {len(marker.cells)}\n".encode()
-        yield from _elements(marker.cells, numbered=False)
+        yield from _elements(len(marker.cells), partial(_some, marker.cells), numbered=False)
 
 
-def _elements(cells: Cells, *, numbered: bool) -> Iterator[bytes]:
+def _elements(count: int, cells: CellsOf, *, numbered: bool) -> Iterator[bytes]:
     """Yield a line for each element: type, nodes, and its index where asked for."""
-    yield from in_order(partial(_cell_rows, cells, numbered), _starts(len(cells)))
+    yield from in_order(partial(_cell_rows, cells, numbered), _blocks(count))
 
 
-def _cell_rows(cells: Cells, numbered: bool, first: int) -> bytes:
+def _cell_rows(cells: CellsOf, numbered: bool, block: tuple[int, int]) -> bytes:
     """Return a line for each element of a block."""
     from slideviz.mesh.io.su2.digits import print_cells
 
-    types = cells.types[first : first + _BLOCK_ROWS]
-    offsets = cells.offsets[first : first + len(types) + 1]
-    nodes = cells.connectivity[offsets[0] : offsets[-1]]
-    out = np.empty(_NUMBER_BYTES * (len(nodes) + 2 * len(types)), np.uint8)
-    index = first if numbered else -1
-    return out[: print_cells(types, offsets, nodes, index, out)].tobytes()
+    some = cells(*block)
+    out = np.empty(_NUMBER_BYTES * (len(some.connectivity) + 2 * len(some)), np.uint8)
+    index = block[0] if numbered else -1
+    size = print_cells(some.types, some.offsets, some.connectivity, index, out)
+    return out[:size].tobytes()
 
 
 def _whole(text: bytes) -> bytes:

@@ -1,0 +1,86 @@
+"""A text made of an SU2 binary mesh and other points, without the whole of it in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from slideviz.deformation.measuring import Scratch
+from slideviz.mesh.io.su2.write import text_of_parts
+from slideviz.mesh.io.su2b.elements import element_blocks, elements_between, taken
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace
+from slideviz.mesh.io.su2b.read import read_elements
+from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
+from slideviz.mesh.skin import index_of
+
+NEAR = 256
+"""Elements between two that are read with them, rather than apart."""
+
+
+def text_of_binary(
+    source: Source, place: ZonePlace, after: Source, folder: Path
+) -> Iterator[bytes]:
+    """Yield the zone of a binary mesh as a text of its own, with the points of ``after``.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the places of the elements are kept meanwhile, if these stand in another order.
+    """
+    kind = source.point(place.dim)
+
+    def points(i: int, j: int) -> FloatArray:
+        rows = after.array(place.points + i * kind.itemsize, j - i, kind, "the points")
+        return np.ascontiguousarray(rows["x"], np.float64)
+
+    with ExitStack() as stack:
+        where = _places(stack, source, place, folder)
+
+        def cells(i: int, j: int) -> Cells:
+            if where is None:
+                block = elements_between(source, place, place.cells, place.dim, i, j - i)
+                return Cells.from_types(block.types, block.nodes)
+            return _gathered(source, place, where[i:j])
+
+        markers = tuple(
+            Marker(
+                m.name, read_elements(source, place, m.elements, place.dim - 1, lambda _: None)[0]
+            )
+            for m in place.markers
+        )
+        yield from text_of_parts(
+            place.dim, (place.cells.count, cells), (place.n_points, points), markers
+        )
+
+
+def _places(stack: ExitStack, source: Source, place: ZonePlace, folder: Path) -> IntArray | None:
+    """Return where each cell stands among the elements of a file (m,); None where in order."""
+    scratch: Scratch | None = None
+    for block in element_blocks(source, place, place.cells, place.dim):
+        here = slice(block.first, block.first + len(block.ids))
+        ids = index_of(block.ids)
+        if scratch is None and not (isinstance(ids, slice) and ids == here):
+            scratch = Scratch(stack, folder, place.cells.count, np.int64)
+            scratch.array[: block.first] = np.arange(block.first)
+        if scratch is not None:
+            scratch.array[ids] = np.arange(here.start, here.stop)
+            scratch.release()
+    return None if scratch is None else scratch.array
+
+
+def _gathered(source: Source, place: ZonePlace, where: IntArray) -> Cells:
+    """Return the elements at some places (k,), in that order; those near each other in one go."""
+    ordered = np.sort(where)
+    cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1
+    types, flats = [], []
+    for part in np.split(ordered, cuts):
+        first, count = int(part[0]), int(part[-1] - part[0]) + 1
+        block = elements_between(source, place, place.cells, place.dim, first, count)
+        some = taken(Cells.from_types(block.types, block.nodes), part - first)
+        types.append(some.types)
+        flats.append(some.connectivity)
+    found = Cells.from_types(np.concatenate(types), np.concatenate(flats))
+    return taken(found, np.searchsorted(ordered, where))
