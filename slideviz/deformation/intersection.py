@@ -11,13 +11,15 @@ from slideviz.case.model import Case
 from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.caching import njit
-from slideviz.mesh.crossing import Crossing, first_crossing, swept_crossing
+from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swept_crossing
 from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.threads import PART, in_parts
 from slideviz.mesh.topology import components, facet_vectors, unit
 
+MOST = 30_000
+"""Facets that are compared with each other while somebody waits: three seconds."""
 LOOKED_AT = 5
 """Facets of a moved body that are asked whether they are inside; one that is will do."""
 BESIDE = 1e-4
@@ -82,6 +84,28 @@ def jump_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -
                 "inverted there, unless its real path is not straight and goes around"
             )
     return None
+
+
+def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> str | None:
+    """Return a sentence when what moves goes through itself, where it did not before.
+
+    Of more than ``MOST`` facets that is not asked.
+    """
+    after = np.array(mesh.points)
+    after[nodes] += vectors
+    parts = [mesh.marker(name).cells for name in case.markers_with("moving")]
+    if not 0 < sum(map(len, parts)) <= MOST:
+        return None
+    types, corners = ([getattr(p, name) for p in parts] for name in ("types", "connectivity"))
+    body = Cells.from_types(np.concatenate(types), np.concatenate(corners))
+    hit = self_crossing(after, body)
+    if hit is None or self_crossing(mesh.points, body) is not None:
+        return None
+    ends = np.cumsum([len(part) for part in parts])
+    first, other = (case.markers_with("moving")[np.searchsorted(ends, k, "right")] for k in hit[1:])
+    where = "itself" if first == other else other
+    place = ", ".join(f"{value:.4g}" for value in hit[0])
+    return f"{first} goes through {where} near ({place}); cells will be inverted there"
 
 
 def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str | None:

@@ -56,9 +56,9 @@ class IntersectionCheck(QObject):
             self._asked = intersections.intersection_key(session)
             self._runner.start(intersections.find_intersection, session.case, session.mesh)
 
-    def _found(self, text: str) -> None:
+    def _found(self, found: tuple[str, str]) -> None:
         self._known = self._asked
-        self.store.change(intersections.set_intersection, text, self._asked)
+        self.store.change(intersections.set_intersection, found, self._asked)
         self._again()
 
     def _failed(self, error: Exception) -> None:

@@ -167,6 +167,41 @@ def pierced(points: FloatArray, a: Surface, b: Surface, margin: float) -> Hit | 
     return _node_through(points, a, b, planes, np.concatenate(touches))
 
 
+def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
+    """Return where an edge of a boundary goes through the boundary itself, and both facets.
+
+    Facets that share a node are not compared.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+    cells : Cells
+        As ``moved`` in `first_crossing`.
+
+    Raises
+    ------
+    MeshError
+        An element has another dimension than a boundary.
+    """
+    surface = Surface.of(cells, points.shape[1])
+    if not len(surface):
+        return None
+    planes = Planes.of(points, surface, _margin(points, surface, surface))
+    pairs = list(combinations(range(points.shape[1]), 2))
+    for part in _chunks(len(surface)):
+        nodes = surface.nodes[part]
+        i, j = planes.near(points[nodes], normals(points[nodes])[:, None])
+        away = (nodes[i][:, :, None] != surface.nodes[j][:, None]).all(axis=(1, 2))
+        i, j = i[away], j[away]
+        at = points[nodes[i]]
+        height = planes.heights(at, j)
+        for pair in pairs:
+            hit = _strike(planes, at[:, pair], height[:, pair], i, j)
+            if hit is not None:
+                return hit[0], int(surface.facet[part[i[hit[1]]]]), int(surface.facet[j[hit[1]]])
+    return None
+
+
 def swept(ways: FloatArray, planes: Planes) -> Hit | None:
     """Return where the first of some lines (w, 2, d) goes through a surface, line and simplex."""
     for part in _chunks(len(ways)):

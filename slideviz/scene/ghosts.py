@@ -86,11 +86,12 @@ class GhostLayer(Layer):
                     if part in self._actors:
                         self._actors[part].visibility = False
                 continue
-            colour = INTERSECTION_COLOUR if session.intersection else ROLES["moving"].colour
+            hits = bool(session.intersection or session.folding)
+            colour = INTERSECTION_COLOUR if hits else ROLES["moving"].colour
             for actor, shape in self._parts(key, surface, 0.55, ON_TOP):
                 actors.place(shape, points, 3 * self.stage.lift(session.mesh))
                 actor.prop.color = self._rim_colour(colour) if actor.name.endswith(RIM) else colour
-                actor.prop.line_width = 4.5 if session.intersection else 2.5
+                actor.prop.line_width = 4.5 if hits else 2.5
                 actor.visibility = True
 
     def _rim_colour(self, colour: str) -> tuple[float, float, float]:

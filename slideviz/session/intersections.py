@@ -7,7 +7,7 @@ from pathlib import Path
 
 from slideviz.case.model import Case, FromFile
 from slideviz.case.motion import check_case, displacements
-from slideviz.deformation.intersection import intersection_message
+from slideviz.deformation.intersection import folding_message, intersection_message
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import Report, Stopped
@@ -20,22 +20,24 @@ def intersection_key(session: Session) -> tuple[object, ...]:
     return (session.mesh, case.motions, tuple(sorted(case.roles.items())), case.periodic)
 
 
-def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> str:
+def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
     """Return the sentence about an intersection, or about mistakes in a displacement file.
 
     It is empty when there is none, or when the case has other problems: they are told elsewhere.
+    The second sentence is about what moves and goes through itself, which keeps nobody from a run.
     """
     files = [motion.path for motion in case.motions if isinstance(motion, FromFile)]
     try:
         if not case.motions or check_case(case, mesh) or stopped():
-            return ""
+            return "", ""
         if not all(path.is_file() for path in files):
-            return ""
+            return "", ""
         moved = displacements(case, mesh)
         found = intersection_message(case, mesh, moved.nodes, moved.vectors)
+        folded = None if found else folding_message(case, mesh, moved.nodes, moved.vectors)
     except SlidevizError as error:
-        return _first_line(error, files)
-    return found[0].upper() + found[1:] + "." if found else ""
+        return _first_line(error, files), ""
+    return (found[0].upper() + found[1:] + "." if found else ""), (f"{folded}." if folded else "")
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:
@@ -46,8 +48,8 @@ def _first_line(error: SlidevizError, files: list[Path]) -> str:
     return f"{first} ({len(others)} more)." if others else f"{first}."
 
 
-def set_intersection(session: Session, text: str, key: tuple[object, ...]) -> Session:
+def set_intersection(session: Session, found: tuple[str, str], key: tuple[object, ...]) -> Session:
     """Return the session with the result of the check for ``key``, unless it is out of date."""
-    if intersection_key(session) != key or session.intersection == text:
+    if intersection_key(session) != key or (session.intersection, session.folding) == found:
         return session
-    return replace(session, intersection=text)
+    return replace(session, intersection=found[0], folding=found[1])

@@ -172,6 +172,8 @@ class Session:
         What is on disk, or what was there at the start.
     intersection : str
         What the motions put through what, in a sentence; empty as far as is known.
+    folding : str
+        What the motions put through itself; a run can start all the same.
     invalid : tuple of (Place, str)
         The fields that show something else than the case has, because it is not valid: the panel,
         and a sentence. No run starts meanwhile.
@@ -188,6 +190,7 @@ class Session:
     saved: Case | None = None
     view: ViewState = field(default_factory=ViewState)
     intersection: str = ""
+    folding: str = ""
     invalid: tuple[tuple[Place, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0

@@ -7,8 +7,8 @@ import slideviz as sv
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.case.motion import displacements
 from slideviz.deformation import intersection
+from slideviz.deformation.intersection import folding_message, jump_message
 from slideviz.deformation.intersection import intersection_message as message
-from slideviz.deformation.intersection import jump_message
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 from slideviz.samples.table import sample
@@ -227,3 +227,55 @@ def test_what_crosses_before_the_motion_is_no_fault_of_it(square):
 def test_a_body_whose_sides_are_twisted_is_not_lost_by_a_small_motion():
     run = random_run(1464)
     assert message(*moved(run.case, run.mesh, *run.case.motions)) is None
+
+
+def pushed(mesh, name):
+    """A case, and the upper part of a body pushed down through its lower part."""
+    nodes = mesh.marker(name).nodes
+    high = mesh.points[nodes][:, -1] > 0.5 * np.ptp(mesh.points[nodes][:, -1]) * 0.5
+    vectors = np.where(high[:, None], -np.eye(mesh.dim)[-1] * 0.7, 0.0)
+    return Case(roles={name: "moving"}), mesh, nodes, vectors
+
+
+def test_a_body_that_goes_through_itself_is_told():
+    case, mesh, nodes, vectors = pushed(sphere_in_box(6), "sphere")
+    said = folding_message(case, mesh, nodes, vectors)
+    assert said is not None
+    assert said.startswith("sphere goes through itself near (")
+    assert folding_message(case, mesh, nodes, 0.1 * vectors) is None
+    # What was so before is not told of the motion.
+    points = np.array(mesh.points)
+    points[nodes] += vectors
+    folded = mesh.with_points(points)
+    assert folding_message(case, folded, nodes, 0.0 * vectors) is None
+
+
+def test_two_parts_of_a_body_that_go_through_each_other_are_named():
+    _, mesh, nodes, vectors = pushed(sphere_in_box(6), "sphere")
+    whole, others = mesh.marker("sphere"), [one for one in mesh.markers if one.name != "sphere"]
+    quads = whole.cells.connectivity.reshape(-1, 4)
+    top = np.isin(quads, nodes[vectors.any(axis=1)]).any(axis=1)
+    parts = [
+        sv.Marker(n, sv.Cells.from_blocks([(9, quads[k])]))
+        for n, k in (("low", ~top), ("top", top))
+    ]
+    split = Mesh(mesh.points, mesh.cells, (*parts, *others), name="split")
+    both = Case(roles={"low": "moving", "top": "moving"})
+    said = folding_message(both, split, nodes, vectors)
+    assert said is not None
+    assert said.startswith("low goes through top near (")
+
+
+@pytest.mark.parametrize(("mesh", "name"), [(sphere_in_box(), "sphere"), (airfoil(), "airfoil")])
+def test_a_body_that_turns_as_it_is_does_not_go_through_itself(mesh, name):
+    nodes = mesh.marker(name).nodes
+    turned = (
+        mesh.points[nodes] @ np.linalg.qr(np.random.default_rng(3).normal(size=(mesh.dim,) * 2))[0]
+    )
+    vectors = turned - mesh.points[nodes]
+    assert folding_message(Case(roles={name: "moving"}), mesh, nodes, vectors) is None
+
+
+def test_of_very_many_facets_nobody_waits(monkeypatch):
+    monkeypatch.setattr(intersection, "MOST", 3)
+    assert folding_message(*pushed(sphere_in_box(6), "sphere")) is None

@@ -332,7 +332,7 @@ def test_typing_on_asks_for_the_last_motion_only(opened, monkeypatch):
 
     def listening(case, mesh, report, stopped):
         asked.append(case.motions[0].vector[1])
-        return ""
+        return "", ""
 
     opened.qtbot.waitUntil(lambda: not window.intersection_check.busy)
     monkeypatch.setattr(intersections, "find_intersection", listening)
@@ -1037,3 +1037,21 @@ def test_what_was_undone_is_said_and_both_usual_keys_do_it_again(opened):
     assert said() == "Done again: mesh edges"
     keys = {keys.toString() for keys in redo.shortcuts()}
     assert {"Ctrl+Shift+Z", "Ctrl+Y"} <= keys
+
+
+def test_what_goes_through_itself_is_told_beside_the_button_that_still_runs(ready):
+    from slideviz.session.intersections import intersection_key, set_intersection
+
+    window = ready.window
+    ready.qtbot.waitUntil(lambda: not window.intersection_check.busy)
+    folding = "airfoil goes through itself near (0, 0); cells will be inverted there."
+    key = intersection_key(ready.session)
+    window.store.change(set_intersection, ("", folding), key)
+    panel = window.run_panel
+    assert panel.text.text() == f"<a href='motion'>{folding}</a>"
+    assert panel.run.isEnabled()
+    window.docks["method"].raise_()
+    panel.text.linkActivated.emit("motion")
+    ready.qtbot.waitUntil(lambda: not window.motions.visibleRegion().isEmpty())
+    window.store.change(set_intersection, ("", ""), key)
+    assert panel.text.text() == "Ready."

@@ -1,14 +1,19 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from slideviz.case.model import Case, FromFile, Translate
+from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.intersections import find_intersection, intersection_key, set_intersection
+from slideviz.session.state import Frame
 
 
 def look(case, mesh, stopped=False):
-    return find_intersection(case, mesh, lambda _: None, lambda: stopped)
+    text, folding = find_intersection(case, mesh, lambda _: None, lambda: stopped)
+    assert not folding
+    return text
 
 
 @pytest.fixture
@@ -68,12 +73,31 @@ def test_an_intersection_keeps_a_run_from_starting_and_an_old_answer_is_dropped(
     session = changes.add_motion(session, Translate("bottom", (0.0, 9.0)))
     assert not changes.run_requirements(session)
     key = intersection_key(session)
-    told = set_intersection(session, "It clashes.", key)
+    told = set_intersection(session, ("It clashes.", ""), key)
     assert [(m.text, m.place) for m in changes.run_requirements(told)] == [
         ("It clashes.", "motion")
     ]
-    assert not changes.run_requirements(set_intersection(told, "", key))
+    assert not changes.run_requirements(set_intersection(told, ("", ""), key))
     later = changes.replace_motion(session, 0, Translate("bottom", (0.0, 0.1)))
-    assert set_intersection(later, "It clashes.", key) is later
+    assert set_intersection(later, ("It clashes.", ""), key) is later
     assert intersection_key(changes.set_case(session, steps=7)) == key
     assert intersection_key(changes.set_role(session, ["top"], "internal")) != key
+
+
+def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
+    mesh, file = passage.mesh, tmp_path / "table.txt"
+    nodes = mesh.marker("airfoil").nodes
+    x, y = mesh.points[nodes].T
+    inside = (x > 0.3) & (x < 0.7)
+    upper = inside & (y > np.interp(x, [0.3, 0.7], [y[inside].mean()] * 2))
+    file.write_text(
+        "".join(f"{n} 0 {-0.3 if up else 0}\n" for n, up in zip(nodes, upper, strict=True))
+    )
+    case = Case(roles={"airfoil": "moving"}, motions=(FromFile(file, "airfoil"),))
+    text, folding = find_intersection(case, mesh, lambda _: None, lambda: False)
+    assert text == ""
+    assert folding.startswith("airfoil goes through itself near (")
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), case)
+    told = set_intersection(session, (text, folding), intersection_key(session))
+    assert told.folding == folding
+    assert not changes.run_requirements(told)

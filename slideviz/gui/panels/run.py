@@ -116,7 +116,7 @@ class RunPanel(Panel):
         """Tell how the run that is shown ended, or that the panels say something else."""
         run, bad = session.run_shown, ""
         if run is None:
-            self.text.setText(f"Ready. {self._cost}".rstrip())
+            self._tell_ready("Ready.", session)
         elif not session.outdated:
             bad = inverted_words(run)
             text, notes = html.escape(ended(run)), notes_of(run)
@@ -125,12 +125,18 @@ class RunPanel(Panel):
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
             self.text.setToolTip(wrapped("\n".join([help_for(run.case)] * bool(bad) + [*notes])))
         elif run is session.runs[-1]:
-            text = "Settings changed since the last run."
-            self.text.setText(f"{text} {self._cost}".rstrip())
+            self._tell_ready("Settings changed since the last run.", session)
         else:
             link = f"<a href='{SETTINGS}'>Use its settings</a>"
             self.text.setText(f"The panels differ from run {run.number}. {link}")
         set_style(self.text, "bad", bool(bad))
+
+    def _tell_ready(self, text: str, session: Session) -> None:
+        """Tell that a run can start, what it costs, and what is to be expected of it."""
+        folding = _short(session.folding)
+        text = html.escape(" ".join(filter(None, (folding or text, self._cost))))
+        self.text.setText(f"<a href='motion'>{text}</a>" if folding else text)
+        self.text.setToolTip(wrapped(session.folding))
 
     def _link(self, target: str) -> None:
         if target == NOTES:
@@ -141,7 +147,8 @@ class RunPanel(Panel):
         elif target == SETTINGS:
             self.store.change(changes.take_settings, self.store.session.shown)
         else:
-            self.place_wanted.emit(self._missing[0])
+            asked = Requirement(self.store.session.folding, "motion")
+            self.place_wanted.emit((*self._missing, asked)[0])
 
     def take_theme(self, _scheme: ColorScheme) -> None:
         """Show the text in the colours of another theme: those of a link are kept otherwise."""
