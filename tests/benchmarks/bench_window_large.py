@@ -113,11 +113,11 @@ def test_cutting_by_a_plane(benchmark, bench):
     def work():
         store.change(changes.add_section, Section("plane", (x, y, z)))
         until_read(bench)
-        store.hold(True)
+        store.set_dragging(True)
         for k in range(10):
             store.change(changes.replace_section, 0, Section("plane", (x, y, z + 0.001 * k)))
             bench.rest(0.1)
-        store.hold(False)
+        store.set_dragging(False)
         until_read(bench)
 
     measure(benchmark, bench, work)
@@ -127,12 +127,12 @@ def test_cutting_by_a_cylinder(benchmark, bench):
     store = bench.window.store
 
     def work():
-        store.hold(True)
+        store.set_dragging(True)
         for k in range(10):
             other = Section("cylinder", (0.0, 0.0, 0.0), (0, 0, 1), 0.26 + 0.002 * k)
             store.change(changes.replace_section, 0, other)
             bench.rest(0.1)
-        store.hold(False)
+        store.set_dragging(False)
         until_read(bench)
 
     measure(benchmark, bench, work)
