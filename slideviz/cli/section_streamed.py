@@ -15,7 +15,6 @@ from slideviz.cli.streamed import Looked, looked
 from slideviz.deformation.rated import Rated, Zone, rated_blocks
 from slideviz.deformation.steps import Progress
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.elements import taken
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh, Part
 from slideviz.mesh.quality import Quality
 from slideviz.sections.model import Section
@@ -65,7 +64,7 @@ class _Kept:
     @classmethod
     def of(cls, part: Rated, chosen: IntArray) -> _Kept:
         """Return the chosen cells (k,) of a block."""
-        cells, found = taken(part.mesh.cells, chosen), part.quality
+        cells, found = part.mesh.cells.take(chosen), part.quality
         base = part.mesh if part.base is None else part.base
         return cls(
             part.ids[chosen],
@@ -141,7 +140,7 @@ def _joined(
     flat = np.searchsorted(nodes, every.flat)
     mesh = Mesh(
         every.points[first].reshape(-1, skin.dim),
-        taken(Cells.from_types(every.types, flat), order),
+        Cells.from_types(every.types, flat).take(order),
         name=skin.name,
         zone=skin.zone,
         zones=skin.zones,

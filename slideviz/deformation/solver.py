@@ -15,7 +15,7 @@ from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.stepping import Stepping, renumbered
 from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, UnsoundError
-from slideviz.mesh.model import Cells, IntArray, Mesh
+from slideviz.mesh.model import IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.problem import Watch
@@ -155,10 +155,7 @@ def folded_at(steps: Sequence[Step], mesh: Mesh, cells: IntArray) -> IntArray:
     first = np.zeros(len(cells), np.int64)
     if not len(cells):
         return first
-    size = np.diff(mesh.cells.offsets)[cells]
-    starts = np.repeat(mesh.cells.offsets[cells] - np.r_[0, np.cumsum(size)[:-1]], size)
-    nodes = mesh.cells.connectivity[starts + np.arange(size.sum())]
-    part = Mesh(mesh.points, Cells.from_types(mesh.cells.types[cells], nodes))
+    part = Mesh(mesh.points, mesh.cells.take(cells))
     for step in steps:
         status = quality(part.with_points(step.mesh.points), part).status
         first[(first == 0) & (status == INVERTED)] = step.index

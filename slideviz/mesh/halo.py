@@ -174,19 +174,13 @@ def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray]:
         return mesh, np.arange(len(mesh.cells))
     beyond = halo.of_nodes(len(mesh.points))
     markers = tuple(
-        Marker(marker.name, _taken(marker.cells, ~_touching(marker.cells, beyond)))
+        Marker(marker.name, marker.cells.take(~_touching(marker.cells, beyond)))
         for marker in mesh.markers
     )
     domain = Mesh(
-        mesh.points, _taken(mesh.cells, ~halo.cells), markers, name=mesh.name, source=mesh.source
+        mesh.points, mesh.cells.take(~halo.cells), markers, name=mesh.name, source=mesh.source
     )
     return domain, np.flatnonzero(~halo.cells)
-
-
-def _taken(cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
-    """Return the chosen cells, in their order."""
-    size = np.diff(cells.offsets)
-    return Cells.from_types(cells.types[chosen], cells.connectivity[np.repeat(chosen, size)])
 
 
 def fit_motion(before: FloatArray, after: FloatArray) -> RigidMotion:

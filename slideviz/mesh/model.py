@@ -127,6 +127,17 @@ class Cells:
         )
         return f"Cells({found})"
 
+    def take(self, which: IntArray | NDArray[np.bool_]) -> Cells:
+        """Return some of the elements, by numbers (k,) in their order, or by a mask (m,)."""
+        sizes = np.diff(self.offsets)
+        if which.dtype == bool:
+            entries = np.repeat(which, sizes)
+        else:
+            sizes = sizes[which]
+            begins = self.offsets[which] - (np.cumsum(sizes) - sizes)
+            entries = np.repeat(begins, sizes) + np.arange(sizes.sum())
+        return Cells.from_types(self.types[which], self.connectivity[entries])
+
     def same_as(self, other: Cells) -> bool:
         """Tell whether both hold the same elements in the same order."""
         return np.array_equal(self.types, other.types) and np.array_equal(

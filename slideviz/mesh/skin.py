@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
-from slideviz.mesh.io.su2b.elements import BLOCK, Block, element_block, require_used, taken
+from slideviz.mesh.io.su2b.elements import BLOCK, Block, element_block, require_used
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.read import point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
@@ -131,7 +131,7 @@ def _cells_near(
             _check_block(source, place, block, cells)
             near = np.add.reduceat(on[block.nodes], cells.offsets[:-1], dtype=np.int64)
             chosen = np.flatnonzero(near >= place.dim)
-            kept = taken(cells, chosen)
+            kept = cells.take(chosen)
             return _Near(
                 first, kept.types, kept.connectivity, block.ids[chosen], index_of(block.ids)
             )
@@ -166,7 +166,7 @@ def _cells_at(source: Source, place: ZonePlace, found: Iterator[_Near]) -> tuple
     nodes = np.concatenate([near.nodes for near in kept])
     ids = np.concatenate([near.ids for near in kept])
     order = np.argsort(ids, kind="stable")
-    return taken(Cells.from_types(types, nodes), order), ids[order]
+    return Cells.from_types(types, nodes).take(order), ids[order]
 
 
 def _check_block(source: Source, place: ZonePlace, block: Block, cells: Cells) -> None:

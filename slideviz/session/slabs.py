@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.deformation.measuring import PointFiles
-from slideviz.mesh.io.su2b.elements import element_blocks, elements_between, taken
+from slideviz.mesh.io.su2b.elements import element_blocks, elements_between
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.sections.cut import sides_of
 from slideviz.sections.model import ON_SECTION, Section
@@ -157,9 +157,9 @@ def _cut_cells(
         level = sign * section.distance(now.points)
         level[np.abs(level) <= near] = 0.0
         chosen = np.flatnonzero(sides_of(now.cells, level))
-        local = taken(now.cells, chosen)
+        local = now.cells.take(chosen)
         types.append(local.types)
-        flat.append(taken(Cells.from_types(block.types, block.nodes), chosen).connectivity)
+        flat.append(Cells.from_types(block.types, block.nodes).take(chosen).connectivity)
         ids.append(block.ids[chosen])
         both = np.stack([base.points, now.points])[:, local.connectivity]
         points.append(both)
@@ -169,7 +169,7 @@ def _cut_cells(
     before, after = np.concatenate(points, axis=1)[:, at]
     number = np.concatenate(ids)
     order = np.argsort(number, kind="stable")
-    cells = taken(Cells.from_types(np.concatenate(types), local_of), order)
+    cells = Cells.from_types(np.concatenate(types), local_of).take(order)
     base = Mesh(before, cells, name=files.before.name)
     return base, base.with_points(after), nodes, number[order]
 

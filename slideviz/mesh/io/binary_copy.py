@@ -27,7 +27,7 @@ from slideviz.mesh.io.su2.numbers import (
 )
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2.text import Text
-from slideviz.mesh.io.su2b.elements import SIZES, taken
+from slideviz.mesh.io.su2b.elements import SIZES
 from slideviz.mesh.io.su2b.layout import NAME_BYTES
 from slideviz.mesh.io.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
 from slideviz.mesh.model import Cells, IntArray
@@ -231,7 +231,7 @@ def _put_cells(plan: Plan, out: int, k: int) -> int:
         before = int(plan.before[k, column])
         row = int(totals[:column].sum()) + before
         start = int(totals[:column] @ _WIDTHS[:column]) + before * width
-        some = cells if len(mine) == len(types) else taken(cells, mine)
+        some = cells if len(mine) == len(types) else cells.take(mine)
         table = rows_of(some.types, some.connectivity, piece.row + mine)
         offsets = start + width * np.arange(len(mine))
         _put(out, plan.offsets + row * plan.width, offsets.astype(plan.conn))

@@ -44,13 +44,7 @@ class Elements:
 
     def where(self, mask: NDArray[np.bool_]) -> Elements:
         """Return those of a mask (m,)."""
-        return Elements(selected(self.cells, mask), self.numbers[mask], self.section[mask])
-
-
-def selected(cells: Cells, mask: NDArray[np.bool_]) -> Cells:
-    """Return the cells of a mask (m,), in their order."""
-    flat = cells.connectivity[np.repeat(mask, np.diff(cells.offsets))]
-    return Cells.from_types(cells.types[mask], flat)
+        return Elements(self.cells.take(mask), self.numbers[mask], self.section[mask])
 
 
 def dimensions(cells: Cells) -> IntArray:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.check import check_mesh, path_error, printable
-from slideviz.mesh.io.cgns.elements import selected
 from slideviz.mesh.io.cgns.join import Interface, Joined, join
 from slideviz.mesh.io.cgns.tree import Node, cgns_file
 from slideviz.mesh.io.cgns.zone import Zone, conditions, facets_of, read_zone, region_of
@@ -132,7 +131,7 @@ def _markers(
         inner = outer_facets(mesh) if inner is None else inner
         for index, section in enumerate(zone.sections):
             facets = _renumbered([zone.sides.where(zone.sides.section == index).cells], [number])
-            facets = selected(facets, among(facets, inner))
+            facets = facets.take(among(facets, inner))
             if len(facets):
                 groups.setdefault(section.name, []).append(facets)
     _add_open(groups, remarks, zones, joined)
@@ -180,7 +179,7 @@ def _add_open(
     taken = list(groups)
     for one in joined.open:
         facets = _renumbered([facets_of(zones[one.zone], one.node)], [joined.numbers[one.zone]])
-        facets = selected(facets, ~among(facets, known))
+        facets = facets.take(~among(facets, known))
         key = one.period or (one.node.name,)
         if len(facets):
             names.setdefault(key, _free_name(one, [*taken, *names.values()]))

@@ -15,7 +15,6 @@ from slideviz.mesh.io.cgns.elements import (
     grid_cells,
     grid_nodes,
     read_sections,
-    selected,
 )
 from slideviz.mesh.io.cgns.tree import DATA, Node
 from slideviz.mesh.io.meshio.markers import in_node_sets
@@ -107,7 +106,7 @@ def read_zone(node: Node, dim: int, physical: int) -> Zone:
     dims = dimensions(elements.cells)
     if not (dims == dim).any():
         raise node.fault(f"has no cells of dimension {dim}; export the mesh with its volume cells")
-    cells = selected(elements.cells, dims == dim)
+    cells = elements.cells.take(dims == dim)
     return Zone(
         node, shape, points, cells, elements.where(dims == dim - 1), tuple(sections), datasets
     )
@@ -225,7 +224,7 @@ def faces_by_number(zone: Zone, node: Node, numbers: IntArray) -> Cells:
             f"names element {missing[0]}, but the sections of {zone.node.name} do not have it as a "
             f"{'face' if zone.dim == 3 else 'edge'}; export the mesh with its boundary elements"
         )
-    return selected(zone.sides.cells, np.isin(zone.sides.numbers, numbers))
+    return zone.sides.cells.take(np.isin(zone.sides.numbers, numbers))
 
 
 def _range_faces(zone: Zone, node: Node, where: str, corners: IntArray) -> Cells:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.su2b.layout import Elements, Source, ZonePlace
-from slideviz.mesh.model import Cells, IntArray
+from slideviz.mesh.model import IntArray
 
 BLOCK = 1 << 18
 """Elements or points that are read at a time."""
@@ -201,11 +201,3 @@ def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntA
             f"element {block.first + k} is a {row.name} (type {row.vtk}, dimension {row.dim}), but "
             f"dimension {dim} is needed here; correct the element or the dimension of its zone",
         )
-
-
-def taken(cells: Cells, chosen: IntArray) -> Cells:
-    """Return the chosen cells (k,), in that order."""
-    sizes = np.diff(cells.offsets)[chosen]
-    ends = np.cumsum(sizes)
-    rows = np.repeat(cells.offsets[chosen] - (ends - sizes), sizes) + np.arange(sizes.sum())
-    return Cells.from_types(cells.types[chosen], cells.connectivity[rows])

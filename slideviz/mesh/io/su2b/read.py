@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.mesh.check import first_fault, printable
 from slideviz.mesh.io.su2.scan import Progress
-from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks, taken
+from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks
 from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 
@@ -207,7 +207,7 @@ def sorted_back(cells: Cells, order: IntArray) -> Cells:
     """Return cells that stand in another order, by their indices ``order`` (m,)."""
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    return taken(cells, place)
+    return cells.take(place)
 
 
 def is_su2b(path: Path) -> bool:

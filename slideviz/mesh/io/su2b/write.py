@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.io.su2.read import Document
-from slideviz.mesh.io.su2b.elements import BLOCK, SIZES, taken
+from slideviz.mesh.io.su2b.elements import BLOCK, SIZES
 from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.io.su2b.read import BinaryForm
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
@@ -237,7 +237,7 @@ def _zone(mesh: Mesh, order: IntArray | None) -> Zone:
 
     def part(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
         if order is not None:
-            some = taken(cells, order[i:j])
+            some = cells.take(order[i:j])
             return some.types, some.connectivity, order[i:j]
         begin, end = cells.offsets[[i, j]]
         return cells.types[i:j], cells.connectivity[begin:end], np.arange(i, j)
