@@ -46,11 +46,11 @@ def find_period(
         Periodic markers do not match.
     """
     pairs = _pairs(case, without_halo(mesh)[0])
-    alike = case.periodic != "none"
+    periodic = case.periodic != "none"
     inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
-    frame = make_frame(inside, pairs, periodic_distance=alike)
+    frame = make_frame(inside, pairs, periodic_distance=periodic)
     coords = frame.coords(mesh.points)
-    stands = find_images(pairs if alike else (), frame, coords, boundary.nodes, mesh.extent)
+    stands = find_images(pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent)
     return pairs, frame, coords, stands
 
 

@@ -59,7 +59,7 @@ def displaced(moved: Displacements, mesh: Mesh) -> Displacements:
     return replace(moved, nodes=nodes, vectors=asked[nodes])
 
 
-def alikeness(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
+def image_tolerance(case: Case, mesh: Mesh, pairs: tuple[Pair, ...]) -> float:
     """Return by which part of the largest displacement those of periodic images may differ.
 
     Motions displace images alike but for what these are apart; files have few digits.
@@ -74,7 +74,7 @@ def prescribed(
     case: Case,
     mesh: Mesh,
     moved: Displacements,
-    alike: float,
+    tolerance: float,
     *,
     boundary: Boundary,
     fans: Fans,
@@ -85,7 +85,7 @@ def prescribed(
 
     Parameters
     ----------
-    alike
+    tolerance
         By which part of the largest displacement those of images may differ.
     """
     problem = intersection_message(case, mesh, moved.nodes, moved.vectors)
@@ -100,7 +100,7 @@ def prescribed(
     values = np.zeros(mesh.points.shape)
     values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
     largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
-    allowed = alike * largest + ROUNDING * largest_coordinate(mesh.points)
+    allowed = tolerance * largest + ROUNDING * largest_coordinate(mesh.points)
     values, source = spread(values, moved.nodes, classes.stands, allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):

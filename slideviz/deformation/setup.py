@@ -15,7 +15,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case
 from slideviz.case.motion import displacements, require_valid
 from slideviz.deformation.classes import find_classes, find_period, roles_of_copies
-from slideviz.deformation.prescribed import alikeness, displaced, prescribed
+from slideviz.deformation.prescribed import displaced, image_tolerance, prescribed
 from slideviz.deformation.reduction import find_reduction, loose_warnings
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
@@ -175,10 +175,10 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
     classes = replace(find_classes(case, mesh, boundary, fans, frame, stands), beyond=beyond)
     axis = on_axis(frame, coords)
     normals = fan_normals(boundary, fans, coords, corners_of(coords, boundary.facets, axis))
-    alike = TOLERANCE if moved else alikeness(case, mesh, pairs)
+    tolerance = TOLERANCE if moved else image_tolerance(case, mesh, pairs)
     moved = moved or displaced(displacements(asked, mesh), mesh)
     known, target, warnings = prescribed(
-        case, mesh, moved, alike, boundary=boundary, fans=fans, classes=classes, frame=frame
+        case, mesh, moved, tolerance, boundary=boundary, fans=fans, classes=classes, frame=frame
     )
     largest = float(np.linalg.norm(target, axis=1).max(initial=0.0))
     candidates = _candidates(classes, known)
