@@ -27,10 +27,8 @@ def write_slopes(vtk, points, nodes, table, turn, powers, sums, out):  # type: i
 
     Parameters
     ----------
-    points, nodes, table
-        (N, d), (m, n), and ``CORNERS[vtk]``.
-    turn : (m,) int8
-        1, or -1 for a cell that is numbered the other way round: a factor of its Jacobians.
+    points, nodes, table, turn
+        As of `slideviz.mesh.jacobians.measure`.
     powers : (2,)
         Exponents of spread and Jacobian, ``EXPONENTS`` of the metric and type.
     sums : (m,)

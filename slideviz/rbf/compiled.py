@@ -125,7 +125,7 @@ def sum_rotational(x, c, w, half, scale, out):  # type: ignore[no-untyped-def]
         out[0, i], out[1, i], out[2, i] = s0, s1, s2
 
 
-_A2 = SHAPE * SHAPE
+A2 = SHAPE * SHAPE
 BLOCK = 256
 TARGETS_PER_TASK = 64
 
@@ -164,10 +164,10 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
             q[j] = q[j] * q[j] * np.log(max(q[j], 1e-300))
     elif kind == 9:
         for j in range(count):
-            q[j] = np.sqrt(_A2 + q[j] * q[j])
+            q[j] = np.sqrt(A2 + q[j] * q[j])
     elif kind == 10:
         for j in range(count):
-            q[j] = SHAPE / np.sqrt(_A2 + q[j] * q[j])
+            q[j] = SHAPE / np.sqrt(A2 + q[j] * q[j])
     elif kind == 11:
         for j in range(count):
             q[j] = 1.0 + q[j] * q[j]
@@ -180,7 +180,7 @@ def _apply(kind, q, count):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-def]
+def distances(x, c, start, count, half, scale, q):  # type: ignore[no-untyped-def]
     """Write xi of one target x (4,) to ``count`` controls from ``start`` on."""
     c0, c1 = c[0, start : start + count], c[1, start : start + count]
     c2, c3 = c[2, start : start + count], c[3, start : start + count]
@@ -212,7 +212,7 @@ def sum_any(x, c, w, half, scale, kind, out):  # type: ignore[no-untyped-def]
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                _distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, half, scale, q)
                 _apply(kind, q, count)
                 for j in range(count):
                     s0 += w[0, start + j] * q[j]
@@ -232,7 +232,7 @@ def fill_matrix(x, c, across, along, half, scale, kind, out):  # type: ignore[no
     d, n = across.shape[0], c.shape[1]
     for a in prange(x.shape[1]):
         row = out[a]
-        _distances(x[:, a], c, 0, n, half, scale, row)
+        distances(x[:, a], c, 0, n, half, scale, row)
         if kind == 0:
             for b in range(n):
                 u = max(1.0 - row[b], 0.0)

@@ -18,7 +18,7 @@ from numba import prange
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf import compiled
-from slideviz.rbf.compiled import _A2, BLOCK, OPTIONS, TARGETS_PER_TASK, _distances, half_chord
+from slideviz.rbf.compiled import A2, BLOCK, OPTIONS, TARGETS_PER_TASK, distances, half_chord
 from slideviz.rbf.evaluate import Basis, padded_rows
 from slideviz.rbf.kernels import KERNELS, SHAPE
 
@@ -46,9 +46,9 @@ def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
         elif kind == 3:
             q[j] = -11.0 * u**7 * ((16.0 * x + 7.0) * x + 1.0)
         elif kind == 9:
-            q[j] = 0.5 / np.sqrt(_A2 + x * x)
+            q[j] = 0.5 / np.sqrt(A2 + x * x)
         elif kind == 10:
-            q[j] = -0.5 * SHAPE / ((_A2 + x * x) * np.sqrt(_A2 + x * x))
+            q[j] = -0.5 * SHAPE / ((A2 + x * x) * np.sqrt(A2 + x * x))
         elif kind == 11:
             q[j] = 1.0
         elif kind == 12:
@@ -97,7 +97,7 @@ def _reverse(x, c, wx, wc, half, scale, kind, power, out):  # type: ignore[no-un
             s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                _distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, half, scale, q)
                 _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     p = (a0 * wc[0, j] + a1 * wc[1, j] + a2 * wc[2, j]) * q[j - start]
@@ -130,7 +130,7 @@ def _forward(x, c, w, dx, dc, half, scale, kind, power, out):  # type: ignore[no
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                _distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, half, scale, q)
                 _slope(kind, power, q, count)
                 for j in range(start, start + count):
                     change = (x3 - c[3, j]) * (d3 - dc[3, j]) + (x0 - c[0, j]) * (d0 - dc[0, j])
@@ -160,7 +160,7 @@ def _sum_powers(x, c, w, half, scale, power, out):  # type: ignore[no-untyped-de
             s0, s1, s2 = 0.0, 0.0, 0.0
             for start in range(0, c.shape[1], BLOCK):
                 count = min(BLOCK, c.shape[1] - start)
-                _distances(x[:, i], c, start, count, half, scale, q)
+                distances(x[:, i], c, start, count, half, scale, q)
                 for j in range(count):
                     p = max(q[j] * q[j], TINY) ** (-0.5 * power)
                     s0 += w[0, start + j] * p
@@ -203,17 +203,8 @@ def pull_positions(
     x, c = padded_rows(targets, 4), padded_rows(controls, 4)
     out = np.empty((4, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _reverse(
-            x,
-            c,
-            padded_rows(adjoint.T, 3),
-            padded_rows(weights.T, 3),
-            basis.half,
-            1.0 / basis.radius,
-            INVERSE if power else KERNELS[basis.kernel].code,
-            power,
-            out,
-        )
+        wx, wc = padded_rows(adjoint.T, 3), padded_rows(weights.T, 3)
+        _reverse(x, c, wx, wc, *_settings(basis, power), out)
     return out[: len(targets)]
 
 
@@ -241,16 +232,11 @@ def push_positions(
     dc = np.zeros_like(c) if moved_controls is None else padded_rows(moved_controls, 4)
     out = np.empty((3, x.shape[1]))
     with compiled.one_at_a_time(x.shape[1] * c.shape[1]):
-        _forward(
-            x,
-            c,
-            padded_rows(weights.T, 3),
-            dx,
-            dc,
-            basis.half,
-            1.0 / basis.radius,
-            INVERSE if power else KERNELS[basis.kernel].code,
-            power,
-            out,
-        )
+        _forward(x, c, padded_rows(weights.T, 3), dx, dc, *_settings(basis, power), out)
     return np.ascontiguousarray(out[: weights.shape[1]].T)
+
+
+def _settings(basis: Basis, power: float) -> tuple[float, float, int, float]:
+    """Return what the loops take: half, scale, kind of function and power."""
+    kind = INVERSE if power else KERNELS[basis.kernel].code
+    return basis.half, 1.0 / basis.radius, kind, power
