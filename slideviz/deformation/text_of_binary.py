@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.deformation.measuring import Scratch
 from slideviz.mesh.io.su2.write import text_of_parts
-from slideviz.mesh.io.su2b.elements import element_blocks, elements_between, taken
+from slideviz.mesh.io.su2b.elements import element_blocks, elements_between
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace
 from slideviz.mesh.io.su2b.read import read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
@@ -79,8 +79,8 @@ def _gathered(source: Source, place: ZonePlace, where: IntArray) -> Cells:
     for part in np.split(ordered, cuts):
         first, count = int(part[0]), int(part[-1] - part[0]) + 1
         block = elements_between(source, place, place.cells, place.dim, first, count)
-        some = taken(Cells.from_types(block.types, block.nodes), part - first)
+        some = Cells.from_types(block.types, block.nodes).take(part - first)
         types.append(some.types)
         flats.append(some.connectivity)
     found = Cells.from_types(np.concatenate(types), np.concatenate(flats))
-    return taken(found, np.searchsorted(ordered, where))
+    return found.take(np.searchsorted(ordered, where))
