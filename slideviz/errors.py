@@ -40,7 +40,7 @@ class ToleranceWarning(UserWarning):
 
 
 class ConditionWarning(UserWarning):
-    """A system is so badly conditioned that derivatives have few digits."""
+    """A system is so badly conditioned that derivatives, or points too, have few digits."""
 
 
 class Cancelled(SlidevizError):

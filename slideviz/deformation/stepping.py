@@ -22,6 +22,7 @@ from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.refine import DOUBTFUL
 
 HALVINGS = 3
 """How often a step that folds a cell is halved."""
@@ -69,7 +70,7 @@ class Stepping:
         coords, done, index, folded = setup.coords, 0.0, 0, 0
         warnings = [*self.case.warnings, *setup.warnings]
         remarks: list[str] = []
-        worst = 0.0
+        worst, least = 0.0, (0.0, 0.0, 0, 0.0)
         seconds = dict(self.seconds)
         before: Solution | None = None
         made: list[Step] = []
@@ -110,9 +111,10 @@ class Stepping:
             elif not remarks:
                 remarks = _dropped_warning(solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
+            least = max(least, (solution.doubt, solution.refined, index, solution.condition))
             yield replace(
                 step,
-                warnings=(*warnings, *remarks),
+                warnings=(*warnings, *remarks, *_doubt_warning(*least)),
                 periodic_misfit=largest_misfit(setup.frame, setup.coords, points, setup.images),
             )
             seconds = {}
@@ -270,6 +272,27 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
         f"{setup.reduction.tolerance:.3g}: {solution.short}. Boundary nodes still get exactly "
         "their displacement, but what is near them follows by the correction alone"
     )
+
+
+def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -> list[str]:
+    """Return the sentence about a system whose solution cannot be trusted, or was refined."""
+    nearly = f"the system is nearly singular (condition number {condition:.0e})"
+    if doubt > DOUBTFUL:
+        sentence = (
+            f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
+            f"wrong by {100 * doubt:.2g} % of the largest; use DATA_REDUCTION= YES, a less smooth "
+            "RBF_KERNEL such as wendland-c0, or a smaller INFLUENCE_FACTOR"
+        )
+        return [sentence]
+    if refined:
+        return [
+            Note(
+                f"step {index}: {nearly}; between the boundary nodes its solution would be wrong "
+                f"by {100 * refined:.2g} % of the largest displacement, so it was refined with "
+                f"twice the digits, to {100 * doubt:.2g} %"
+            )
+        ]
+    return []
 
 
 def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:

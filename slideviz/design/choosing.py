@@ -40,9 +40,16 @@ def choose_steps(
         A step cannot be solved, or its result cannot be right.
     """
     require_memory(setup, case)
+    kept = setup
+    setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
     parts, solutions = _reference(case, mesh, replace(setup, target=targets[0]), tell)
     for target in targets[1:]:
-        solutions = _further(mesh, replace(setup, target=target), parts, solutions, tell)
+        further = _further(mesh, replace(setup, target=target), parts, solutions, tell)
+        # A system that was solved with more rows and digits for one is so for all.
+        solutions = [
+            new if new.refined >= old.refined else old
+            for old, new in zip(solutions, further, strict=True)
+        ]
     for solution in solutions:
         if len(solution.dropped) and KERNELS[setup.basis.kernel].polynomial:
             raise DeformError(
@@ -52,7 +59,7 @@ def choose_steps(
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     return tuple(
         FrozenStep(
-            setup=setup,
+            setup=kept,
             mesh=mesh,
             sliding=case.sliding,
             part=part,
@@ -60,10 +67,15 @@ def choose_steps(
             stages=solution.stages,
             dropped=solution.dropped,
             condition=solution.condition,
+            refined=solution.refined > 0.0,
             weights=weights,
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )
+
+
+def _lasting(problem: Problem) -> Problem:
+    return replace(problem, lasting=True)
 
 
 def _reference(

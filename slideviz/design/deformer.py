@@ -17,7 +17,6 @@ from slideviz.deformation.reduction import AUTO_TOLERANCE
 from slideviz.deformation.setup import Setup, make_setup
 from slideviz.deformation.solver import Progress
 from slideviz.design.choosing import choose_steps
-from slideviz.design.frozen_fit import BADLY_CONDITIONED
 from slideviz.design.frozen_step import FrozenStep, State
 from slideviz.design.given import given_input
 from slideviz.design.loops import farthest, to_points
@@ -28,6 +27,15 @@ from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
+from slideviz.rbf.refine import DOUBTFUL
+
+BADLY_CONDITIONED = 1e14
+"""From this condition number on, what a single node moves alone has few correct digits."""
+
+REMEDY = (
+    "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "
+    "wendland-c0, or a smaller INFLUENCE_FACTOR"
+)
 
 TOGETHER = 128
 """Designs that are deformed together, and share the radial functions."""
@@ -117,7 +125,7 @@ class Deformer:
         Warns
         -----
         ConditionWarning
-            The system is so badly conditioned that derivatives and points have few digits.
+            The system is so badly conditioned that derivatives, or points too, have few digits.
         """
         _require_derivative(case)
         if displacements is not None and not case.motions:
@@ -148,8 +156,10 @@ class Deformer:
         targets = [value(self._target(reference)) for reference in references]
         tell = progress or (lambda _: None)
         self._steps: tuple[FrozenStep, ...] = choose_steps(case, mesh, setup, targets, tell)
-        self._run(targets[0])  # what is discrete is chosen at the first design, and kept
-        self._warn_of_condition()
+        # What is discrete is chosen at the first design, and kept.
+        states = self._run(targets[0])
+        if not self._warn_of_doubt(np.max([state.doubt for state in states], axis=0)):
+            self._warn_of_condition()
 
     def deform(self, displacement: FloatArray | None = None) -> FloatArray:
         """Return the deformed points, (n, d), or (k, n, d) of k designs.
@@ -168,10 +178,13 @@ class Deformer:
         -----
         ToleranceWarning
             The control nodes of the reference do not suffice for a design.
+        ConditionWarning
+            Between the boundary nodes, the points of a design cannot be trusted.
         """
         given = self.displacement if displacement is None else displacement
         given = self._checked(given, "displacement")
-        points, errors = self._deformed(given)
+        points, errors, doubt = self._deformed(given)
+        self._warn_of_doubt(doubt)
         self._warn(errors, self._tolerance(given))
         return points
 
@@ -287,26 +300,28 @@ class Deformer:
             states.append(step.run(states[-1], target))
         return states[1:]
 
-    def _deformed(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return points (..., n, d) and largest errors (...,), all of them checked."""
+    def _deformed(self, displacement: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return points (..., n, d), largest errors and doubts (...,), all of them checked."""
         if displacement.ndim == 2:
             target = value(self._target(displacement))
             states = self._run(target)
-            return value(states[-1].points), self._errors(target, states)
+            doubt = np.max([state.doubt for state in states], axis=0)
+            return value(states[-1].points), self._errors(target, states), doubt
         points = np.empty((len(displacement), *self.mesh.points.shape))
         if len(self._steps) > 1 or self.mesh.halo is not None:
-            errors = np.empty(len(points))
+            errors, doubt = np.empty((2, len(points)))
             for k, each in enumerate(displacement):
-                points[k], errors[k] = self._deformed(each)
-            return points, errors
+                points[k], errors[k], doubt[k] = self._deformed(each)
+            return points, errors, doubt
         found = [
             self._together(displacement[first : first + TOGETHER], points[first : first + TOGETHER])
             for first in range(0, len(points), TOGETHER)
         ]
-        return points, np.concatenate([np.empty(0), *found])
+        errors, doubt = np.concatenate([np.empty((2, 0)), *found], axis=1)
+        return points, errors, doubt
 
     def _together(self, displacement: FloatArray, room: FloatArray) -> FloatArray:
-        """Deform designs in one step into ``room`` (k, n, d), and return their largest errors."""
+        """Deform designs in one step into ``room`` (k, n, d); return their errors and doubts."""
         setup, (step,) = self._setup, self._steps
         targets = value(self._target(displacement))
         state = step.moved(State(setup.coords), targets, room)
@@ -315,7 +330,7 @@ class Deformer:
         to_points(setup.frame, room, setup.coords, self.mesh.points)
         for points in room:
             self._require_alike_after(points)
-        return errors
+        return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
 
     def _taped(self, displacement: FloatArray) -> tuple[list[State], Variable, Variable]:
         """Return the states of a design, and input and points as variables of one tape."""
@@ -392,18 +407,36 @@ class Deformer:
         largest = np.linalg.norm(designs, axis=-1).max(axis=-1, initial=0.0)
         return AUTO_TOLERANCE * largest + ROUNDING * self.mesh.extent
 
+    def _condition(self) -> float:
+        """Return the largest condition number of the systems at the reference."""
+        return max((step.condition for step in self._steps), default=1.0)
+
     def _warn_of_condition(self) -> None:
-        worst = max((step.condition for step in self._steps), default=1.0)
+        worst = self._condition()
         if not worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
             return
         warnings.warn(
-            f"the condition number of the system is {worst:.0e}, so that derivatives, and points "
-            "between the boundary nodes, may have few correct digits; use DATA_REDUCTION= YES with "
-            "a larger tolerance, a less smooth RBF_KERNEL such as wendland-c0, or a smaller "
-            "INFLUENCE_FACTOR",
+            f"the condition number of the system is {worst:.0e}, so that derivatives by single "
+            "nodes, and points between the boundary nodes where neighbours move very differently, "
+            f"may have few correct digits; {REMEDY}",
             ConditionWarning,
             stacklevel=3,
         )
+
+    def _warn_of_doubt(self, doubt: FloatArray) -> bool:
+        """Warn where the points of designs cannot be trusted, and tell whether that is so."""
+        worst = float(doubt.max(initial=0.0))
+        if worst <= DOUBTFUL:
+            return False
+        of = "" if doubt.ndim == 0 else f" of {np.count_nonzero(doubt > DOUBTFUL)} designs"
+        warnings.warn(
+            f"the condition number of the system is {self._condition():.0e}: derivatives, and "
+            f"points{of} between the boundary nodes, may be wrong by {100 * worst:.2g} % of the "
+            f"largest displacement; {REMEDY}",
+            ConditionWarning,
+            stacklevel=3,
+        )
+        return True
 
     def _warn(self, errors: FloatArray, allowed: FloatArray) -> None:
         above = errors > allowed

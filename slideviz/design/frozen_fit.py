@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from slideviz.design.operations import columns, many, radial_sum, terms
+from slideviz.design.frozen_solve import Measured, columnwise, solved, whole
+from slideviz.design.operations import columns, radial_sum, terms
 from slideviz.design.tape import (
     Array,
     Variable,
@@ -33,11 +34,9 @@ from slideviz.rbf.exact import parts, row_names
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
+from slideviz.rbf.refine import System
 from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend, saddle_system
-
-BADLY_CONDITIONED = 1e14
-"""From this condition number on, solutions have few digits, and are refined once. Points between
-the boundary nodes are then mostly nearer to those found with 45 digits: by four times at best."""
+from slideviz.rbf.twofold import usable
 
 SINGULAR = 1e15
 """The condition number from which a system with a polynomial counts as singular."""
@@ -70,6 +69,8 @@ class FrozenFit:
     Attributes
     ----------
     found : Sum or None
+    doubt : (...,) float64
+        As of a ``Solution``.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class FrozenFit:
         chosen: Keep,
         fixed: Keep,
         refined: bool = False,
+        checked: bool = False,
     ) -> None:
         """Begin without rows.
 
@@ -91,10 +93,15 @@ class FrozenFit:
         chosen, fixed
             Keep what is discrete, and what never changes because the positions do not.
         refined
-            Whether solutions are refined once, because the systems are badly conditioned.
+            Whether systems are solved with twice the digits.
+        checked
+            Whether it is measured how wrong a solution is.
         """
         self._basis, self._features, self._dim = basis, features, dim
-        self._chosen, self._fixed, self._refined = chosen, fixed, refined
+        self._chosen, self._fixed = chosen, fixed
+        tailed = KERNELS[basis.kernel].polynomial
+        self._refined, self._checked = refined and usable(basis), checked and not tailed
+        self.doubt: FloatArray = np.zeros(())
         self._rows: Rows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
         self.found: Sum | None = None
@@ -155,6 +162,8 @@ class FrozenFit:
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
         right[..., :count, :] = value(rows.right)
         found: Array = solve(right)
+        if isinstance(solve, Measured):
+            self.doubt = np.maximum(self.doubt, solve.doubt)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             found = solution(self._residual(rows, value(found), extra), value(found), solve)
         own = take(found, np.arange(count))
@@ -194,27 +203,6 @@ class FrozenFit:
         self, rows: Rows, index: IntArray, level: int, stage: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return what solves the system of some rows, and how many unknowns a polynomial adds."""
-        solve, extra = self._direct(rows, index, level, stage)
-        if not self._refined or KERNELS[self._basis.kernel].polynomial:
-            return solve, extra
-        place = value(self._features)[:, rows.nodes]
-        normals = None if rows.normals is None else value(rows.normals)
-
-        def refined(right: FloatArray) -> FloatArray:
-            first = solve(right)
-            along = first if normals is None else normals * first
-            # As of several together: by the numbers of the matrix that was factorised.
-            met = many(self._basis, place, place, along[None])[0]
-            if normals is not None:
-                met = np.einsum("...rd,rd->...r", met, normals)[..., None]
-            return first + solve(right - met)
-
-        return refined, extra
-
-    def _direct(
-        self, rows: Rows, index: IntArray, level: int, stage: str
-    ) -> tuple[Callable[[FloatArray], FloatArray], int]:
-        """Return what solves with the factors alone, and how many unknowns a polynomial adds."""
         place = value(self._features)[:, rows.nodes]
         normals = None if rows.normals is None else value(rows.normals)
         if KERNELS[self._basis.kernel].polynomial:
@@ -224,7 +212,8 @@ class FrozenFit:
                 f"{stage} factor {level}", lambda: self._extended(place, index, level)
             )
             self._factors[level] = index, factor
-            return lambda b: _columnwise(factor.solve, b), 0
+            every = np.arange(len(index))
+            return self._measured([every], [factor], (place, None), f"{stage} system {level}"), 0
         blocks = self._chosen(
             f"{stage} blocks {level}",
             lambda: parts(ConstraintRows(rows.nodes, normals, np.empty((0, 1)))),
@@ -233,20 +222,31 @@ class FrozenFit:
             f"{stage} factor {level}",
             lambda: [self._factor(place[:, b], normals[b]) for b in blocks],
         )
+        return self._measured(blocks, factors, (place, normals), f"{stage} system {level}"), 0
 
-        def solve(right: FloatArray) -> FloatArray:
-            out = np.empty_like(right)
-            for block, factor in zip(blocks, factors, strict=True):
-                out[..., block, :] = _columnwise(factor.solve, right[..., block, :])
-            return out
+    def _measured(
+        self,
+        blocks: list[IntArray],
+        factors: list[Factor],
+        place: tuple[FloatArray, FloatArray | None],
+        name: str,
+    ) -> Callable[[FloatArray], FloatArray]:
+        """Return what solves the blocks of a system."""
+        if not (self._refined or self._checked):
+            return partial(solved, blocks, factors)
+        features, normals = place
 
-        return solve, 0
+        def make() -> list[System]:
+            places = [(features[:, b], None if normals is None else normals[b]) for b in blocks]
+            return [System(self._basis, *both) for both in zip(places, factors, strict=True)]
+
+        return Measured(blocks, self._fixed(name, make), refined=self._refined)
 
     def _factor(self, place: FloatArray, normals: FloatArray) -> Factor:
         system = matrix(self._basis, (place, normals))
         with enough_threads(len(system) ** 3 / 3):
             factor = extend(NOTHING, system)
-            return factor if not len(factor.dropped) else _whole(system)
+            return factor if self._refined or not len(factor.dropped) else whole(system)
 
     def _extended(self, place: FloatArray, index: IntArray, level: int) -> Factor:
         """Return the factor of full rows; that of the stage before is a part of it."""
@@ -259,7 +259,9 @@ class FrozenFit:
         system = matrix(self._basis, (new, None), (place, None))
         with enough_threads(len(system) * len(index) ** 2 / 3):
             grown = extend(factor, system)
-            return grown if not len(grown.dropped) else _whole(matrix(self._basis, (place, None)))
+            if self._refined or not len(grown.dropped):
+                return grown
+            return whole(matrix(self._basis, (place, None)))
 
     def _saddle(
         self, place: FloatArray, normals: FloatArray | None, name: str
@@ -294,38 +296,10 @@ class FrozenFit:
 
         def solve(right: FloatArray) -> FloatArray:
             out = np.zeros_like(right)
-            out[..., rows, :] = _columnwise(lambda b: lu_solve(factor, b), right[..., rows, :])
+            out[..., rows, :] = columnwise(lambda b: lu_solve(factor, b), right[..., rows, :])
             return out
 
         return solve, total
-
-
-def _whole(system: FloatArray) -> Factor:
-    """Return a factor of all rows of a system, also of those that the pivot guard would leave out.
-
-    Raises
-    ------
-    DeformError
-        The positions of a design make the system singular.
-    """
-    try:
-        lower = np.linalg.cholesky(system)
-    except np.linalg.LinAlgError as problem:
-        raise DeformError(
-            f"the system of the {len(system)} control rows chosen for another displacement is "
-            "singular at this design; choose them anew with `refresh(displacement)`"
-        ) from problem
-    every = np.arange(len(system))
-    return Factor(np.asfortranarray(lower), every, every[:0])
-
-
-def _columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
-    """Return the solutions for right-hand sides (..., n, m), all at once."""
-    n, m = right.shape[-2:]
-    wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
-    with enough_threads(2.0 * n * wide.size):
-        found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
-    return np.ascontiguousarray(np.moveaxis(found, 1, 0)).reshape(right.shape)
 
 
 def _firsts(nodes: IntArray) -> tuple[IntArray, IntArray]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from dataclasses import field as made_by
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slideviz.baselines.idw import Weights
-from slideviz.design.frozen_fit import BADLY_CONDITIONED, FrozenFit, Rows
+from slideviz.design.frozen_fit import FrozenFit, Rows
 from slideviz.design.frozen_spread import Spread, chosen_spread, shares
 from slideviz.design.loops import take_over
 from slideviz.design.normals import sliding_normals
@@ -40,6 +41,10 @@ from slideviz.rbf.primitives import primitives
 if TYPE_CHECKING:
     from slideviz.design.frozen_step import FrozenStep, State
 
+CHECKED = 1e11
+"""From this condition number on, solutions of further designs are checked as those of a run. Data
+reduction makes more of a difference than rounding."""
+
 ROUNDING = 1e-14
 """Part of the largest coordinate below which a distance is rounding."""
 
@@ -55,6 +60,7 @@ class _Solved:
     of: IntArray
     max_error: FloatArray
     lost: FloatArray
+    doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
 
 
 class Method:
@@ -111,6 +117,7 @@ class Method:
         """Sliding by the system itself (`slideviz.rbf.methods.direct_sliding`)."""
         setup, fit = self._setup, self._fit()
         fit.add(self._sliding_rows(), self._stages.pop(0), "first")
+        doubt = fit.doubt
         sliding = np.concatenate([self._edge, self._surface])
         nodes = np.concatenate([self._known, sliding])
         free = self._less_behind(fit.at(sliding), sliding)
@@ -123,6 +130,7 @@ class Method:
             return self._finished(fit, nodes, join(self._values, slid))
         values = join(self._values, slid)
         second = self._fit()
+        second.doubt = doubt
         self._meet(second, nodes, values)
         return self._finished(second, nodes, values)
 
@@ -163,7 +171,8 @@ class Method:
             setup.coords.shape[1],
             chosen=self._step.choices,
             fixed=self._keep,
-            refined=self._step.condition > BADLY_CONDITIONED,
+            refined=self._step.refined,
+            checked=setup.reduction is None and self._step.condition > CHECKED,
         )
 
     def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
@@ -333,7 +342,8 @@ class Method:
         if spread is not None:
             displacement = self._spread(displacement, spread, errors)
         displacement = put(displacement, nodes, values, own=True)
-        return _Solved(displacement, lag, nodes, size.max(axis=-1, initial=0.0), lost)
+        most = size.max(axis=-1, initial=0.0)
+        return _Solved(displacement, lag, nodes, most, lost, doubt=fit.doubt)
 
     def _in_room(self, displacement: Array) -> Array:
         """Return the displacement where it is to go."""

@@ -45,7 +45,7 @@ class State:
     lag : (..., b, d) or None
         What the interpolants so far lack at the boundary nodes ``of`` (b,); None without data
         reduction.
-    max_error, lost : (...,) float64
+    max_error, lost, doubt : (...,) float64
         As of a ``Solution``.
     points : (..., n, d)
         Cartesian positions; empty before the first step.
@@ -56,6 +56,7 @@ class State:
     of: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
     max_error: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     lost: FloatArray = made_by(default_factory=lambda: np.zeros(()))
+    doubt: FloatArray = made_by(default_factory=lambda: np.zeros(()))
     points: Array = made_by(default_factory=lambda: np.empty((0, 0)))
 
 
@@ -92,6 +93,8 @@ class FrozenStep:
         Nodes that the pivot guard left out of them.
     condition : float
         Estimated condition number of the last of them, at the reference.
+    refined : bool
+        Whether they are solved with twice the digits, as at the reference.
     weights : Weights or None
         Of inverse distance weighting, where that is the method.
     choices, constants : Kept
@@ -106,6 +109,7 @@ class FrozenStep:
     stages: tuple[Levels, ...]
     dropped: IntArray
     condition: float
+    refined: bool = False
     weights: Weights | None = None
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
@@ -145,7 +149,9 @@ class FrozenStep:
             displacement = put(displacement, on, still, own=True)
         moved = _shifted(before.coords, displacement, own=True)
         moved = put(moved, setup.known, goal, own=True)
-        return State(moved, solved.lag, solved.of, solved.max_error, solved.lost)
+        return State(
+            moved, solved.lag, solved.of, solved.max_error, solved.lost, doubt=solved.doubt
+        )
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
         """Return coordinates and points, with copies in place."""

@@ -50,9 +50,8 @@ OPTIONS: dict[str, Any] = {
 
 # (1 - cos g) / g^2 as a polynomial in t = g^2. The arguments of Eq. 2.15 stay below 2 (a full
 # turn), where nine terms are right to 4e-13; below 1 (half a turn) to the last bit.
-_K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = (
-    (-1.0) ** k / float(factorial(2 * k + 2)) for k in range(9)
-)
+_K = tuple((-1.0) ** k / float(factorial(2 * k + 2)) for k in range(9))
+_K0, _K1, _K2, _K3, _K4, _K5, _K6, _K7, _K8 = _K
 
 
 @njit(inline="always", **OPTIONS)

@@ -10,6 +10,7 @@ from slideviz.rbf.evaluate import Tick, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
+from slideviz.rbf.refine import TRUSTED, System, between
 from slideviz.rbf.solve import (
     NOTHING,
     Factor,
@@ -19,6 +20,10 @@ from slideviz.rbf.solve import (
     saddle_condition,
     solve_saddle,
 )
+from slideviz.rbf.twofold import usable
+
+BETTER = 0.1
+"""A refined solution counts where it is so much less wrong than the first."""
 
 
 class ExactFit:
@@ -34,6 +39,8 @@ class ExactFit:
         Nodes of which the pivot guard left out a constraint.
     short : str
         Empty: there is no tolerance that it could miss.
+    doubt, refined : float
+        As of a ``Solution``.
     stages : tuple of Levels
         The rows in the system after each call of ``add``.
     """
@@ -49,6 +56,7 @@ class ExactFit:
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
         self.dropped: IntArray = np.empty(0, np.int64)
         self.stages: tuple[Levels, ...] = ()
+        self.doubt = self.refined = 0.0
 
     def add(self, rows: ConstraintRows) -> None:
         """Solve with these rows and all before them."""
@@ -61,6 +69,7 @@ class ExactFit:
             if KERNELS[problem.basis.kernel].polynomial:
                 self.found, deficient = saddle_fit(problem, rows)
                 self.dropped = np.unique(rows.nodes) if deficient else np.empty(0, np.int64)
+                self.doubt = max(self.doubt, saddle_doubt(problem, rows, self.found))
                 self.stages += ((row_names(rows),),)
                 return
             weights = np.zeros_like(rows.right)
@@ -75,9 +84,9 @@ class ExactFit:
     ) -> IntArray:
         """Write the weights of one block of rows, of which those below ``done`` are factorised.
 
-        Returns the rows that the pivot guard left out.
+        Returns the rows that are not met because the pivot guard left them out.
         """
-        problem, new = self._problem, part[part >= done]
+        problem, new, right = self._problem, part[part >= done], rows.right[part]
 
         def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
             normals = None if rows.normals is None else rows.normals[index]
@@ -87,9 +96,39 @@ class ExactFit:
         first = int(part[0])
         with enough_threads(len(system) * len(part) ** 2 / 3):
             factor = extend(self._factors.get(first, NOTHING), system, tick)
-            weights[part] = factor.solve(rows.right[part])
+            found = factor.solve(right)
         self._factors[first] = factor
-        return part[factor.dropped]
+        largest = float(np.abs(rows.right).max(initial=0.0))
+        system_ = System(problem.basis, place(part), factor)
+        weights[part], met = self._checked(system_, right, found, largest, tick)
+        return part[factor.dropped[:0] if met else factor.dropped]
+
+    def _checked(
+        self, system: System, right: FloatArray, found: FloatArray, largest: float, tick: Tick
+    ) -> tuple[FloatArray, bool]:
+        """Return weights that can be trusted, as far as there are any, and whether they are others.
+
+        Others meet all rows, those too that the pivot guard left out.
+        """
+        trials = [(right, found, largest)]
+        if self._problem.lasting:
+            rough = system.rough_data()
+            trials.append((rough, system.factor.solve(rough), 1.0))
+        wrong = [
+            float(system.wrong(data, first).max(initial=0.0)) / (size or 1.0)
+            for data, first, size in trials
+        ]
+        if max(wrong) > TRUSTED and usable(system.basis):
+            refined = [
+                system.refined(data, np.full(data.shape[1], size), first, lambda _: tick(1.0))
+                for data, first, size in trials
+            ]
+            doubt = [float(each.doubt.max(initial=0.0)) for each in refined]
+            if max(doubt) < BETTER * max(wrong):
+                self.refined, self.doubt = max(self.refined, *wrong), max(self.doubt, doubt[0])
+                return refined[0].weights, True
+        self.doubt = max(self.doubt, wrong[0])
+        return found, False
 
     def condition(self) -> float:
         """Return an estimate of the condition number of the last system."""
@@ -149,3 +188,15 @@ def saddle_fit(problem: Problem, rows: ConstraintRows) -> tuple[Interpolant, boo
     solved = solve_saddle(matrix(problem.basis, place), row_terms(problem, rows), rows.right)
     d = problem.values.shape[1]
     return gathered(rows, solved.weights, solved.tail.reshape(-1, d)), solved.rank_deficient
+
+
+def saddle_doubt(problem: Problem, rows: ConstraintRows, found: Interpolant) -> float:
+    """Return by how much the field of a solved system with polynomial is wrong (`refine`)."""
+    largest = float(np.abs(rows.right).max(initial=0.0))
+    met = found.at(problem, rows.nodes)
+    if rows.normals is not None:
+        met = np.einsum("rd,rd->r", met, rows.normals)[:, None]
+    lacking = ConstraintRows(rows.nodes, rows.normals, rows.right - met)
+    field = saddle_fit(problem, lacking)[0].field(problem)
+    wrong = np.abs(field.interpolated(between(problem.features[:, rows.nodes]))).max(initial=0.0)
+    return float(wrong / largest) if wrong > TRUSTED * largest else 0.0

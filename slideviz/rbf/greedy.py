@@ -77,6 +77,7 @@ class GreedyFit:
         self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
         self.dropped: IntArray = np.empty(0, np.int64)
         self.stages: tuple[Levels, ...] = ()
+        self.doubt = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
         self._level = history[-1].level if history else 1
         self._rows = ConstraintRows(np.empty(0, np.int64), None, np.empty((0, d)))

@@ -48,6 +48,8 @@ class Fit(Protocol):
     short: str
     history: tuple[Cycle, ...]
     stages: tuple[Levels, ...]
+    doubt: float
+    refined: float
 
     def add(self, rows: ConstraintRows) -> None:
         """Meet further constraints, exactly or to the tolerance."""
@@ -106,7 +108,12 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
     second = _fit(problem, watch, fit.history)
     second.add(full_rows(problem, nodes, values))
     found = _finish(problem, watch, second, nodes, values)
-    return replace(found, stages=(*fit.stages, *found.stages))
+    return replace(
+        found,
+        stages=(*fit.stages, *found.stages),
+        doubt=max(fit.doubt, found.doubt),
+        refined=max(fit.refined, found.refined),
+    )
 
 
 def within(problem: Problem, nodes: IntArray, free: FloatArray) -> FloatArray:
@@ -188,6 +195,8 @@ def _finish(
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
         lost=lost,
+        doubt=fit.doubt,
+        refined=fit.refined,
         field=replace(fit.found.field(problem), correction=correction),
         stages=fit.stages,
     )

@@ -108,6 +108,9 @@ class Problem:
         None: all candidates are control nodes.
     before : Solution or None
         That of the step before.
+    lasting : bool
+        Whether the system is to be solved for other data too, so that these alone do not tell
+        whether its solutions can be trusted.
     """
 
     basis: Basis
@@ -126,6 +129,7 @@ class Problem:
     shift: FloatArray
     reduction: Reduction | None = None
     before: Solution | None = None
+    lasting: bool = False
 
     def behind(self, nodes: IntArray) -> FloatArray:
         """Return how much the interpolants of all steps before lack at nodes, (m, d)."""
@@ -179,6 +183,12 @@ class Solution:
     lost : float
         By how much the solution of an exact system misses its own control nodes, before they
         are set.
+    doubt : float
+        By how much the field of an exact system may be wrong between its control nodes, measured
+        at some points, as a part of the largest displacement.
+    refined : float
+        The same of the ordinary solution, where it was too much and a refined one was found; else
+        0.
     field : Field or None
         What displaced the nodes that are no boundary; None where a method has no such thing.
     stages : tuple of Levels
@@ -198,6 +208,8 @@ class Solution:
     dropped_error: float = 0.0
     short: str = ""
     lost: float = 0.0
+    doubt: float = 0.0
+    refined: float = 0.0
     field: Field | None = None
     stages: tuple[Levels, ...] = ()
 

@@ -1,0 +1,83 @@
+"""Solutions with factors that are kept, of several designs at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from slideviz.errors import DeformError
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.refine import System
+from slideviz.rbf.solve import Factor, enough_threads
+
+
+class Measured:
+    """Solves a system in blocks, and measures how wrong the fields of its solutions are.
+
+    Attributes
+    ----------
+    doubt : (...,) float64
+        Of the last solutions, as a part of their largest datum.
+    """
+
+    def __init__(self, blocks: list[IntArray], systems: list[System], *, refined: bool) -> None:
+        self._blocks, self._systems, self._refined = blocks, systems, refined
+        self.doubt: FloatArray = np.zeros(())
+
+    def __call__(self, right: FloatArray) -> FloatArray:
+        """Return the solutions (..., n, m) for right-hand sides, all at once."""
+        n, m = right.shape[-2:]
+        wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
+        largest = np.repeat(np.abs(right).max(axis=(-1, -2), initial=0.0).ravel(), m)
+        out, doubt = np.empty_like(wide), np.zeros(len(largest))
+        for block, system in zip(self._blocks, self._systems, strict=True):
+            with enough_threads(2.0 * len(block) * wide[block].size):
+                found = system.factor.solve(wide[block])
+                if self._refined:
+                    refined = system.refined(wide[block], largest, found)
+                    found, wrong = refined.weights, refined.doubt
+                else:
+                    parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
+                    off = [system.wrong(wide[block, at], found[:, at]) for at in parts]
+                    wrong = np.concatenate(off) / np.where(largest > 0.0, largest, 1.0)
+            out[block], doubt = found, np.maximum(doubt, wrong)
+        self.doubt = doubt.reshape(*right.shape[:-2], m).max(axis=-1)
+        shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
+        return np.ascontiguousarray(shaped).reshape(right.shape)
+
+
+def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> FloatArray:
+    """Return the solutions (..., n, m) of a system in blocks with factors of all their rows."""
+    out = np.empty_like(right)
+    for block, factor in zip(blocks, factors, strict=True):
+        out[..., block, :] = columnwise(factor.solve, right[..., block, :])
+    return out
+
+
+def whole(system: FloatArray) -> Factor:
+    """Return a factor of all rows of a system, also of those that the pivot guard would leave out.
+
+    Raises
+    ------
+    DeformError
+        The positions of a design make the system singular.
+    """
+    try:
+        lower = np.linalg.cholesky(system)
+    except np.linalg.LinAlgError as problem:
+        raise DeformError(
+            f"the system of the {len(system)} control rows chosen for another displacement is "
+            "singular at this design; choose them anew with `refresh(displacement)`"
+        ) from problem
+    every = np.arange(len(system))
+    return Factor(np.asfortranarray(lower), every, every[:0])
+
+
+def columnwise(solve: Callable[[FloatArray], FloatArray], right: FloatArray) -> FloatArray:
+    """Return the solutions for right-hand sides (..., n, m), all at once."""
+    n, m = right.shape[-2:]
+    wide = np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1)
+    with enough_threads(2.0 * n * wide.size):
+        found = solve(np.ascontiguousarray(wide)).reshape(n, -1, m)
+    return np.ascontiguousarray(np.moveaxis(found, 1, 0)).reshape(right.shape)

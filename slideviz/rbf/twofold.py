@@ -1,0 +1,239 @@
+"""Residuals of interpolation systems with twice the digits of a float64.
+
+A number is the unevaluated sum of two: its rounding to a float64, and what that leaves (Dekker
+1971). Distances and radial functions of the given features, products and sums are made so, to about
+1e-31, and only what a system lacks is rounded. Where weights are 1e9 times as large as the
+data, the sum of ordinary products has lost nine digits; this one has not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field as made_by
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from slideviz.mesh.caching import njit
+from slideviz.mesh.model import FloatArray
+from slideviz.rbf.compiled import _K, one_at_a_time
+from slideviz.rbf.evaluate import Basis, Tick, no_tick
+from slideviz.rbf.kernels import KERNELS
+
+# Without "fastmath", which takes a + b - a for b.
+_OPTIONS: dict[str, Any] = {"nogil": True, "cache": True, "error_model": "numpy"}
+
+FUNCTIONS: dict[str, tuple[int, tuple[float, ...]]] = {
+    "wendland-c2": (4, (1.0, 4.0)),
+    "wendland-c0": (2, (1.0,)),
+    "wendland-c4": (6, (1.0, 6.0, 35.0 / 3.0)),
+    "wendland-c6": (8, (1.0, 8.0, 25.0, 32.0)),
+    "ctps-c0": (5, (1.0,)),
+}
+"""The radial functions that are (1 - xi)^p times a polynomial: p and the polynomial's terms."""
+
+PAIRS = 1_000_000
+"""Pairs between two calls of ``tick``: some tens of milliseconds."""
+
+KEPT = 2000
+"""Rows of the largest system that is kept: 64 MB."""
+
+
+@njit(inline="always", **_OPTIONS)
+def _sum(a, b):  # type: ignore[no-untyped-def]
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@njit(inline="always", **_OPTIONS)
+def _product(a, b):  # type: ignore[no-untyped-def]
+    t, u = 134217729.0 * a, 134217729.0 * b
+    a1, b1 = t - (t - a), u - (u - b)
+    a2, b2 = a - a1, b - b1
+    p = a * b
+    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+@njit(inline="always", **_OPTIONS)
+def _joined(a, b):  # type: ignore[no-untyped-def]
+    """Return a + b for |a| >= |b|."""
+    s = a + b
+    return s, b - (s - a)
+
+
+@njit(inline="always", **_OPTIONS)
+def _plus(a, al, b, bl):  # type: ignore[no-untyped-def]
+    s, e = _sum(a, b)
+    t, f = _sum(al, bl)
+    s, e = _joined(s, e + t)
+    return _joined(s, e + f)
+
+
+@njit(inline="always", **_OPTIONS)
+def _times(a, al, b, bl):  # type: ignore[no-untyped-def]
+    p, e = _product(a, b)
+    return _joined(p, e + (a * bl + al * b))
+
+
+@njit(inline="always", **_OPTIONS)
+def _root(a, al):  # type: ignore[no-untyped-def]
+    first = np.sqrt(max(a, 1e-300))
+    p, e = _product(first, first)
+    rest, lost = _plus(a, al, -p, -e)
+    return _joined(first, (rest + lost) * (0.5 / first))
+
+
+@njit(inline="always", **_OPTIONS)
+def _half_chord(g, gl):  # type: ignore[no-untyped-def]
+    """Return 1 - cos g by the terms of ``compiled.half_chord``."""
+    t, tl = _times(g, gl, g, gl)
+    p, pl = _K[8], 0.0
+    for k in range(7, -1, -1):
+        p, pl = _times(p, pl, t, tl)
+        p, pl = _plus(p, pl, _K[k], 0.0)
+    return _times(p, pl, t, tl)
+
+
+@njit(inline="always", **_OPTIONS)
+def _plus_square(s, sl, a, b):  # type: ignore[no-untyped-def]
+    d, dl = _sum(a, -b)
+    p, pl = _times(d, dl, d, dl)
+    return _plus(s, sl, p, pl)
+
+
+@njit(**_OPTIONS)
+def _distances(x, i, half, scale, q, ql):  # type: ignore[no-untyped-def]
+    """Write xi of node i to all nodes x (4, n) to q + ql."""
+    c0, c1, c2, c3 = x[0], x[1], x[2], x[3]
+    x0, x1, x2, x3 = x[0, i], x[1, i], x[2, i], x[3, i]
+    for j in range(x.shape[1]):
+        s, sl = _plus_square(0.0, 0.0, x0, c0[j])
+        s, sl = _plus_square(s, sl, x3, c3[j])
+        if half > 0.0:
+            a, al = _product(x1, c2[j])
+            b, bl = _product(x2, c1[j])
+            g, gl = _plus(a, al, -b, -bl)
+            g, gl = _times(g, gl, half, 0.0)
+            h, hl = _half_chord(g, gl)
+            r, rl = _product(2.0 * x0, c0[j])
+            h, hl = _times(h, hl, r, rl)
+            s, sl = _plus(s, sl, h, hl)
+        else:
+            s, sl = _plus_square(s, sl, x1, c1[j])
+            s, sl = _plus_square(s, sl, x2, c2[j])
+        r, rl = _root(s, sl)
+        q[j], ql[j] = _times(r, rl, scale, 0.0)
+
+
+@njit(**_OPTIONS)
+def _apply(power, terms, q, ql, v, vl):  # type: ignore[no-untyped-def]
+    """Write the radial function of xi = q + ql to v + vl."""
+    n = len(q)
+    v[:], vl[:] = terms[-1], 0.0
+    for k in range(len(terms) - 2, -1, -1):
+        for j in range(n):
+            p, pl = _times(v[j], vl[j], q[j], ql[j])
+            v[j], vl[j] = _plus(p, pl, terms[k], 0.0)
+    for j in range(n):
+        u, ul = _plus(1.0, 0.0, -q[j], -ql[j])
+        inside = 1.0 if u > 0.0 else 0.0
+        q[j], ql[j] = inside * u, inside * ul
+    for _ in range(power):
+        for j in range(n):
+            v[j], vl[j] = _times(v[j], vl[j], q[j], ql[j])
+
+
+@njit(**_OPTIONS)
+def _turn(across, i, v, vl):  # type: ignore[no-untyped-def]
+    """Multiply v + vl with the scalar products of direction i and all directions (d, n)."""
+    for j in range(len(v)):
+        dot, lost = 0.0, 0.0
+        for k in range(across.shape[0]):
+            p, pl = _product(across[k, i], across[k, j])
+            dot, lost = _plus(dot, lost, p, pl)
+        v[j], vl[j] = _times(v[j], vl[j], dot, lost)
+
+
+@njit(parallel=True, **_OPTIONS)
+def _fill(x, across, first, half, scale, power, terms, v, vl):  # type: ignore[no-untyped-def]
+    n = x.shape[1]
+    for row in prange(len(v)):
+        q, ql = np.empty(n), np.empty(n)
+        _distances(x, first + row, half, scale, q, ql)
+        _apply(power, terms, q, ql, v[row], vl[row])
+        if across.shape[0] > 0:
+            _turn(across, first + row, v[row], vl[row])
+
+
+@njit(parallel=True, **_OPTIONS)
+def _lacking(v, vl, right, weights, low, out):  # type: ignore[no-untyped-def]
+    for i in prange(len(v)):
+        for k in range(len(weights)):
+            total, lost = right[i, k], 0.0
+            for j in range(v.shape[1]):
+                p, e = _product(v[i, j], -weights[k, j])
+                total, f = _sum(total, p)
+                lost += e + f - (vl[i, j] * weights[k, j] + v[i, j] * low[k, j])
+            out[i, k] = total + lost
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """A system whose residuals have twice the digits.
+
+    Attributes
+    ----------
+    basis : Basis
+        Its kernel is one of ``FUNCTIONS``.
+    place : tuple
+        Features (k, n) of the node of each row, and its unit direction (n, d) or None.
+    """
+
+    basis: Basis
+    place: tuple[FloatArray, FloatArray | None]
+    _kept: dict[int, tuple[FloatArray, FloatArray]] = made_by(default_factory=dict)
+
+    def __call__(
+        self, right: FloatArray, weights: FloatArray, low: FloatArray, tick: Tick = no_tick
+    ) -> FloatArray:
+        """Return what the system lacks, ``right - G (weights + low)`` (n, m), rounded once.
+
+        Parameters
+        ----------
+        right, weights, low : (n, m)
+            ``low`` is far smaller than ``weights``.
+        """
+        out, n = np.empty_like(right), len(right)
+        w, wl = np.ascontiguousarray(weights.T), np.ascontiguousarray(low.T)
+        size = max(1, PAIRS // max(1, n))
+        for first in range(0, n, size):
+            part = slice(first, min(n, first + size))
+            rows, rest = self._rows(part, n)
+            with one_at_a_time(10 * rows.size * len(w)):
+                _lacking(rows, rest, np.ascontiguousarray(right[part]), w, wl, out[part])
+            tick(part.stop / n)
+        return out
+
+    def _rows(self, part: slice, n: int) -> tuple[FloatArray, FloatArray]:
+        """Return some rows of G, and what their rounding leaves; kept where they are few."""
+        if part.start in self._kept:
+            return self._kept[part.start]
+        features, normals = self.place
+        x = np.zeros((4, n))
+        x[: len(features)] = features
+        across = np.zeros((0, n)) if normals is None else np.ascontiguousarray(normals.T)
+        power, terms = FUNCTIONS[self.basis.kernel]
+        found, rest = np.empty((2, part.stop - part.start, n))
+        scale, half = 1.0 / self.basis.radius, self.basis.half
+        with one_at_a_time(100 * found.size):
+            _fill(x, across, part.start, half, scale, power, np.array(terms), found, rest)
+        if n <= KEPT:
+            self._kept[part.start] = found, rest
+        return found, rest
+
+
+def usable(basis: Basis) -> bool:
+    """Tell whether a kernel has these residuals."""
+    return basis.kernel in FUNCTIONS and not KERNELS[basis.kernel].polynomial

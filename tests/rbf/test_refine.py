@@ -1,0 +1,90 @@
+"""Nearly singular systems: residuals, measured errors and refined solutions, against 50 digits."""
+
+from __future__ import annotations
+
+from decimal import localcontext
+
+import numpy as np
+import pytest
+
+from slideviz.rbf.evaluate import Basis, matrix
+from slideviz.rbf.refine import System
+from slideviz.rbf.solve import factorise
+from slideviz.rbf.twofold import FUNCTIONS, Residuals
+from tests.oracles import digits
+
+
+def profile(size):
+    """Points of a thin profile in a far field, and whether they are of the profile."""
+    t = 2.0 * np.pi * np.arange(24) / 24
+    thin = np.stack([np.cos(t), 0.05 * np.sin(t) * np.sin(t / 2.0)], axis=1)
+    far = np.stack([np.cos(t[::4]), np.sin(t[::4])], axis=1)
+    return np.concatenate([size * thin, far]), np.arange(30) < 24
+
+
+@pytest.mark.parametrize("kernel", FUNCTIONS)
+@pytest.mark.parametrize("turned", [False, True], ids=["axes", "directions"])
+def test_residuals_have_twice_the_digits(kernel, turned):
+    rng = np.random.default_rng(0)
+    points = rng.uniform(size=(12, 3)) * [1.0, 2.0, 4.0]
+    normals = rng.normal(size=points.shape) if turned else None
+    right, weights = rng.normal(size=(12, 2)), 1e12 * rng.normal(size=(12, 2))
+    low = 1e-6 * rng.normal(size=(12, 2))
+    basis = Basis(4.0, kernel=kernel)  # a power of two: the oracle divides by it
+    with localcontext() as context:
+        context.prec = 50
+        system = digits.matrix(points, points, 4.0, kernel)
+        if normals is not None:
+            system = system * (digits.EXACT(normals) @ digits.EXACT(normals).T)
+        exact = digits.EXACT(right) - system @ (digits.EXACT(weights) + digits.EXACT(low))
+    found = Residuals(basis, (points.T.copy(), normals))(right, weights, low)
+    np.testing.assert_allclose(found, exact.astype(float), rtol=1e-12)
+
+
+def test_residuals_with_rotational_distances_are_those_of_the_matrix():
+    rng = np.random.default_rng(1)
+    points = rng.uniform(0.5, 1.5, size=(20, 3))
+    basis = Basis(4.0, period=0.5)
+    angle = points[:, 1] * np.pi / 0.5
+    features = np.stack([points[:, 0], np.sin(angle), np.cos(angle), points[:, 2]])
+    weights = rng.normal(size=(20, 1))
+    nothing = np.zeros_like(weights)
+    found = Residuals(basis, (features, None))(nothing, weights, nothing)
+    np.testing.assert_allclose(found, -matrix(basis, (features, None)) @ weights, rtol=1e-12)
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["axes", "directions"])
+@pytest.mark.parametrize("dropped", [False, True], ids=["whole", "dropped"])
+def test_the_error_is_measured_and_mended(turned, dropped):
+    size = 1e-3 if dropped else 0.02
+    points, inside = profile(size)
+    values = np.sin(points[:, ::-1] / size) * inside[:, None]
+    angle = np.random.default_rng(2).uniform(0.0, 0.5, size=len(points))
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1) if turned else None
+    right = values if normals is None else (values * normals).sum(axis=1, keepdims=True)
+    basis = Basis(4.0)
+    features = points.T.copy()
+    factor = factorise(matrix(basis, (features, normals)))
+    assert bool(len(factor.dropped)) == dropped
+    with localcontext() as context:
+        context.prec = 50
+        exact = digits.matrix(points, points, 4.0)
+        if normals is not None:
+            exact = exact * (digits.EXACT(normals) @ digits.EXACT(normals).T)
+        weights = digits.solved(exact, digits.EXACT(right))
+        field = digits.matrix(0.9 * points, points, 4.0)
+        if normals is not None:
+            weights = weights * digits.EXACT(normals)
+        truth = (field @ weights).astype(float)
+    system = System(basis, (features, normals), factor)
+
+    def error(found):
+        along = found if normals is None else found * normals
+        return np.abs(matrix(basis, (0.9 * features, None), (features, None)) @ along - truth).max()
+
+    first = factor.solve(right)
+    refined = system.refined(right, np.ones(right.shape[1]), first)
+    assert error(refined.weights) < 0.01 * error(first)
+    assert error(refined.weights) <= refined.doubt.max() + 1e-12
+    assert refined.doubt.max() < 1e-4
+    assert 0.03 * error(first) < system.wrong(right, first).max() < 30.0 * error(first)
