@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING
 
 from qtpy.QtCore import QObject, QSettings, QStandardPaths, QTimer
 
-from slideviz.case.model import FromFile
 from slideviz.errors import SlidevizError
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import questions
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.files import usual_ending
+from slideviz.mesh.io.files import is_source, usual_ending
 from slideviz.session import changes, jobs
 from slideviz.session.formats import left_out
-from slideviz.session.keep import keep_view
+from slideviz.session.keep import files_beside, keep_view
 from slideviz.session.unsaved import Unsaved
 
 if TYPE_CHECKING:
@@ -75,8 +74,7 @@ class Files(QObject):
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
-        path = questions.ask_open(self.window, self.folder())
-        if path is not None:
+        if path := questions.ask_open(self.window, self.folder()):
             self.open_path(path)
 
     def open_path(self, path: Path, zone: int | None = None) -> None:
@@ -100,8 +98,7 @@ class Files(QObject):
         from slideviz.samples.table import SAMPLES
 
         sizes = {name: jobs.SIZES.get(name, SAMPLES[name].size) for name in self.samples}
-        found = questions.ask_sample(self.window, self.samples, sizes)
-        if found is not None:
+        if found := questions.ask_sample(self.window, self.samples, sizes):
             self.open_sample(found[0], size=found[1])
 
     def open_sample(self, name: str, run: bool = False, size: int | None = None) -> None:
@@ -194,7 +191,7 @@ class Files(QObject):
         path = questions.ask_save(self.window, "Save mesh", default, filters)
         if path is None:
             return
-        overwrite = _same(path, session.path)
+        overwrite = is_source(path, session.mesh)
         if overwrite and not questions.ask_overwrite_input(self.window, path):
             return
         self.settings.setValue("folder", str(path.parent))
@@ -212,11 +209,12 @@ class Files(QObject):
     def ask_output(self) -> Path | None:
         """Ask where the deformed mesh goes of one that stays in its file, which no run changes."""
         session = self.window.store.session
+        assert session.mesh is not None
         default = session.case.mesh_out or self.folder() / f"{self.stem()}_deformed.su2b"
         path = questions.ask_save(
             self.window, "Deformed mesh", default, "SU2 binary meshes (*.su2b)"
         )
-        if path is None or not _same(path, session.path):
+        if path is None or not is_source(path, session.mesh):
             return path
         self.window.banner.tell_error(
             SlidevizError(f"{path} is the mesh itself, which is read meanwhile; give another name")
@@ -273,16 +271,7 @@ class Files(QObject):
 
         Return whether the case can be saved.
         """
-        case = self.window.store.session.case
-        used = [case.mesh_file, *(m.path for m in case.motions if isinstance(m, FromFile))]
-        ours = [file for file in used if file and sample_folder() in file.parents]
-        moved = {
-            file: path.with_suffix(file.suffix)
-            if file == case.mesh_file
-            else path.with_name(f"{path.stem}_{file.name}")
-            for file in ours
-            if file.is_file() and sample_folder() not in path.parents
-        }
+        moved = files_beside(self.window.store.session.case, path, sample_folder())
         there = [target for target in moved.values() if target.exists()]
         if there and not questions.ask_replace(self.window, there):
             return False
@@ -296,13 +285,6 @@ class Files(QObject):
         if moved:
             self.window.store.change(changes.moved_files, moved)
         return True
-
-
-def _same(path: Path, other: Path | None) -> bool:
-    try:
-        return other is not None and path.samefile(other)
-    except OSError:
-        return False
 
 
 def sample_folder() -> Path:

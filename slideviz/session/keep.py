@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from slideviz.case.model import Case
+from slideviz.case.model import Case, FromFile
 from slideviz.case.view_keys import SectionText, hyphened
 from slideviz.sections.model import Section
 from slideviz.session.state import Session, ViewState
@@ -101,3 +101,17 @@ def _section(text: SectionText) -> Section:
     *size, a, b, c, x, y, z = numbers
     section = Section.of(kind, (x, y, z), (a, b, c), sum(size))
     return replace(section, whole=whole, shown=shown, flat=flat)
+
+
+def files_beside(case: Case, path: Path, folder: Path) -> dict[Path, Path]:
+    """Return where the files of a case that are in a folder go, to be beside it at ``path``."""
+    if folder in path.parents:
+        return {}
+    used = [case.mesh_file, *(m.path for m in case.motions if isinstance(m, FromFile))]
+    return {
+        file: path.with_suffix(file.suffix)
+        if file == case.mesh_file
+        else path.with_name(f"{path.stem}_{file.name}")
+        for file in used
+        if file and folder in file.parents and file.is_file()
+    }

@@ -151,7 +151,7 @@ def write(
     >>> sv.write("square.vtu", square, cell_data={"quality": sv.quality(square).values})
     """
     path = Path(path)
-    if not overwrite and _is_source(path, mesh):
+    if not overwrite and is_source(path, mesh):
         raise path_error(
             path,
             "this is the file that the mesh was read from; choose another name, or ask "
@@ -204,7 +204,8 @@ def _write_other(
         write_other_format(path, mesh, values, point_data, replaces)
 
 
-def _is_source(path: Path, mesh: Mesh) -> bool:
+def is_source(path: Path, mesh: Mesh) -> bool:
+    """Tell whether a path is that of the file that a mesh was read from, which is still there."""
     try:
         return mesh.source is not None and path.samefile(mesh.source)
     except OSError:
