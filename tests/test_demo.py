@@ -11,6 +11,7 @@ import pytest
 HERE = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_the_demo_tells_every_file_that_it_writes(tmp_path):
     (tmp_path / "tools").mkdir()

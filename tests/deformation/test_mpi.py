@@ -170,6 +170,7 @@ def test_what_moves_nodes_can_be_sent(tmp_path, monkeypatch, name, size, sets):
 
 
 @needs_mpi
+@pytest.mark.slow
 def test_steps_are_found_by_all_and_inverted_cells_told_by_one(square):
     """Unsound trials are errors of some rank, after which all go on together."""
     words = ("--set", "STEPS=auto", "--set", "SLIDING_MODE=none", "--set", "PERIODIC_MODE=none")

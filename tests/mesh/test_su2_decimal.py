@@ -53,8 +53,8 @@ def usual(rng: np.random.Generator) -> list[float]:
 def halfway(rng: np.random.Generator) -> list[str]:
     """Return numbers just between two float64, and just beside that."""
     words = []
-    mantissas = rng.integers(2**52, 2**53, MANY // 10).tolist()
-    for m, e in zip(mantissas, rng.integers(-80, 80, MANY // 10).tolist(), strict=True):
+    mantissas = rng.integers(2**52, 2**53, MANY // 40).tolist()
+    for m, e in zip(mantissas, rng.integers(-80, 80, MANY // 40).tolist(), strict=True):
         middle = (2 * m + 1) << max(e, 0)
         middle *= 5 ** max(-e, 0)
         words += [f"{10 * middle + d}e{min(e, 0) - 1}" for d in (-1, 0, 1)]
