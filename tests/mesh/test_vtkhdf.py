@@ -8,7 +8,7 @@ from itertools import pairwise
 import h5py
 import numpy as np
 import pytest
-from builders import cube, square
+from builders import cube, grid, square
 from su2_samples import SOLID, SQUARE, bits, save
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
@@ -17,6 +17,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from slideviz import quality
 from slideviz.cli import run
 from slideviz.errors import MeshError
+from slideviz.mesh.io import vtkhdf
 from slideviz.mesh.io.files import read, write
 from slideviz.mesh.io.vtkhdf import vtkhdf_series
 from slideviz.mesh.model import Marker
@@ -154,6 +155,46 @@ def test_steps_have_their_points_and_one_topology(tmp_path, mesh):
         assert volume["Connectivity"].size == len(mesh.cells.connectivity)
         assert volume["Types"].size == len(mesh.cells)
         assert len(volume["Points"]) == 4 * len(mesh.points)
+
+
+def pieces(path, count, step=0):
+    """Return the partitions of the first block that each of several processes reads, by number."""
+    found = []
+    for piece in range(count):
+        reader = vtkHDFReader()
+        reader.SetFileName(str(path))
+        reader.UpdateInformation()
+        reader.SetStep(step)
+        reader.UpdatePiece(piece, count, 0)
+        out = reader.GetOutput()
+        grids = (out.GetPartition(0, k) for k in range(out.GetNumberOfPartitions(0)))
+        found.append({k: Found(grid) for k, grid in enumerate(grids) if grid is not None})
+    return found
+
+
+@pytest.mark.skipif(VTK_VERSION < (9, 7), reason="VTK gives each process its partitions since 9.7")
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_partitions_are_shared_by_processes(tmp_path, monkeypatch, count):
+    mesh = grid((5, 4, 4), kind="mixed")
+    monkeypatch.setattr(vtkhdf, "PARTITION", 50)
+    assert len(mesh.cells) == 192
+    with vtkhdf_series(tmp_path / "steps.vtkhdf", mesh) as series:
+        for step in steps_of(mesh, 3):
+            series.add(*step)
+    *_, (points, cells, nodes) = steps_of(mesh, 3)
+    write(tmp_path / "a.vtkhdf", mesh.with_points(points), cell_data=cells)
+    for path, step in ((tmp_path / "steps.vtkhdf", 2), (tmp_path / "a.vtkhdf", 0)):
+        found = pieces(path, count, step)
+        assert [sorted(part) for part in found] == [list(range(k, 4, count)) for k in range(count)]
+        every = dict(sorted((k, grid) for one in found for k, grid in one.items()))
+        assert [len(part.cells) for part in every.values()] == [50, 50, 50, 42]
+        told = [(vtk, bits(part.points[own])) for part in every.values() for vtk, own in part.cells]
+        assert told == [(vtk, bits(points[own])) for vtk, own in rows(mesh.cells)]
+        values = np.concatenate([part.cell_data["q"] for part in every.values()])
+        assert bits(values) == bits(cells["q"])
+        if step:
+            shift = [part.point_data["d"][own] for part in every.values() for _, own in part.cells]
+            assert bits(np.concatenate(shift)) == bits(nodes["d"][mesh.cells.connectivity])
 
 
 def test_names_that_are_no_names_of_groups(tmp_path):

@@ -5,6 +5,9 @@ marker, by its name, as other readers of ParaView give boundaries; so they are s
 extracted by name. (The cells of a VTU file are all in one grid, with numbers for the boundaries,
 for such a file has no blocks.) A series has its topology once, and points and values of each step
 behind each other; ``Steps`` says where each begins.
+
+The cells of a large mesh are in partitions, behind each other, so that each process of a parallel
+ParaView reads some of them. Each has its own points: those between two partitions stand in both.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,16 +32,22 @@ VTKHDF = ".vtkhdf"
 _VERSION = (2, 1)
 _VOLUME = "volume"
 _CHUNK_ROWS = 1 << 16
+PARTITION = 1 << 20
+"""Cells of a partition, at most."""
 
 Values = Mapping[str, NDArray]
 
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """A block of the collection: its group, its nodes in the mesh, and how many cells it has."""
+    """A block of the collection: its group, how many partitions and how many cells it has.
+
+    ``nodes`` are those of its partitions in the mesh, one partition behind the other.
+    """
 
     group: h5py.Group
     nodes: IntArray
+    partitions: int
     count: int
 
 
@@ -104,7 +114,7 @@ class Series:
             steps.attrs["NSteps"] = count
             steps["Values"] = np.array(self._times)
             steps["PartOffsets"] = np.zeros(count, np.int64)
-            steps["NumberOfParts"] = np.ones(count, np.int64)
+            steps["NumberOfParts"] = np.full(count, block.partitions)
             steps["PointOffsets"] = numbers * len(block.nodes)
             # All steps have the topology of the first.
             steps["CellOffsets"] = np.zeros((count, 1), np.int64)
@@ -172,16 +182,30 @@ def _add_block(
     _typed(group, "UnstructuredGrid")
     group.attrs["Index"] = len(root) - 2  # the assembly is no block
     tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
-    own = np.searchsorted(nodes, cells.connectivity)
-    group["NumberOfPoints"] = np.array([len(nodes)], np.int64)
-    group["NumberOfCells"] = np.array([len(cells)], np.int64)
-    group["NumberOfConnectivityIds"] = np.array([len(own)], np.int64)
+    partitions = _partitions(cells) if len(cells) > PARTITION else [(nodes, cells)]
+    group["NumberOfPoints"] = np.array([len(own) for own, _ in partitions], np.int64)
+    group["NumberOfCells"] = np.array([len(part) for _, part in partitions], np.int64)
+    sizes = [len(part.connectivity) for _, part in partitions]
+    group["NumberOfConnectivityIds"] = np.array(sizes, np.int64)
     # Prisms are numbered as in SU2 since VTK 9.7 (vtk!12988): so its CGNS reader gives them, their
     # volumes are positive and their sides look outward. VTU files have the order from before.
     group["Types"] = cells.types
-    group["Offsets"] = cells.offsets
-    group["Connectivity"] = own
-    return _Block(group, nodes, len(cells))
+    group["Offsets"] = np.concatenate([part.offsets for _, part in partitions])
+    group["Connectivity"] = np.concatenate(
+        [np.searchsorted(own, part.connectivity) for own, part in partitions]
+    )
+    every = np.concatenate([own for own, _ in partitions])
+    return _Block(group, every, len(partitions), len(cells))
+
+
+def _partitions(cells: Cells) -> list[tuple[IntArray, Cells]]:
+    """Return cells in partitions: the nodes of each (k,), sorted, and its cells."""
+    edges = [*range(0, len(cells), PARTITION), len(cells)]
+    parts = [
+        Cells.from_types(cells.types[a:b], cells.connectivity[cells.offsets[a] : cells.offsets[b]])
+        for a, b in pairwise(edges)
+    ]
+    return [(part.nodes, part) for part in parts]
 
 
 def _typed(group: h5py.Group, kind: str) -> None:
