@@ -92,6 +92,24 @@ def require_su2(path: Path, file_format: FileFormat | None = None) -> FileFormat
     return kind
 
 
+def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
+    """Return a text that can be streamed.
+
+    Raises
+    ------
+    MeshError
+        It has a mistake, or a halo, whose copies are no boundary.
+    """
+    text = find_text(path, zone, _from(tick, 0.0, SCANNED))
+    if text.zone.sends:
+        raise text.lines.error(
+            text.zone.sends[0].begin,
+            "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
+            "halo, or run it without --stream",
+        )
+    return text
+
+
 @contextmanager
 def given_mesh(
     path: Path,
@@ -110,7 +128,7 @@ def given_mesh(
     if require_su2(path, file_format) == "su2b":
         yield Given(path, zone)
         return
-    plan = planned(find_text(path, zone, _from(tick, 0.0, SCANNED)), is_result=False)
+    plan = planned(_streamable(path, zone, tick), is_result=False)
     with draft(folder) as ours:
         ours.touch(mode=0o600)
         require_room(ours, path, plan.size)
@@ -159,7 +177,7 @@ def given_for(
             warn(_lost_in_text(output, path, zone))
         yield Given(path, zone)
         return
-    text = find_text(path, zone, _from(tick, 0.0, SCANNED))
+    text = _streamable(path, zone, tick)
     if not is_text:
         require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
         lost = lost_of_text((part.key for part in text.zone.kept), text.zone.bounds.zones)

@@ -366,15 +366,19 @@ def test_killing_it_at_random_moments_leaves_no_half_mesh(tmp_path):
     assert not list(tmp_path.glob(".out*"))
 
 
+def with_halo(text):
+    """Return a text with a marker of a halo."""
+    marks = int(text.partition("NMARK= ")[2].split()[0])
+    text = text.replace(f"NMARK= {marks}", f"NMARK= {marks + 1}")
+    return text + "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
+
+
 def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8, ("STEPS=1",))
     text = case.mesh_file.read_text()
     out = tmp_path / "out.su2"
-    marks = int(text.partition("NMARK= ")[2].split()[0])
-    halo = text.replace(f"NMARK= {marks}", f"NMARK= {marks + 1}")
-    halo += "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
-    Path("halo.su2").write_text(halo)
+    Path("halo.su2").write_text(with_halo(text))
     with pytest.raises(MeshError, match=r"halo.su2:\d+: a mesh with SEND_RECEIVE markers"):
         stream(case.change(mesh_file=tmp_path / "halo.su2"), out)
     first = text.splitlines()[2]
@@ -424,5 +428,8 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     assert "note: mesh.su2 needs about 0 GB of memory" in capsys.readouterr().err
     monkeypatch.setattr(streaming, "stream", None)
     assert run([*call, "-o", "out.vtu", "-q"]) == 0
+    halo = with_halo(case.mesh_file.read_text())
+    Path("halo.su2").write_text(halo)
+    assert run([*call, "-o", "out.su2", "-q", "--set", "MESH_FILENAME=halo.su2"]) == 0
     monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2"] * size)
     assert run([*call, "-o", "out.su2", "-q"]) == 0

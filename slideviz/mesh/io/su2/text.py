@@ -51,15 +51,8 @@ def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None)
     Raises
     ------
     MeshError
-        The file has a mistake, or the zone a halo, whose copies are no boundary.
+        The file has a mistake.
     """
     lines = scan(open_source(path), progress)
     sections = find_sections(lines)
-    found = find_zone(lines, sections, find_bounds(lines, sections, zone))
-    if found.sends:
-        raise lines.error(
-            found.sends[0].begin,
-            "a mesh with SEND_RECEIVE markers (a halo) cannot be streamed; make it without its "
-            "halo, or run it without --stream",
-        )
-    return Text(lines, found)
+    return Text(lines, find_zone(lines, sections, find_bounds(lines, sections, zone)))
