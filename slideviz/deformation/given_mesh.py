@@ -13,6 +13,7 @@ import numpy as np
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
+from slideviz.mesh.io.atomic import reason_of
 from slideviz.mesh.io.binary_copy import Plan, fill, planned
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.files import format_of
@@ -130,12 +131,18 @@ def given_mesh(
         return
     plan = planned(_streamable(path, zone, tick), is_result=False)
     with draft(folder) as ours:
-        ours.touch(mode=0o600)
-        require_room(ours, path, plan.size)
-        os.truncate(ours, plan.size)
-        head = fill(plan, ours, _from(tick, SCANNED, COPIED))
-        with ours.open("r+b") as file:
-            file.write(head)
+        try:
+            ours.touch(mode=0o600)
+            require_room(ours, path, plan.size)
+            os.truncate(ours, plan.size)
+            head = fill(plan, ours, _from(tick, SCANNED, COPIED))
+            with ours.open("r+b") as file:
+                file.write(head)
+        except OSError as problem:
+            raise MeshError(
+                f"{path}: its binary copy cannot be written in {folder}: {reason_of(problem)} "
+                "(TMPDIR names another folder)"
+            ) from problem
         with told_of(plan.text, ours):
             yield Given(ours, None, plan.text)
 

@@ -120,6 +120,15 @@ def test_what_cannot_be_streamed_is_told(small, capsys):
         assert said in capsys.readouterr().err
 
 
+def test_no_place_for_the_copy_of_a_text_is_told(small, capsys):
+    sv.write("mesh.su2", grid((4, 4)))
+    Path("scratch").rmdir()
+    assert run(["info", "mesh.su2", "--stream"]) == 1
+    said = capsys.readouterr().err
+    assert "mesh.su2: its binary copy cannot be written in " in said
+    assert "the folder does not exist; create it first (TMPDIR names another folder)" in said
+
+
 def test_mistakes_of_the_file_are_told(small):
     """An index that stands twice would leave another cell without a value."""
     Path("mesh.su2b").write_bytes(change(WHOLE, 80, "<Q", 1))
