@@ -21,7 +21,7 @@ _PHASES = {
     "evaluate": "moving nodes",
     "project": "sliding",
     "read": "reading",
-    "write": "copying the mesh",
+    "write": "writing the mesh",
     "quality": "measuring cells",
 }
 _EVERY = 0.1

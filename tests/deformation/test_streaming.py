@@ -465,7 +465,7 @@ def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):
         "measuring cells: 0 %",
         "measuring cells: 25 %, about 30 s left",
         "measuring cells: 50 %, about 20 s left",
-        "copying the mesh: 0 %",
+        "writing the mesh: 0 %",
     ]
     monkeypatch.undo()
     case, told = made(tmp_path, "square", 8, ("STEPS=1",)), []
