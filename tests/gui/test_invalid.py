@@ -42,7 +42,7 @@ def try_all_ways(driver):
 
 @pytest.mark.parametrize(
     ("typed", "told"),
-    [("360*2", "Angle (°): “360*2” is not a number."), ("", "Angle (°): a number is needed.")],
+    [("360**2", "Angle (°): “360**2” is not a number."), ("", "Angle (°): a number is needed.")],
 )
 def test_no_run_starts_with_what_was_typed_before(blade, typed, told):
     window, field = blade.window, blade.window.motions.editor.angle
@@ -59,7 +59,7 @@ def test_no_run_starts_with_what_was_typed_before(blade, typed, told):
 
 def test_the_field_that_is_left_has_the_number_that_is_computed(blade):
     field = blade.window.motions.editor.angle
-    type_into(field, "360*2")
+    type_into(field, "360**2")
     QTest.keyClick(field, Qt.Key.Key_Tab)
     assert field.text() == "3"
     assert blade.session.case.motions == (Rotate("airfoil", 3.0),)
