@@ -162,9 +162,9 @@ def test_another_plot_does_not_show_the_one_before_meanwhile(full, qtbot):
         canvas.picked = gone_to.append
         QTest.mouseClick(canvas, Qt.MouseButton.LeftButton, pos=QPoint(150, 100))
         assert not gone_to, "its axes are no longer there"
-        shown, ground = canvas.grab().toImage(), canvas.look.background
+        shown, ground = canvas.grab().toImage(), canvas.scheme.background
         corners = {shown.pixelColor(x, y).name() for x in (3, 290) for y in range(20, 90, 7)}
-        assert corners <= {ground, canvas.look.background_top}, "nothing of the old plot"
+        assert corners <= {ground, canvas.scheme.background_top}, "nothing of the old plot"
         assert full.grab().toImage() != before
     qtbot.waitUntil(lambda: not canvas.wiped)
     (axes,) = canvas.figure.axes
