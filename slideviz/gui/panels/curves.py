@@ -14,7 +14,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QMouseEvent
 from qtpy.QtWidgets import QHBoxLayout, QWidget
 
-from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.errors import SlidevizError
 from slideviz.gui.widgets.build import boxed, check_box, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
@@ -140,10 +140,6 @@ class CurvesPanel(Panel):
                 "you see here how the error falls as control nodes are added."
             )
         return ""
-
-    def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw the plot in the colours of another theme."""
-        self.canvas.set_scheme(scheme)
 
     # Drawing ---------------------------------------------------------------------------
 

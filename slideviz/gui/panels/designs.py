@@ -10,7 +10,6 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
-from slideviz.color_scheme import ColorScheme
 from slideviz.design.sweep_designs import read_designs
 from slideviz.design.sweep_row import Row
 from slideviz.errors import CaseError, SlidevizError
@@ -120,10 +119,6 @@ class DesignsPanel(Panel):
         if self.table.results and self.case != session.case and not self.runner.busy:
             self._say("The settings have changed since: Run does all designs again.")
         self._sync()
-
-    def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw the plot in the colours of another theme."""
-        self.plot.canvas.set_scheme(scheme)
 
     def _put(self, table: DesignTable) -> None:
         """Show another table."""

@@ -12,7 +12,7 @@ from qtpy.QtCore import QRectF, Qt, QTimer, Signal
 from qtpy.QtGui import QColor, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QPen, QShortcut
 from qtpy.QtWidgets import QHBoxLayout, QLabel
 
-from slideviz.color_scheme import SELECTED_COLOUR, ColorScheme
+from slideviz.color_scheme import SELECTED_COLOUR
 from slideviz.gui.responsiveness.settings import SELECTING_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets.build import check_box, in_column, in_row, push_button
@@ -233,10 +233,6 @@ class HistogramPanel(Panel):
         # Behind another tab there were no words.
         if self._described is None and self.store.session.frame is not None:
             QTimer.singleShot(0, self, lambda: self._sync_words(self.store.session))
-
-    def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw the plot in the colours of another theme."""
-        self.canvas.set_scheme(scheme)
 
     # Drawing ---------------------------------------------------------------------------
 

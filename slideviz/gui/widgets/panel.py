@@ -7,6 +7,7 @@ from collections.abc import Callable
 from qtpy.QtWidgets import QWidget
 
 from slideviz.color_scheme import ColorScheme
+from slideviz.gui.widgets.plot_canvas import PlotCanvas
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
 from slideviz.session.store import Store
@@ -41,7 +42,9 @@ class Panel(QWidget):
         raise NotImplementedError
 
     def take_theme(self, scheme: ColorScheme) -> None:
-        """Draw what palette and icons do not reach in the colours of another theme."""
+        """Draw plots, and what palette and icons do not reach, in the colours of another theme."""
+        for canvas in self.findChildren(PlotCanvas):
+            canvas.set_scheme(scheme)
 
     def lead_to(self, missing: Requirement) -> None:
         """Put the cursor into the field for a requirement of a run."""
