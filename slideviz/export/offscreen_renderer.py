@@ -128,7 +128,7 @@ class OffscreenRenderer:
     @property
     def fills(self) -> bool:
         """Tell whether a picture may show the mesh larger than the view, which has all of it."""
-        return self.like is None or self.like.sees_all(0.02)
+        return self.like is None or self.like.camera.sees_all(0.02)
 
     @property
     def shows_detail(self) -> bool:
@@ -279,11 +279,11 @@ class OffscreenRenderer:
         scene.set_scheme(PAPER if like is None or options.background != "shown" else like.scheme)
         self._prepare(session, options)
         if like is not None:
-            scene.take_camera(like)
+            scene.camera.take(like.camera)
         if self.overview is not None:
             scene.look_along(self.overview, self._seen(options))
         elif options.fill:
-            scene.fit()
+            scene.camera.fit()
         elif like is not None:
             scene.camera.show_width_of(like.camera)
         # Below the title; a detail has the width that was asked for.

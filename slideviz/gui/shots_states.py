@@ -162,7 +162,7 @@ def beside(window: MainWindow, place: Path) -> None:
     window.viewing.look_from("+x")
     settle(window)
     (_, (view, scene)) = window.viewing.pairs()
-    scene.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
+    scene.camera.zoom_at(0.62 * view.width(), 0.4 * view.height(), 1.06)
 
 
 def dark(window: MainWindow, place: Path) -> None:

@@ -18,7 +18,7 @@ from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
 from slideviz.scene.actors import CELL, Drawn
 from slideviz.scene.boxes import BoxLayer
-from slideviz.scene.camera import SLACK, Camera
+from slideviz.scene.camera import Camera
 from slideviz.scene.coarse import CoarseLayer
 from slideviz.scene.ghosts import GhostLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
@@ -212,22 +212,6 @@ class Scene:
 
     def _shapes(self) -> list[Any]:
         return [shape for layer in self.layers for shape in layer.shapes()]
-
-    def take_camera(self, other: Scene) -> None:
-        """Copy the camera of another scene."""
-        self.camera.take(other.camera)
-
-    def fit(self) -> None:
-        """Make all that is drawn fill the view, from the present side, beside the legend."""
-        self.camera.fit()
-
-    def sees_all(self, slack: float = SLACK) -> bool:
-        """Tell whether the mesh is in the view, but for a small part of the view's size."""
-        return self.camera.sees_all(slack)
-
-    def zoom_at(self, x: float, y: float, factor: float) -> None:
-        """Enlarge by ``factor``; in parallel projection pixel (x, y) keeps what it shows."""
-        self.camera.zoom_at(x, y, factor)
 
     def pick(self, x: float, y: float) -> str | None:
         """Return the visible boundary at a pixel counted from the lower left, or None.

@@ -66,7 +66,7 @@ def test_so_it_is_in_the_flat_view(plotter, cube):
     session = above_all(changes.set_view(session, colour_by="size-skew", edges=False))
     scene = FlatScene(plotter, Cuts())
     scene.update(session, Section("plane", (0.5, 0.5, 0.52)))
-    scene.fit()
+    scene.camera.fit()
     picture = colours(plotter)
     assert count(picture, LOWEST) > 5000
     assert count(picture, INVERTED_COLOUR) == 0

@@ -268,7 +268,7 @@ def test_a_design_is_shown_whole_and_without_the_ghost_of_the_motion_panel(
     # Where the mesh is outside of the view, it comes back with a design that was run already.
     window.scene.camera.aim((99.0, 99.0, 0.0), 0.1)
     passage.show_design(1)
-    assert window.scene.sees_all()
+    assert window.scene.camera.sees_all()
     # A motion that is typed now is seen again.
     motion = window.store.session.case.motions[0]
     window.store.change(changes.replace_motion, 0, sv.Rotate(motion.marker, 20.0))

@@ -16,10 +16,10 @@ def test_a_run_that_moves_the_mesh_leaves_it_in_the_view(driver, passage_file, z
     window.viewing.fit()
     if zoomed:
         # Some of the mesh is still seen then; of an empty view nobody has anything.
-        window.scene.zoom_at(50, window.view.height() - 1, 1.2)
+        window.scene.camera.zoom_at(50, window.view.height() - 1, 1.2)
     before = window.scene.camera.place
     window.start_run()
     driver.settle()
     assert window.store.session.deformed is not None
     assert np.allclose(window.scene.camera.place, before) == zoomed
-    assert zoomed or window.scene.sees_all()
+    assert zoomed or window.scene.camera.sees_all()

@@ -385,7 +385,7 @@ def test_the_whole_mesh_is_seen_in_both_and_a_detail_stays_one(ran):
     rooms = [view.width() for view in (viewing.view, viewing.second)]
     assert seen[:, 0].max() - seen[:, 0].min() > 0.8 * min(rooms), "both are well filled"
     ran.window.store.change(changes.show_beside, None)
-    viewing.scene.zoom_at(200, 200, 5.0)
+    viewing.scene.camera.zoom_at(200, 200, 5.0)
     scale = viewing.view.camera.parallel_scale
     compare(ran)
     assert viewing.second.camera.parallel_scale == viewing.view.camera.parallel_scale == scale
@@ -449,7 +449,7 @@ def test_what_fills_the_view_does_so_at_another_size_unless_the_camera_was_moved
     assert lead.camera.fitted
     ran.window.viewing.fit()
     assert lead.camera.place == pytest.approx(place)
-    lead.zoom_at(100, 100, 1.5)
+    lead.camera.zoom_at(100, 100, 1.5)
     place = lead.camera.place
     ran.window.resize(1280, 800)
     QApplication.processEvents()
@@ -461,7 +461,7 @@ def test_linked_views_come_to_rest(ran, qtbot):
     drawn = []
     for view in (viewing.view, viewing.second):
         view._repaints._timer.timeout.connect(lambda: drawn.append(1))
-    viewing.scene.zoom_at(50, 50, 1.1)
+    viewing.scene.camera.zoom_at(50, 50, 1.1)
     qtbot.waitUntil(lambda: bool(drawn))
     for _ in range(40):
         QApplication.processEvents()

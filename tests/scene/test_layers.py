@@ -172,7 +172,7 @@ def test_a_whole_wheel_is_drawn_once_and_fits_the_view(scene, stator):
     scene.update(changes.set_view(session, passages=-1))
     names = {name for name in scene.plotter.actors if name.endswith(":BLADE") and "copy" in name}
     assert len(names) == 40
-    scene.fit()
+    scene.camera.fit()
     assert scene.plotter.camera.parallel_scale > 3 * near_scale
     copies = next(layer for layer in scene.layers if isinstance(layer, PassageLayer))
     points = np.concatenate([shape.points for shape in copies.shapes()])

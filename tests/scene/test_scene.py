@@ -178,7 +178,7 @@ def test_zooming_keeps_the_point_under_the_mouse(scene, session):
     corner = np.array([[0.0, 4.0, 0.0]])
     x, y = to_display(scene.plotter, corner)[0]
     before = to_display(scene.plotter, np.array([[4.0, 4.0, 0.0]]))[0, 0] - x
-    scene.zoom_at(x, y, 1.5)
+    scene.camera.zoom_at(x, y, 1.5)
     assert np.allclose(to_display(scene.plotter, corner)[0], (x, y), atol=0.6)
     after = to_display(scene.plotter, np.array([[4.0, 4.0, 0.0]]))[0, 0] - x
     assert after == pytest.approx(1.5 * before, rel=1e-3)
@@ -363,9 +363,9 @@ def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, s
 
 def test_a_camera_comes_back(scene, session):
     opened(scene, session)
-    scene.zoom_at(100, 100, 2.0)
+    scene.camera.zoom_at(100, 100, 2.0)
     place = scene.camera.place
-    scene.fit()
+    scene.camera.fit()
     assert scene.camera.place != place
     scene.camera.go(place)
     assert np.allclose(scene.camera.place, place)

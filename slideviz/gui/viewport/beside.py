@@ -121,7 +121,7 @@ class CameraLink:
                 return
             self._following = True
             try:
-                follower.take_camera(leader)
+                follower.camera.take(leader.camera)
             finally:
                 self._following = False
             view.render_soon()

@@ -148,7 +148,7 @@ class SectionViews(QSplitter):
         if self.flats is None:
             self.flats = Flats(self.viewing, self.scheme, self._multi_samples)
             self.flats.closed.connect(lambda: self.want_flat(False))
-        whole = self.viewing.scene.sees_all()
+        whole = self.viewing.scene.camera.sees_all()
         if made:
             self.addWidget(self.flats)
         self.flats.show_section(session, section)
@@ -175,7 +175,7 @@ class SectionViews(QSplitter):
         flats, self.flats = self.flats, None
         if flats is None:
             return
-        whole = self.viewing.scene.sees_all()
+        whole = self.viewing.scene.camera.sees_all()
         flats.close_views()
         flats.setParent(None)
         flats.deleteLater()

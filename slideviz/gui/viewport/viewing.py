@@ -109,7 +109,7 @@ class Viewing(QWidget):
         self.second_scene.set_coarse(self.coarse)
         self.second_scene.open(changes.seen_beside(session), self.surfaces)
         self.second_scene.set_motion_ghosts(self.scene.motion_ghosts)
-        self.second_scene.take_camera(self.scene)
+        self.second_scene.camera.take(self.scene.camera)
         self._share_legend(session.view.swapped)
         self._link = CameraLink((self.view, self.second), (self.scene, self.second_scene))
         self._rearranged(not detail)
@@ -155,7 +155,7 @@ class Viewing(QWidget):
         fitted = self._leader.camera.fitted
         scene.resized()
         if fitted:
-            self._leader.fit()
+            self._leader.camera.fit()
 
     @property
     def _leader(self) -> Scene:
@@ -175,7 +175,7 @@ class Viewing(QWidget):
             return
         self.second_leaves.emit()
         second, self.second, self.second_scene = self.second, None, None
-        whole = self.scene.sees_all()
+        whole = self.scene.camera.sees_all()
         self._link.end()
         self._link = None
         for view in (second, self.view):
@@ -258,7 +258,7 @@ class Viewing(QWidget):
     # Mouse -----------------------------------------------------------------------------
 
     def _zoomed(self, view: View3D, scene: Scene, where: QPoint, factor: float) -> None:
-        scene.zoom_at(*view.to_pixels(where), factor)
+        scene.camera.zoom_at(*view.to_pixels(where), factor)
         self.render()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -276,7 +276,7 @@ class Viewing(QWidget):
     def fit(self) -> None:
         """Make the whole mesh fill the view."""
         self._before = None
-        self._leader.fit()
+        self._leader.camera.fit()
         self.render()
 
     def refit(self) -> None:
