@@ -19,7 +19,8 @@ METHODS = [
     for periodic in ("none", "periodic", "fixed", "moving")
     if (sliding, periodic) != ("none", "moving")
 ]
-SMALL = st.floats(-0.08, 0.08)
+# A slide of less than 1e-8 of the distance to the boundary is rounding.
+SMALL = st.floats(-0.08, 0.08).map(lambda value: round(value, 6))
 QUIET = settings(max_examples=12, deadline=None)
 
 

@@ -155,6 +155,17 @@ def _before(a, b):  # type: ignore[no-untyped-def]
     return (a[0] - b[0]) + 0.6180339887 * (a[1] - b[1]) + 0.4142135624 * (a[2] - b[2]) < 0.0
 
 
+@njit(inline="always", **_OPTIONS)
+def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
+    """Tell whether points a and b, that are equally near at a squared distance, are one place.
+
+    Where facets meet, the end of one ties with a point of the next that is 1e-6 of the distance
+    away: there the nearer one is right, however little it is nearer.
+    """
+    apart = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+    return apart <= 4.0 * TIE * gap
+
+
 @njit(parallel=True, **_OPTIONS)
 def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-untyped-def]
     """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
@@ -170,7 +181,7 @@ def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-un
         first = np.empty(64, np.int64)
         last = np.empty(64, np.int64)
         point, trial, t = np.empty(3), np.empty(3), np.empty((3, 3))
-        best, top = np.inf, 1
+        best, held, top = np.inf, np.inf, 1
         stack[0], first[0], last[0] = 0, 0, len(order)
         while top > 0:
             top -= 1
@@ -187,9 +198,14 @@ def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-un
                             if image > 0:  # adding zero would turn -0.0 into 0.0
                                 t[corner, axis] += shifts[image, axis]
                     gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
-                    tied = abs(gap - best) <= TIE * best
-                    if gap < best * (1.0 - TIE) or (tied and _before(point, out[i])):
-                        out[i] = point
+                    nearer = gap < best * (1.0 - TIE)
+                    if not nearer and gap <= best * (1.0 + TIE):
+                        if gap != held and _is_beside(point, out[i], best):
+                            nearer = gap < held
+                        else:
+                            nearer = _before(point, out[i])
+                    if nearer:
+                        held, out[i] = gap, point
                         which[i] = order[j]
                     best = min(best, gap)
                 continue

@@ -61,6 +61,15 @@ def test_degenerate_simplices_do_no_harm():
     np.testing.assert_allclose(ClosestPoints(dot).query(np.array([[0.0, 0.0]])), [[1, 1]])
 
 
+@pytest.mark.parametrize("slide", [3e-11, -3e-10, 1e-8, -1e-7])
+def test_a_slide_is_seen_however_small_it_is_beside_the_way_to_the_boundary(slide):
+    # The end of one piece tied with a point of the next, and came first up to a millionth.
+    wall = np.array([[[0.0, 0.0], [0.0, 0.5]], [[0.0, 0.5], [0.0, 1.0]]])
+    for pieces in (wall, wall[::-1]):
+        found = ClosestPoints(pieces).query(np.array([[1e-3, 0.5 + slide]]))[0]
+        np.testing.assert_allclose(found, [0.0, 0.5 + slide], rtol=0, atol=2e-11)
+
+
 def tracks_of(mesh, roles, method=("ps", "none"), shift=None):
     boundary = find_boundary(mesh)
     fans = find_fans(boundary, mesh.points)
