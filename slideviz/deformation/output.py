@@ -35,7 +35,7 @@ CHUNK = 1 << 20
 """Nodes, or cells, that are in memory at a time, at most."""
 FEWEST = 1 << 16
 """Nodes or cells of a part, at least."""
-PARTS = 256
+PARTS = 1024
 """Parts of a file, so that many ranks have some; their number must not depend on that of ranks."""
 Part = tuple[int, int]
 """The first of some nodes or cells, and the one after the last."""

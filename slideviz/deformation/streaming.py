@@ -31,9 +31,10 @@ from slideviz.deformation.stepping import Stepping
 from slideviz.errors import CaseError, NodeError
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.text import find_text
-from slideviz.mesh.model import Mesh
+from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.ranks import ALONE, Alone
+from slideviz.mesh.threads import give_back
 from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
 from slideviz.terms import FileFormat
@@ -50,7 +51,7 @@ class Streamed:
     Attributes
     ----------
     skin : Mesh
-        Undeformed.
+        Undeformed, without cells and those of its markers.
     steps : tuple of Step
         With the skin as mesh, and the counts of the whole.
     quality, undeformed : Quality
@@ -134,31 +135,35 @@ def stream(
                     ranks=ranks,
                 )
             )
-            out = Output(
-                stack,
-                given,
-                case.quality_metric,
-                output,
-                watch,
-                ranks,
-                _about(case, path),
-                is_text=is_text,
-                resume=resume,
-                replaces=replaces,
-            )
-            skin = given.skin(tick, ranks)
-        stack.enter_context(_numbered(skin))
+        out = Output(
+            stack,
+            given,
+            case.quality_metric,
+            output,
+            watch,
+            ranks,
+            _about(case, path),
+            is_text=is_text,
+            resume=resume,
+            replaces=replaces,
+        )
         if resume:
             note(out.found())
-        rest = _solved(case, skin, out, tell)
+
+        def read() -> Mesh:
+            with watch.phase("read") as tick:
+                return given.skin(tick, ranks)
+
+        rest = _solved(case, read, out, tell)
+        give_back()
         out.displace(rest, final=True)
         rating = out.rating(listed)
         folded = folded_steps(rest, out.files, rating.inverted)
         moved = rest.steps[-1].mesh.origin.ffd
-        out.finish(None if moved is skin.origin.ffd else moved)
+        out.finish(None if moved is rest.skin.origin.ffd else moved)
     return Streamed(
-        skin,
-        _of_whole(rest.steps, skin),
+        rest.skin,
+        _of_whole(rest.steps, rest.skin),
         rating.quality(),
         rating.undeformed(),
         folded,
@@ -166,31 +171,38 @@ def stream(
     )
 
 
-def _solved(case: Case, skin: Mesh, out: Output, tell: Tell) -> Rest:
-    """Return what displaces the rest of a mesh, after all steps of its skin."""
+def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Rest:
+    """Return what displaces the rest of a mesh, after all steps of its skin, which is read."""
     watch = Watch(lambda phase, part: tell(Progress(1, max(1, case.steps), phase, part)))
-    with watch.phase("classify"):
-        setup = make_setup(case, skin)
-    require_memory(setup, case)
-    # The tracks are most of what is in memory, and needed for the skin alone.
-    lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+    skin = read()
+    assert skin.part is not None
+    give_back()
+    with _numbered(skin.part.points):
+        with watch.phase("classify"):
+            setup = make_setup(case, skin)
+        require_memory(setup, case)
+        # No memory for what is not needed any more: cells from here on, and after the steps tracks.
+        none = Cells.from_blocks([])
+        markers = tuple(Marker(marker.name, none) for marker in skin.markers)
+        skin = replace(skin, cells=none, markers=markers)
+        lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
+        give_back()
 
-    def rate(steps: Sequence[Step]) -> Quality:
-        out.displace(Rest(skin, lean, steps), final=False)
-        return out.rating(0).quality()
+        def rate(steps: Sequence[Step]) -> Quality:
+            out.displace(Rest(skin, lean, steps), final=False)
+            return out.rating(0).quality()
 
-    steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
+        steps = tuple(all_steps(Stepping(case, skin, setup, tell, watch.seconds, rate)))
     return Rest(skin, lean, steps)
 
 
 @contextmanager
-def _numbered(skin: Mesh) -> Iterator[None]:
-    """Return a context whose errors have the numbers that nodes have in the file."""
+def _numbered(numbers: IntArray) -> Iterator[None]:
+    """Return a context whose errors have the numbers (n,) that nodes have in the file."""
     try:
         yield
     except NodeError as problem:
-        nodes = (skin.number(node) for node in problem.nodes)
-        raise NodeError(problem.sentence, *nodes) from problem
+        raise NodeError(problem.sentence, *numbers[list(problem.nodes)].tolist()) from problem
 
 
 def require_stream(case: Case) -> None:

@@ -92,11 +92,11 @@ def find_tracks(
     of_node = np.full(classes.total, -1, np.int64)
     tracks: list[ClosestPoints] = []
     curved = False
-    sides = place(boundary.facets)
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
     across = _across(boundary, classes.stands, roles) if shift is not None else None
-    labels = _surface_labels(boundary, corner_vectors(sides), roles, feature_angle_deg, across)
+    vectors = corner_vectors(place(boundary.facets))
+    labels = _surface_labels(boundary, vectors, roles, feature_angle_deg, across)
     on_surface = classes.edge if boundary.dim == 2 else classes.surface
     fan_facet = np.zeros(len(fans.fan_node), np.int64)
     fan_facet[fans.fan] = fans.facet
@@ -105,9 +105,9 @@ def find_tracks(
     for nodes, chosen in _by_surfaces(on_surface, row_node, row_label):
         member = np.isin(labels, chosen)
         of_node[nodes] = len(tracks)
-        curved |= _bends(corner_vectors(sides[member]))
+        curved |= _bends(vectors[member])
         beyond = surface_extension(boundary, member, moving, place, reach)
-        corners = np.concatenate([_simplices(sides[member]), beyond])
+        corners = np.concatenate([_simplices(place(boundary.facets[member])), beyond])
         tracks.append(ClosestPoints(corners, shift))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
