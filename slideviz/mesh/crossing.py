@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from slideviz.mesh.model import column_bounds
 from slideviz.mesh.planes import Planes, Surface, line_normals, normals
 
 if TYPE_CHECKING:
@@ -134,7 +135,10 @@ def swept_crossing(
 def _margin(points: FloatArray, a: Surface, b: Surface) -> float:
     """Return ``TOLERANCE`` as a length."""
     used = points[np.concatenate((a.nodes, b.nodes)).ravel()]
-    return TOLERANCE * float(np.ptp(used, axis=0).max()) if len(used) else 0.0
+    if not len(used):
+        return 0.0
+    low, high = column_bounds(used)
+    return TOLERANCE * float((high - low).max())
 
 
 def pierced(points: FloatArray, a: Surface, b: Surface, margin: float) -> Hit | None:

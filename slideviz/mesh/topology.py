@@ -187,13 +187,8 @@ def _canonical_triangles(table: IntArray) -> IntArray:
 
 def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
     """Return the facets with the node order that makes their normals point out of the owner."""
-    centre = mesh.points[facets].mean(axis=1)
-    size = mesh.cells.offsets[owner + 1] - mesh.cells.offsets[owner]
-    starts = np.cumsum(size) - size
-    entries = np.repeat(mesh.cells.offsets[owner] - starts, size) + np.arange(size.sum())
-    corners = mesh.points[mesh.cells.connectivity[entries]]
-    middle = np.add.reduceat(corners, starts, axis=0) / size[:, None] if len(owner) else centre
-    inward = np.einsum("fd,fd->f", facet_vectors(mesh.points, facets), centre - middle) < 0
+    inward, cells = np.empty(len(facets), bool), mesh.cells
+    _face_inward(mesh.points, facets, owner, cells.offsets, cells.connectivity, inward)
     turned = facets.copy()
     if mesh.dim == 2:
         turned[inward] = facets[inward][:, ::-1]
@@ -202,6 +197,32 @@ def _turn_outward(mesh: Mesh, facets: IntArray, owner: IntArray) -> IntArray:
         turned[inward & ~triangle] = facets[inward & ~triangle][:, ::-1]
         turned[inward & triangle] = facets[inward & triangle][:, [1, 0, 2, 3]]
     return turned
+
+
+@njit(nogil=True, cache=True)
+def _face_inward(points, facets, owner, offsets, connectivity, inward):  # type: ignore[no-untyped-def]
+    """Tell for each facet (f, k) whether its normal, of this node order, points into its cell."""
+    dim, width = points.shape[1], facets.shape[1]
+    out, along, across = np.zeros(3), np.zeros(3), np.zeros(3)
+    for f in range(len(facets)):
+        first, last = offsets[owner[f]], offsets[owner[f] + 1]
+        for axis in range(dim):
+            centre, middle = 0.0, 0.0
+            for k in range(width):
+                centre += points[facets[f, k], axis]
+            for k in range(first, last):
+                middle += points[connectivity[k], axis]
+            out[axis] = centre / width - middle / (last - first)
+            along[axis] = points[facets[f, min(2, width - 1)], axis] - points[facets[f, 0], axis]
+            across[axis] = points[facets[f, width - 1], axis] - points[facets[f, 1], axis]
+        if dim == 2:
+            inward[f] = along[1] * out[0] - along[0] * out[1] < 0
+        else:
+            volume = 0.0
+            for axis in range(3):
+                i, j = (axis + 1) % 3, (axis + 2) % 3
+                volume += (along[i] * across[j] - along[j] * across[i]) * out[axis]
+            inward[f] = volume < 0
 
 
 def facet_vectors(coords: FloatArray, facets: IntArray) -> FloatArray:

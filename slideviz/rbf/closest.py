@@ -65,7 +65,7 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
     starts = np.zeros(nodes, np.int64)
     stops = np.zeros(nodes, np.int64)
     stops[0] = len(order)
-    count = len(corners)
+    count, size = len(corners), np.empty(3)
     middle, low, high = np.empty(len(order)), np.empty((count, 3)), np.empty((count, 3))
     for i in range(count):
         for axis in range(3):
@@ -81,9 +81,14 @@ def _build(corners, shifts, order, bounds):  # type: ignore[no-untyped-def]
                 lowest = min(lowest, low[one, axis] + by)
                 highest = max(highest, high[one, axis] + by)
             bounds[k, axis], bounds[k, 3 + axis] = lowest, highest
+            if bounds[k, axis] > lowest:  # rounded: no box is smaller than what is in it
+                bounds[k, axis] = np.nextafter(bounds[k, axis], np.float32(-np.inf))
+            if bounds[k, 3 + axis] < highest:
+                bounds[k, 3 + axis] = np.nextafter(bounds[k, 3 + axis], np.float32(np.inf))
+            size[axis] = highest - lowest
         if 2 * k + 2 >= nodes:
             continue
-        longest = np.argmax(bounds[k, 3:] - bounds[k, :3])
+        longest = np.argmax(size)
         for i in range(a, b):
             image = _image(order[i], count)
             one, by = order[i] - image * count, shifts[image, longest]
@@ -252,8 +257,8 @@ class ClosestPoints:
         if shift is not None:
             items, self._shifts[1, :dim], self._shifts[2, :dim] = 3 * n, -shift, shift
         depth = max(0, int(np.ceil(np.log2(max(1, items / LEAF)))))
-        self._bounds: FloatArray = np.empty((2 ** (depth + 1) - 1, 6))
-        self._order: IntArray = np.arange(items)
+        self._bounds = np.empty((2 ** (depth + 1) - 1, 6), np.float32)
+        self._order = np.arange(items, dtype=np.int32)
         _build(self._corners, self._shifts, self._order, self._bounds)
 
     def simplices(self, which: IntArray) -> FloatArray:

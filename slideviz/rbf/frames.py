@@ -25,6 +25,9 @@ from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
 from slideviz.mesh.threads import in_parts
 
+SECTORS = 1 << 12
+"""Into how many the circle is divided to find the largest empty one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -223,7 +226,20 @@ def make_frame(
 
 def _middle_angle(angles: FloatArray) -> float:
     """Return the angle opposite the middle of the largest empty sector."""
-    ordered = np.sort(angles)
-    gaps = np.diff(np.r_[ordered, ordered[0] + 2 * np.pi])
+    # Of each of many narrow sectors the ends: nothing else borders on an empty sector.
+    narrow = np.clip((angles + np.pi) * (SECTORS / (2 * np.pi)), 0, SECTORS - 1).astype(np.int32)
+    low, high = np.full(SECTORS, np.inf), np.full(SECTORS, -np.inf)
+    np.minimum.at(low, narrow, angles)
+    np.maximum.at(high, narrow, angles)
+    ordered = np.stack([low, high], axis=1)[low <= high].ravel()
+    gaps = _gaps(ordered)
+    if gaps.max() <= 4 * np.pi / SECTORS:
+        ordered = np.sort(angles)
+        gaps = _gaps(ordered)
     widest = int(np.argmax(gaps))
     return float(ordered[widest] + gaps[widest] / 2 + np.pi)
+
+
+def _gaps(ordered: FloatArray) -> FloatArray:
+    """Return how far it is from each of ascending angles to the next, (k,), around the circle."""
+    return np.diff(np.r_[ordered, ordered[0] + 2 * np.pi])

@@ -89,15 +89,16 @@ def spread(
     DeformError
         They differ by more.
     """
-    first = np.full(len(values), -1, np.int64)
-    first[stands[given[::-1]]] = given[::-1]
-    source, images = first.copy(), np.flatnonzero(stands != np.arange(len(stands)))
-    source[images] = first[stands[images]]
+    source = np.full(len(values), -1, np.int64)
+    source[stands[given[::-1]]] = given[::-1]
+    images = np.flatnonzero(stands != np.arange(len(stands)))
+    source[images] = source[stands[images]]
     gap = np.abs(values[given] - values[source[given]]).max(axis=1, initial=0.0)
     if gap.max(initial=0.0) > allowed:
         row = int(np.argmax(gap))
         refuse(int(given[row]), int(source[given[row]]), float(gap[row]))
-    out, rows = np.zeros_like(values), np.flatnonzero(source >= 0)
+    # Memory for zeros is taken when something is written, but not by `zeros_like`.
+    out, rows = np.zeros(values.shape), np.flatnonzero(source >= 0)
     out[rows] = values[source[rows]]
     return out, source
 
