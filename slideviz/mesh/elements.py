@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class ElementType:
@@ -100,3 +102,8 @@ _ROWS = (
 
 ELEMENTS: dict[int, ElementType] = {row.vtk: row for row in _ROWS}
 """Element type by VTK identifier."""
+
+SIZES, DIMS = np.zeros(256, np.int64), np.zeros(256, np.int64)
+"""Nodes, and the dimension, of an element by VTK identifier; 0: none has it."""
+for _row in _ROWS:
+    SIZES[_row.vtk], DIMS[_row.vtk] = _row.n_nodes, _row.dim

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slideviz.errors import MeshError
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import ELEMENTS, SIZES
 
 if TYPE_CHECKING:
     from slideviz.mesh.halo import Halo
@@ -77,10 +77,7 @@ class Cells:
             An identifier is not in ``ELEMENTS``, or the connectivity has another length.
         """
         ids = frozen_array(types, np.uint8)
-        sizes = np.zeros(256, np.int64)
-        for row in ELEMENTS.values():
-            sizes[row.vtk] = row.n_nodes
-        counts = sizes[ids]
+        counts = SIZES[ids]
         if np.any(counts == 0):
             raise MeshError(f"element type {ids[np.argmin(counts)]} is not supported")
         offsets = np.concatenate(([0], np.cumsum(counts)))

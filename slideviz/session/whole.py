@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.deformation.measuring import PointFiles
-from slideviz.mesh.io.su2b.elements import SIZES, Block, element_at, element_blocks
+from slideviz.mesh.elements import SIZES
+from slideviz.mesh.io.su2b.elements import Block, element_at, element_blocks
 from slideviz.mesh.io.su2b.layout import Source, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.check import LARGEST, too_large, within
+from slideviz.mesh.elements import SIZES
 from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.su2.lines import Piece, number_of
 from slideviz.mesh.io.su2.numbers import (
@@ -27,7 +28,6 @@ from slideviz.mesh.io.su2.numbers import (
 )
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2.text import Text
-from slideviz.mesh.io.su2b.elements import SIZES
 from slideviz.mesh.io.su2b.layout import NAME_BYTES
 from slideviz.mesh.io.su2b.write import LARGEST_4, SORTED, marker_table, padded, rows_of
 from slideviz.mesh.model import Cells, IntArray

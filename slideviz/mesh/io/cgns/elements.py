@@ -47,13 +47,6 @@ class Elements:
         return Elements(self.cells.take(mask), self.numbers[mask], self.section[mask])
 
 
-def dimensions(cells: Cells) -> IntArray:
-    """Return the dimension of each cell, (m,)."""
-    table = np.zeros(256, np.int64)
-    table[list(ELEMENTS)] = [row.dim for row in ELEMENTS.values()]
-    return table[cells.types]
-
-
 def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
     """Return the cells of a structured zone.
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from slideviz.mesh.cached_boundary import outer_facets
+from slideviz.mesh.elements import DIMS
 from slideviz.mesh.io.cgns.elements import (
     Elements,
-    dimensions,
     grid_cells,
     grid_nodes,
     read_sections,
@@ -60,7 +60,7 @@ class Zone:
     @property
     def dim(self) -> int:
         """Return the dimension of its cells."""
-        return len(self.shape) if self.sides is None else int(dimensions(self.cells)[0])
+        return len(self.shape) if self.sides is None else int(DIMS[self.cells.types[0]])
 
     @cached_property
     def outer(self) -> Cells:
@@ -103,7 +103,7 @@ def read_zone(node: Node, dim: int, physical: int) -> Zone:
         flat = points[:, :dim]
         return Zone(node, shape, points, grid_cells(shape, flat), None, (), datasets)
     elements, sections = read_sections(node, len(points))
-    dims = dimensions(elements.cells)
+    dims = DIMS[elements.cells.types]
     if not (dims == dim).any():
         raise node.fault(f"has no cells of dimension {dim}; export the mesh with its volume cells")
     cells = elements.cells.take(dims == dim)

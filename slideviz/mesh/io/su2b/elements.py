@@ -12,17 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
 from slideviz.mesh.io.su2b.layout import Elements, Source, ZonePlace
 from slideviz.mesh.model import IntArray
 
 BLOCK = 1 << 18
 """Elements or points that are read at a time."""
-SIZES = np.zeros(256, np.int64)
-"""Nodes of an element, by type."""
-_DIMS = np.zeros(256, np.int64)
-for _row in ELEMENTS.values():
-    SIZES[_row.vtk], _DIMS[_row.vtk] = _row.n_nodes, _row.dim
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +187,7 @@ def _check_nodes(
 
 def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntArray) -> None:
     """Raise for the first element of a block that has another dimension."""
-    wrong = _DIMS[block.types] != dim
+    wrong = DIMS[block.types] != dim
     if wrong.any():
         k = int(np.argmax(wrong))
         row = ELEMENTS[int(block.types[k])]
