@@ -259,6 +259,9 @@ PERIODIC_MODES: dict[PeriodicMode, Term] = {
     ),
 }
 
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""The directions that have a word."""
+
 PeriodicKind = Literal["translational", "rotational"]
 PeriodicType = Literal["auto", "translational", "rotational"]
 PERIODIC_TYPES: dict[PeriodicType, Term] = {

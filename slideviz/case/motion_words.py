@@ -20,8 +20,7 @@ from slideviz.case.model import (
     named,
 )
 from slideviz.mesh.model import Mesh
-
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+from slideviz.terms import AXES
 
 ALONG = 1e-12
 """What the cosine of the angle between a direction and an axis may miss of 1."""

@@ -24,7 +24,7 @@ from slideviz.case.words import (
     words_of,
 )
 from slideviz.errors import CaseError
-from slideviz.terms import Term, labels
+from slideviz.terms import AXES, Term, labels
 
 Entry = Literal["text", "choice", "switch", "real", "whole", "axis", "point"]
 """How a value is entered in a window."""
@@ -35,7 +35,6 @@ MAX_STEPS = 9999
 
 _PLAIN_PATH = re.compile(r"[A-Za-z0-9_./~:@=,+-]([A-Za-z0-9_./~:@=,+ -]*[A-Za-z0-9_./~:@=,+-])?\Z")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,9}\Z")
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # What SU2 writes after each pair of periodic markers: centre, angles, translation.
 _SU2_PAIR, _SU2_GROUP = 2, 11
 
@@ -246,8 +245,8 @@ def read_axis(items: list[Word]) -> tuple[float, float, float]:
     CaseError
         It is none of these, or has no length.
     """
-    if len(items) == 1 and items[0].text.lower() in _AXES:
-        return _AXES[items[0].text.lower()]
+    if len(items) == 1 and items[0].text.lower() in AXES:
+        return AXES[items[0].text.lower()]
     if len(items) != 3:
         text = " ".join(item.text for item in items)
         raise CaseError(f"{shown(text)} is not an axis; write x, y, z or three numbers")
@@ -264,7 +263,7 @@ def vector_text(values: tuple[float, ...]) -> str:
 
 def axis_text(axis: tuple[float, float, float]) -> str:
     """Return ``x``, ``y`` or ``z``, or the three numbers."""
-    for name, unit in _AXES.items():
+    for name, unit in AXES.items():
         # By text, since -0.0 == 0.0 and the two do not give the same bits.
         if repr(tuple(map(float, axis))) == repr(unit):
             return name

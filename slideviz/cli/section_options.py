@@ -11,11 +11,11 @@ from math import isfinite
 from typing import TYPE_CHECKING, Literal
 
 from slideviz.case.section_shapes import SECTION_SHAPES, ShapeTerms
+from slideviz.terms import AXES
 
 if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 MOST_COPIES = 100
 """On each side: more could neither be told apart nor be drawn in reasonable time."""
@@ -56,9 +56,9 @@ def plane(text: str) -> Asked:
     """Return the plane that a text like ``0,0,1,0,0,0.5`` or ``z=0.5`` means."""
     word, sign, value = text.partition("=")
     if sign:
-        if word.strip() not in _AXES:
+        if word.strip() not in AXES:
             raise argparse.ArgumentTypeError(f"{text!r}: the axis is x, y or z, as in z=0.5")
-        normal = _AXES[word.strip()]
+        normal = AXES[word.strip()]
         (at,) = _numbers(value, (1,), "a coordinate, as in z=0.5")
         return Asked(_section("plane", [at * part for part in normal], normal))
     values = _numbers(text, (4, 6), "nx,ny,nz,x,y,z or an axis and a coordinate, as in z=0.5")
@@ -72,11 +72,11 @@ def about_axis(row: ShapeTerms, text: str) -> Asked:
     number, _, axis = text.partition(",")
     (size,) = _numbers(number, (1,), row.size.example)
     if not axis:
-        return Asked(_section(row.value, (), _AXES["z"], size), False)
+        return Asked(_section(row.value, (), AXES["z"], size), False)
     word, _, point = axis.partition(",")
-    if word.strip() in _AXES:
+    if word.strip() in AXES:
         at = _numbers(point, (3,), "x, y or z, then cx,cy,cz") if point else ()
-        return Asked(_section(row.value, at, _AXES[word.strip()], size))
+        return Asked(_section(row.value, at, AXES[word.strip()], size))
     values = _numbers(axis, (3, 6), "x, y, z, ax,ay,az or ax,ay,az,cx,cy,cz")
     return Asked(_section(row.value, values[3:], values[:3], size))
 

@@ -25,8 +25,9 @@ from slideviz.mesh.io.su2b.partial import finish_head, partial_file
 from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.ranks import ALONE, Alone
-from slideviz.mesh.skin import Tick, read_skin
+from slideviz.mesh.skin import read_skin
 from slideviz.mesh.text_skin import skin_of_text, told_of
+from slideviz.mesh.threads import Tick
 from slideviz.terms import FileFormat
 
 SCANNED, COPIED = 0.15, 0.8

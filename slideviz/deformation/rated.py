@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +16,13 @@ from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.skin import index_of
+from slideviz.mesh.threads import Tick
 from slideviz.terms import Metric
 
 CELLS = 1 << 17
 """Cells that are in memory at a time."""
 Zone = tuple[Path, int | None]
 """A file and the number of a zone in it, the first where it is None."""
-Tick = Callable[[float], object]
 
 
 @dataclass(frozen=True, eq=False)

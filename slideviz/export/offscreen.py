@@ -28,7 +28,7 @@ _NORMAL_HEIGHT = 620
 CAPTION_AT = 0.02
 """Where in the width the words above a picture or a film begin."""
 LETTERS = 1.25
-"""Letters of a film are this much larger than those of the view: it is often shown small."""
+"""Letters of pictures and films over those of the view: they are often shown small."""
 
 
 @contextmanager

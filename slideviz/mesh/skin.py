@@ -23,8 +23,8 @@ from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.read import point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 from slideviz.mesh.ranks import ALONE, Alone
+from slideviz.mesh.threads import Tick
 
-Tick = Callable[[float], object]
 Index = slice | IntArray
 """Numbers of cells, as an index of an array."""
 

@@ -12,7 +12,8 @@ from slideviz.mesh.check import printable
 from slideviz.mesh.io.su2.text import Text
 from slideviz.mesh.model import Mesh, Origin
 from slideviz.mesh.ranks import ALONE, Alone
-from slideviz.mesh.skin import Tick, read_skin
+from slideviz.mesh.skin import read_skin
+from slideviz.mesh.threads import Tick
 
 
 def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Mesh:

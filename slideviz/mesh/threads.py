@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
+Tick = Callable[[float], object]
+"""Is told the fraction that is done; may raise to stop."""
+
 PART = 16384
 """Rows of a part."""
 _most = [sys.maxsize]

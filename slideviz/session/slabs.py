@@ -17,6 +17,7 @@ import numpy as np
 from slideviz.deformation.measuring import PointFiles
 from slideviz.mesh.io.su2b.elements import element_blocks, elements_between
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
+from slideviz.mesh.threads import Tick
 from slideviz.sections.cut import sides_of
 from slideviz.sections.model import ON_SECTION, Section
 from slideviz.session.results import Frame
@@ -29,7 +30,6 @@ MOST = 1 << 18
 """Cells that are read at a time."""
 KEPT = 8
 """Sections of one frame that are remembered."""
-Tick = Callable[[float], object]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +17,7 @@ from slideviz.mesh.io.su2b.elements import Block, element_at, element_blocks
 from slideviz.mesh.io.su2b.layout import Source, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
+from slideviz.mesh.threads import Tick
 from slideviz.session.results import Frame
 from slideviz.terms import Metric
 
@@ -25,7 +25,6 @@ FINE = 10_000
 """Intervals of 0 to 1 in which cells are counted; a histogram puts some of them together."""
 LISTED = 100
 """Worst cells that are kept."""
-Tick = Callable[[float], object]
 
 
 @dataclass(frozen=True, eq=False)

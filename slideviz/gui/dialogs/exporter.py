@@ -9,11 +9,12 @@ from pathlib import Path
 from qtpy.QtCore import QObject
 
 from slideviz.errors import SlidevizError
+from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions
 from slideviz.export.vector import MOST_CELLS, SUFFIXES, write_vector
 from slideviz.gui.dialogs.film import FilmDialog
-from slideviz.gui.dialogs.picture import LETTERS, PictureDialog
+from slideviz.gui.dialogs.picture import PictureDialog
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.pixmaps import copy_image, to_image, wait_cursor
 from slideviz.gui.widgets.services import Services

@@ -20,7 +20,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from slideviz.export.offscreen import LARGEST, SMALLEST, font_scale
+from slideviz.export.offscreen import LARGEST, LETTERS, SMALLEST, font_scale
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import BACKGROUNDS, PictureOptions, words_of_size
 from slideviz.export.vector import MOST_CELLS
@@ -60,8 +60,6 @@ SIZES = {
     "other": "other",
 }
 TEXT = {0.8: "small", 1.0: "normal", 1.4: "large"}
-LETTERS = 1.25
-"""Letters of a picture are this much larger than those of the view: it is often shown small."""
 PAPER = (16.0, 10.0, 300.0)
 """Width and height in cm, pixels per inch: the text width of a page."""
 PAPER_POINTS = 8.5

@@ -23,11 +23,11 @@ from slideviz.mesh.io.atomic import mode_of, reason_of
 from slideviz.mesh.io.cleanup import keep, removed_at_stop
 from slideviz.mesh.io.file_checks import require_no_input
 from slideviz.mesh.ranks import ALONE, Alone
+from slideviz.mesh.threads import Tick
 
 HEAD = 8
 """Bytes that are zeros until the end."""
 _PIECE = 1 << 26
-Tick = Callable[[float], object]
 
 
 @dataclass(eq=False)
