@@ -23,7 +23,7 @@ from slideviz.design.loops import farthest, to_points
 from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
 from slideviz.errors import CaseError, ConditionWarning, DeformError, ToleranceWarning, UnsoundError
-from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
@@ -158,6 +158,7 @@ class Deformer:
         self._steps: tuple[FrozenStep, ...] = choose_steps(case, mesh, setup, targets, tell)
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
+        self._facets = self._nearest(value(states[-1].coords))
         if not self._warn_of_doubt(np.max([state.doubt for state in states], axis=0)):
             self._warn_of_condition()
 
@@ -327,8 +328,11 @@ class Deformer:
         state = step.moved(State(setup.coords), targets, room)
         errors = np.maximum(self._off_track(room), state.max_error)
         self._require_sound(1, 1.0, targets, state)
+        one, two = setup.images.T
+        apart = (room[:, two] - room[:, one]) - (setup.coords[two] - setup.coords[one])
+        alike = np.abs(apart).max(initial=0.0) <= FAR * self._size
         to_points(setup.frame, room, setup.coords, self.mesh.points)
-        for points in room:
+        for points in room[:0] if alike else room:
             self._require_alike_after(points)
         return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
 
@@ -390,13 +394,23 @@ class Deformer:
         if not found.max() <= FAR * self._size:  # else it is rounding, without a closer look
             largest_misfit(setup.frame, setup.coords, points, setup.images)
 
+    def _nearest(self, coords: FloatArray) -> dict[int, IntArray]:
+        """Return the facets that the sliding nodes of each track are on at the reference."""
+        tracks, sliding = self._setup.tracks, self._setup.classes.sliding
+        label = tracks.of_node[sliding]
+        return {
+            index: tracks.tracks[index].nearest(coords[sliding[label == index]])[1]
+            for index in np.unique(label[label >= 0]).tolist()
+        }
+
     def _off_track(self, coords: FloatArray) -> FloatArray:
         """Return how far sliding nodes are off their boundary, at most, (...,)."""
         tracks, sliding = self._setup.tracks, self._setup.classes.sliding
         label, off = tracks.of_node[sliding], np.zeros(coords.shape[:-2])
-        for index in np.unique(label[label >= 0]).tolist():
+        for index, facets in self._facets.items():
             at = flat(coords[..., sliding[label == index], :])
-            gap = np.linalg.norm(tracks.tracks[index].query(at) - at, axis=1)
+            guess = np.tile(facets, len(at) // len(facets))
+            gap = np.linalg.norm(tracks.tracks[index].nearest(at, guess)[0] - at, axis=1)
             off = np.maximum(off, gap.reshape(*off.shape, -1).max(axis=-1))
         return off
 

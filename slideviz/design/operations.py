@@ -23,7 +23,7 @@ PAIRS = 1_000_000
 """Pairs whose radial functions are in memory at a time, in each thread, when many columns share
 them: they, and what they are multiplied to, stay in the cache."""
 
-ROWS = 512
+ROWS = 256
 """Targets of these, at most."""
 
 
@@ -163,10 +163,12 @@ def many(
     size = min(ROWS, max(64, PAIRS // max(1, n)))
 
     def fill(part: slice) -> None:
+        found = np.empty((size, wide.shape[1]))
         for first in range(part.start, part.stop, size):
             here = slice(first, min(part.stop, first + size))
             values = matrix(basis, (targets[:, here], None), (controls, None))
-            place(values @ wide, first, out)
+            np.matmul(values, wide, out=found[: len(values)])
+            place(found[: len(values)], first, out)
 
     with enough_threads(0.0):  # the threads are those of the parts
         in_parts(fill, total)

@@ -17,6 +17,8 @@ from slideviz.rbf.compiled import one_at_a_time
 LEAF = 4
 TIE = 1e-12
 """Squares of distances that differ by less than this part are equal but for rounding."""
+ON = 1e-30
+"""Square of a distance, in parts of that from the origin, of a point on its guessed triangle."""
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy"}
 
 
@@ -171,11 +173,24 @@ def _is_beside(a, b, gap):  # type: ignore[no-untyped-def]
     return apart <= 4.0 * TIE * gap
 
 
+@njit(inline="always", **_OPTIONS)
+def _load(item, corners, shifts, out):  # type: ignore[no-untyped-def]
+    """Write the corners of an item to ``out`` (3, 3)."""
+    image = _image(item, len(corners))
+    one = item - image * len(corners)
+    for corner in range(3):
+        for axis in range(3):
+            out[corner, axis] = corners[one, corner, axis]
+            if image > 0:  # adding zero would turn -0.0 into 0.0
+                out[corner, axis] += shifts[image, axis]
+
+
 @njit(parallel=True, **_OPTIONS)
-def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-untyped-def]
+def _query(x, corners, shifts, order, bounds, guess, out, which):  # type: ignore[no-untyped-def]
     """Write the closest points of all triangles (n, 3, 3) to x (m, 3) into out (m, 3).
 
-    And into ``which`` (m,) the items that they are on, numbered as for ``_build``.
+    And into ``which`` (m,) the items that they are on, numbered as for ``_build``. They are looked
+    for from the items ``guess`` (m,) on, where there are any.
 
     Of several equally near ones the position decides, not the order of the triangles.
     """
@@ -188,6 +203,12 @@ def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-un
         point, trial, t = np.empty(3), np.empty(3), np.empty((3, 3))
         best, held, top = np.inf, np.inf, 1
         stack[0], first[0], last[0] = 0, 0, len(order)
+        if len(guess):
+            _load(guess[i], corners, shifts, t)
+            best = held = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
+            out[i], which[i] = point, guess[i]
+            if best <= ON * (x[i, 0] ** 2 + x[i, 1] ** 2 + x[i, 2] ** 2):
+                continue
         while top > 0:
             top -= 1
             k, a, b = stack[top], first[top], last[top]
@@ -195,13 +216,7 @@ def _query(x, corners, shifts, order, bounds, out, which):  # type: ignore[no-un
                 continue
             if k >= inner:
                 for j in range(a, b):
-                    image = _image(order[j], len(corners))
-                    one = order[j] - image * len(corners)
-                    for corner in range(3):
-                        for axis in range(3):
-                            t[corner, axis] = corners[one, corner, axis]
-                            if image > 0:  # adding zero would turn -0.0 into 0.0
-                                t[corner, axis] += shifts[image, axis]
+                    _load(order[j], corners, shifts, t)
                     gap = _on_triangle(x[i], t[0], t[1], t[2], point, trial)
                     nearer = gap < best * (1.0 - TIE)
                     if not nearer and gap <= best * (1.0 + TIE):
@@ -273,15 +288,24 @@ class ClosestPoints:
         """Return the closest point on the simplices for each x, (m, d)."""
         return self.nearest(x)[0]
 
-    def nearest(self, x: FloatArray) -> tuple[FloatArray, IntArray]:
+    def nearest(self, x: FloatArray, guess: IntArray | None = None) -> tuple[FloatArray, IntArray]:
         """Return the closest point for each x, (m, d), and the simplex that it is on, (m,).
 
         For its corners see `simplices`.
+
+        Parameters
+        ----------
+        guess : (m,), optional
+            Simplices that are probably the closest, for speed. One that a point is on is taken,
+            also where it is on others too.
         """
+        begin = np.empty(0, np.int64) if guess is None else guess
         dim = x.shape[1]
         targets = np.zeros((len(x), 3))
         targets[:, :dim] = x
         out, which = np.empty_like(targets), np.zeros(len(x), np.int64)
         with one_at_a_time(50 * len(x)):
-            _query(targets, self._corners, self._shifts, self._order, self._bounds, out, which)
+            _query(
+                targets, self._corners, self._shifts, self._order, self._bounds, begin, out, which
+            )
         return out[:, :dim], which

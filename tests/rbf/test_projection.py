@@ -208,3 +208,14 @@ def test_a_node_without_a_track_stays():
     tracks = Tracks((track,), np.array([0, -1]), False)
     found = tracks.project(np.zeros((2, 2)), np.array([0, 1]), np.full((2, 2), 0.3))
     np.testing.assert_array_equal(found, [[0.3, 0.0], [0.0, 0.0]])
+
+
+def test_a_guess_changes_no_distance():
+    rng = np.random.default_rng(5)
+    corners = rng.normal(size=(40, 3, 3))
+    tree = ClosestPoints(corners)
+    x = np.concatenate([rng.normal(size=(60, 3)), corners.mean(axis=1)])
+    plain = np.linalg.norm(tree.query(x) - x, axis=1)
+    for guess in (rng.integers(0, 40, size=100), tree.nearest(x)[1]):
+        found = np.linalg.norm(tree.nearest(x, guess)[0] - x, axis=1)
+        np.testing.assert_allclose(found, plain, rtol=1e-12, atol=1e-14)
