@@ -22,7 +22,7 @@ from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit
 from slideviz.rbf.problem import Problem, Solution, Watch
-from slideviz.rbf.refine import DOUBTFUL
+from slideviz.rbf.refine import TRUSTED
 
 HALVINGS = 3
 """How often a step that folds a cell is halved."""
@@ -277,7 +277,7 @@ def _short_warning(setup: Setup, solution: Solution, index: int) -> str:
 def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -> list[str]:
     """Return the sentence about a system whose solution cannot be trusted, or was refined."""
     nearly = f"the system is nearly singular (condition number {condition:.0e})"
-    if doubt > DOUBTFUL:
+    if doubt > TRUSTED:
         sentence = (
             f"step {index}: {nearly}, so that between the boundary nodes the displacement may be "
             f"wrong by {100 * doubt:.2g} % of the largest; use DATA_REDUCTION= YES, a less smooth "

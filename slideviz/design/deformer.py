@@ -27,7 +27,7 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
 from slideviz.rbf.problem import Solution
-from slideviz.rbf.refine import DOUBTFUL
+from slideviz.rbf.refine import TRUSTED
 
 BADLY_CONDITIONED = 1e14
 """From this condition number on, what a single node moves alone has few correct digits."""
@@ -440,9 +440,9 @@ class Deformer:
     def _warn_of_doubt(self, doubt: FloatArray) -> bool:
         """Warn where the points of designs cannot be trusted, and tell whether that is so."""
         worst = float(doubt.max(initial=0.0))
-        if worst <= DOUBTFUL:
+        if worst <= TRUSTED:
             return False
-        of = "" if doubt.ndim == 0 else f" of {np.count_nonzero(doubt > DOUBTFUL)} designs"
+        of = "" if doubt.ndim == 0 else f" of {np.count_nonzero(doubt > TRUSTED)} designs"
         warnings.warn(
             f"the condition number of the system is {self._condition():.0e}: derivatives, and "
             f"points{of} between the boundary nodes, may be wrong by {100 * worst:.2g} % of the "

@@ -26,13 +26,11 @@ from slideviz.rbf.evaluate import Basis, Tick, evaluate, matrix, no_tick
 from slideviz.rbf.solve import Factor, enough_threads, solve_lower
 from slideviz.rbf.twofold import Residuals
 
-TRUSTED = 1e-6
-"""Part of the largest displacement by which an ordinary solution may be wrong between nodes."""
+TRUSTED = 1e-5
+"""Part of the largest displacement by which a field may be wrong between control nodes: above, the
+system is refined, and where that does not help the user is told."""
 
-DOUBTFUL = 1e-5
-"""Part of it from which on the user is told that the field may be wrong, refined or not."""
-
-SETTLED, VERIFIED = 1e-3 * TRUSTED, 1e-2 * TRUSTED
+SETTLED, VERIFIED = 1e-4 * TRUSTED, 1e-3 * TRUSTED
 """Parts of it that the last step of a refinement may change, and that it may be wrong by then."""
 
 SHIFT = 1e-14
