@@ -331,6 +331,30 @@ def test_ranks_of_a_machine_share_its_cores(monkeypatch, cores, each):
     assert given == [set().union(*cores)]
 
 
+@contextmanager
+def working(seen):
+    def work(task):
+        if task == 7:
+            raise KeyError(task)
+        time.sleep(0.002 * (task % 3))
+        seen.append(task)
+        return 10 * task
+
+    yield work
+
+
+def test_parts_come_in_order_and_none_is_begun_after_an_error():
+    seen = []
+    with ranks.ALONE.sharing(working, seen) as do:
+        assert list(do(range(7))) == list(range(0, 70, 10))
+        assert list(do([])) == []
+        come = do(range(5, 1000))
+        assert [next(come), next(come)] == [50, 60]
+        with pytest.raises(KeyError):
+            next(come)
+    assert max(seen) < 100
+
+
 def test_threads_are_limited_for_a_time():
     before = threads.cores()
     with ranks.limited(1):

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slideviz.mesh.periodic import match
-from slideviz.rbf.frames import Frame, make_frame
+from slideviz.rbf.frames import Frame, _middle_angle, make_frame
 from tests import builders
 
+SEEDS = st.integers(0, 10_000)
 VECTOR = st.tuples(*[st.floats(-2, 2)] * 3)
 
 
@@ -41,6 +42,25 @@ def test_the_cut_of_theta_lies_in_the_empty_sector():
     theta = frame.coords(mesh.points)[:, 1] / frame.radius
     assert np.ptp(theta) == pytest.approx(np.radians(40.0))
     assert frame.shift()[1] / frame.radius == pytest.approx(np.radians(40.0))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=SEEDS,
+    count=st.integers(1, 40),
+    width=st.sampled_from([0.01, 1.0, 6.28]),
+    full=st.booleans(),
+)
+def test_the_empty_sector_is_that_between_neighbours(seed, count, width, full):
+    """Also where it is narrower than what the circle is divided into."""
+    rng = np.random.default_rng(seed)
+    angles = (rng.uniform(-pi, pi) + width * rng.random(count) + pi) % (2 * pi) - pi
+    if full:
+        angles = np.r_[angles, rng.uniform(-pi, pi, 5000), -pi, pi]
+    ordered = np.sort(angles)
+    gaps = np.diff(np.r_[ordered, ordered[0] + 2 * pi])
+    k = np.argmax(gaps)
+    assert _middle_angle(angles) == ordered[k] + gaps[k] / 2 + pi
 
 
 def test_small_displacements_are_components_along_r_and_theta():

@@ -52,6 +52,33 @@ def test_no_simplex_of_a_track_is_nearer(seed, count, c):
     np.testing.assert_allclose(np.linalg.norm(found - x, axis=1), gaps, atol=1e-12)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_images_are_those_that_stand_beside_their_simplices(dim):
+    rng = np.random.default_rng(dim)
+    corners, shift = rng.normal(size=(40, dim, dim)), np.array([0.3, -1.7, 0.0])[:dim]
+    every = np.concatenate([corners, corners - shift, corners + shift])
+    x = 3.0 * rng.normal(size=(200, dim))
+    track = ClosestPoints(corners, shift)
+    found, which = track.nearest(x)
+    expected, there = ClosestPoints(every).nearest(x)
+    assert np.array_equal(found, expected)
+    assert np.array_equal(which, there)
+    assert set(which // 40) == {0, 1, 2}
+    assert np.array_equal(track.simplices(which), every[which])
+
+
+@pytest.mark.parametrize("scale", [1e-42, 1.0, 1e40])
+def test_no_simplex_is_missed_where_boxes_are_rounded(scale):
+    """Boxes have four bytes for a number, which go from 1e-45 to 3e38."""
+    rng = np.random.default_rng(3)
+    corners, x = rng.normal(size=(60, 3, 3)), rng.normal(size=(50, 3))
+    corners, x = corners * scale, x * scale
+    found, _ = ClosestPoints(corners).nearest(x)
+    each = np.stack([ClosestPoints(one[None]).query(x) for one in corners])
+    gaps = np.linalg.norm((each - x) / scale, axis=2).min(axis=0)
+    np.testing.assert_allclose(np.linalg.norm((found - x) / scale, axis=1), gaps, atol=1e-12)
+
+
 def test_degenerate_simplices_do_no_harm():
     point = np.tile([1.0, 2.0, 3.0], (1, 3, 1))
     np.testing.assert_allclose(ClosestPoints(point).query(np.zeros((1, 3))), [[1, 2, 3]])
