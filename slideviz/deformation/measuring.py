@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,8 @@ from slideviz.terms import Metric
 
 READ = 1 << 20
 """Points that are read in one piece."""
+PIECE = 1 << 22
+"""Numbers of all cells that are looked at in one piece."""
 SPARSE = 8
 """A block of cells whose nodes lie within so many times their number is read with all between."""
 
@@ -181,13 +183,40 @@ class Rating:
     def _of(self, values: FloatArray, status: NDArray[np.uint8]) -> Quality:
         none = np.empty(0)
         found = Quality(values, none, none, status, self._signs, self._metric)
-        found.summary()  # it keeps the numbers that all values are looked at for
-        self._release()
+        lowest, inverted = np.inf, 0
+
+        def look(part: slice) -> None:
+            nonlocal lowest, inverted
+            lowest = min(lowest, float(values[part].min()))
+            inverted += int(np.count_nonzero(status[part] == INVERTED))
+            self._release()
+
+        mean = summed(values, look) / len(values)
+        # Found already: all numbers at once would be in memory.
+        vars(found).update(min=lowest, mean=mean, inverted=inverted)
         return found
 
     def _release(self) -> None:
         for file in self._files:
             file.release()
+
+
+def summed(
+    values: FloatArray, look: Callable[[slice], object], first: int = 0, last: int | None = None
+) -> float:
+    """Return the sum of numbers (k,) from the ``first`` to before the ``last``, piece by piece.
+
+    With the bits of ``numpy.sum``, which adds up halves of halves, each of a multiple of 8; after
+    each piece ``look`` is called with its place.
+    """
+    last = len(values) if last is None else last
+    half = (last - first) // 2 // 8 * 8
+    if last - first > PIECE:
+        middle = first + half
+        return summed(values, look, first, middle) + summed(values, look, middle, last)
+    found = float(values[first:last].sum())
+    look(slice(first, last))
+    return found
 
 
 class Scratch:

@@ -8,7 +8,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.deformation import rated
+from slideviz.deformation import measuring, rated
 from slideviz.errors import MeshError
 from slideviz.mesh import skin
 from slideviz.mesh.io.cleanup import PREFIX
@@ -172,3 +172,15 @@ def test_numbers_of_cells_are_in_files_that_end(small):
         assert len(list(Path("scratch").glob(f"{PREFIX}*"))) == 2
         assert whole.types == {9: 16}
     assert not list(Path("scratch").iterdir())
+
+
+@pytest.mark.parametrize("count", [0, 7, 129, 1000, 99_991])
+def test_a_sum_by_pieces_has_the_bits_of_one(monkeypatch, count):
+    monkeypatch.setattr(measuring, "PIECE", 500)
+    values, seen = np.random.default_rng(count).random(count), np.zeros(count, int)
+
+    def look(part):
+        seen[part] += 1
+
+    assert measuring.summed(values, look) == values.sum()
+    assert (seen == 1).all()
