@@ -13,6 +13,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from slideviz import __version__
 from slideviz.case.model import Case
 from slideviz.deformation.given_mesh import given_for, require_su2
@@ -181,10 +183,13 @@ def _solved(case: Case, read: Callable[[], Mesh], out: Output, tell: Tell) -> Re
         with watch.phase("classify"):
             setup = make_setup(case, skin)
         require_memory(setup, case)
-        # No memory for what is not needed any more: cells from here on, and after the steps tracks.
+        # No memory for what is not needed any more: cells and joints, and after the steps tracks.
         none = Cells.from_blocks([])
         markers = tuple(Marker(marker.name, none) for marker in skin.markers)
         skin = replace(skin, cells=none, markers=markers)
+        pairs = np.empty((0, 2), np.int64)
+        boundary = replace(setup.boundary, owner=pairs[:, 0], joints=pairs, joint_nodes=pairs)
+        setup = replace(setup, boundary=boundary)
         lean = replace(setup, tracks=Tracks((), setup.tracks.of_node[:0], setup.tracks.curved))
         give_back()
 
