@@ -347,9 +347,7 @@ POINTS_SHOWN: dict[PointsShown, Term] = {
     "control": Term("control nodes"),
 }
 
-Shown = Literal[
-    "edges", "undeformed", "motion_ghost", "legend", "triad", "ffd_boxes", "perspective"
-]
+Shown = Literal["edges", "undeformed", "motion_ghost", "legend", "triad", "ffd", "perspective"]
 
 
 @dataclass(frozen=True)
@@ -398,7 +396,7 @@ SHOWN: dict[Shown, ShownTerm] = {
         at_first=True,
         in_bar=False,
     ),
-    "ffd_boxes": ShownTerm(
+    "ffd": ShownTerm(
         "FFD boxes",
         "Draw the control points of the boxes for free-form deformation.",
         shortcut="B",

@@ -34,7 +34,7 @@ class BoxLayer(Layer):
         """Draw another state of the session."""
         if new.mesh is None:
             return
-        shown = "ffd_boxes" in new.view.drawn
+        shown = "ffd" in new.view.drawn
         case = new.case
         definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
         key = (new.mesh, _ffd_motions(case), definition, self.stage.scheme) if shown else ()

@@ -74,7 +74,7 @@ def _with_motions(session: Session, motions: Sequence[Motion]) -> Session:
     """Return the session with other motions; the first one of a box has the boxes drawn."""
     found = set_case(session, motions=tuple(motions))
     if has_ffd(found.case) and not has_ffd(session.case):
-        return replace(found, view=found.view.with_drawn({"ffd_boxes": True}))
+        return replace(found, view=found.view.with_drawn({"ffd": True}))
     return found
 
 

@@ -154,5 +154,5 @@ def fresh_view(session: Session, old: ViewState) -> Session:
 
     Its boxes are drawn if it has motions of them.
     """
-    drawn = old.with_drawn({"ffd_boxes": "ffd_boxes" in session.view.drawn}).drawn
+    drawn = old.with_drawn({"ffd": "ffd" in session.view.drawn}).drawn
     return set_view(session, drawn=drawn, colour_map=old.colour_map)

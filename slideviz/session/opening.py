@@ -30,7 +30,7 @@ def open_mesh(
     chosen = chosen.change(roles=listed | others, mesh_file=path or chosen.mesh_file)
     view = kept_view(chosen, ViewState(), mesh.marker_names)
     if has_ffd(chosen) and "VIEW_SHOW" not in chosen.view:
-        view = view.with_drawn({"ffd_boxes": True})
+        view = view.with_drawn({"ffd": True})
     flat = flat_one(view.sections)
     if mesh.part is not None:
         view = replace(view, threshold=None)  # it would choose among all cells

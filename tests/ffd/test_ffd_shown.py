@@ -73,7 +73,7 @@ def test_lattices_are_drawn_where_they_are_wanted(boxed, scene):
     session = session_of(boxed)
     scene.open(session, find_surfaces(boxed))
     assert not set(NAMES) & set(scene.plotter.actors)
-    session = changes.set_view(session, ffd_boxes=True)
+    session = changes.set_view(session, ffd=True)
     scene.update(session)
     shape = scene.plotter.actors[NAMES[0]].mapper.dataset
     assert (shape.n_points, shape.n_lines) == (4 * 2 + 6 * 3, 4 + 2 * 3 + 2 * 6 + 3 * 5)
@@ -87,7 +87,7 @@ def test_lattices_are_drawn_where_they_are_wanted(boxed, scene):
     assert shift[5] == pytest.approx([0.0, 0.5])
     scene.set_scheme(DARK)
     assert scene.plotter.actors[NAMES[0]].prop.color.hex_rgb != "#000000"
-    scene.update(changes.set_view(session, ffd_boxes=False))
+    scene.update(changes.set_view(session, ffd=False))
     assert not set(NAMES) & set(scene.plotter.actors)
 
 
@@ -97,20 +97,20 @@ def test_solid_boxes_are_drawn_in_space(scene):
         [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float
     )
     boxed = with_boxes(mesh, [regular_box("CUBE", corners, (2, 1, 1), None)])
-    scene.open(changes.set_view(session_of(boxed), ffd_boxes=True), find_surfaces(boxed))
+    scene.open(changes.set_view(session_of(boxed), ffd=True), find_surfaces(boxed))
     shape = scene.plotter.actors[NAMES[0]].mapper.dataset
     assert (shape.n_points, shape.n_lines) == (12, 8 + 6 + 6)
 
 
 def test_boxes_are_drawn_at_first_where_a_motion_is_of_one(boxed):
     plain = session_of(boxed)
-    assert "ffd_boxes" not in plain.view.drawn
+    assert "ffd" not in plain.view.drawn
     opened = session_of(boxed, PUSH)
-    assert "ffd_boxes" in opened.view.drawn
-    assert "ffd_boxes" in changes.fresh_view(opened, ViewState()).view.drawn
+    assert "ffd" in opened.view.drawn
+    assert "ffd" in changes.fresh_view(opened, ViewState()).view.drawn
     added = changes.add_motion(plain, PUSH)
-    assert "ffd_boxes" in added.view.drawn
+    assert "ffd" in added.view.drawn
     # Who takes them away is not asked again by the next number that is typed.
-    gone = changes.set_view(added, ffd_boxes=False)
+    gone = changes.set_view(added, ffd=False)
     other = changes.replace_motion(gone, 0, sv.Ffd("y_low", "BOX", (2, 1, -1), (0.0, 0.1, 0.0)))
-    assert "ffd_boxes" not in other.view.drawn
+    assert "ffd" not in other.view.drawn
