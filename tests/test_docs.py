@@ -70,9 +70,11 @@ def test_an_example_of_the_gallery_runs(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_a_page_shows_what_its_commands_print(page, tmp_path):
+    python = ""
     for kind, text in BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
         if kind == "python":
-            run([sys.executable, "-c", text], tmp_path)
+            python += text  # goes on with what stands before
+            run([sys.executable, "-c", python], tmp_path)
             continue
         if kind != "console":
             (tmp_path / kind.split(":caption:")[1].strip()).write_text(text)
