@@ -432,10 +432,11 @@ def test_nothing_is_said_where_all_is_compiled(square, capsys):
 
 def test_what_is_harmless_is_a_note_and_no_warning(square, capsys):
     argv = ["run", str(square / "square.cfg"), "--set", "CURVED=YES", "--set", "SLIDING_MODE=none"]
-    run([*argv, "--set", "PERIODIC_MODE=fixed", "-q"])
-    told = capsys.readouterr().err
-    assert "slideviz: note: CURVED= YES is without effect" in told
-    assert "slideviz: warning: SLIDING_MODE= none: " in told
+    for quiet in ([], ["-q"]):
+        run([*argv, "--set", "PERIODIC_MODE=fixed", *quiet])
+        told = capsys.readouterr().err
+        assert ("slideviz: note: CURVED= YES is without effect" in told) == (not quiet)
+        assert "slideviz: warning: SLIDING_MODE= none: " in told
 
 
 def test_roles_that_the_method_does_not_use_are_told(square, capsys):

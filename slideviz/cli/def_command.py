@@ -153,7 +153,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
         for name, count in counts.items():
             print(f"FFD box {name}: {count} surface nodes")
         print(f"mesh: {case.mesh_out}")
-    print_remarks(case.warnings)
+    print_remarks(case.warnings, quiet=arguments.quiet)
     for name, count in counts.items():
         if not count:
             words = f"no node of {', '.join(config.markers)} is in the FFD box {name}"

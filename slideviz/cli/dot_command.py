@@ -68,7 +68,7 @@ def run_dot(arguments: argparse.Namespace) -> int:
     }
     if not save_json(arguments.json, report) and not arguments.quiet:
         _print(report, sensitivities, gradient)
-    print_remarks(report["warnings"])
+    print_remarks(report["warnings"], quiet=arguments.quiet)
     return DONE
 
 

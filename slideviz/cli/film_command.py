@@ -172,7 +172,7 @@ def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Fram
         for step in deform(case, mesh, bar):
             found = quality(step.mesh, reference=mesh, metric=case.quality_metric)
             frames.append(Frame(step.mesh, found, step))
-    print_remarks(step.warnings)
+    print_remarks(step.warnings, quiet=arguments.quiet)
     return tuple(frames)
 
 

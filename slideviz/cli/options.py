@@ -58,7 +58,10 @@ def words_of(reference: Path | None) -> str:
 SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "case": (("case",), {"type": Path, "help": "the case file (.cfg)"}),
     "zone": (("--zone",), {"type": int, "metavar": "N", "help": "zone of the mesh file, from 1"}),
-    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "print nothing but errors"}),
+    "quiet": (
+        ("-q", "--quiet"),
+        {"action": "store_true", "help": "print nothing but warnings and errors"},
+    ),
     "json": (
         ("--json",),
         {"type": Path, "metavar": "FILE", "help": "as JSON; - is the terminal"},

@@ -192,9 +192,11 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
-def print_remarks(remarks: Iterable[str]) -> None:
-    """Print warnings, and what is harmless as notes, where errors go."""
+def print_remarks(remarks: Iterable[str], *, quiet: bool) -> None:
+    """Print warnings, and what is harmless as notes unless ``quiet``, where errors go."""
     for text in remarks:
+        if quiet and isinstance(text, Note):
+            continue
         kind = "note" if isinstance(text, Note) else "warning"
         print(f"slideviz: {kind}: {text}", file=sys.stderr)
 

@@ -36,7 +36,7 @@ def tell(
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
-    print_remarks(report["warnings"])
+    print_remarks(report["warnings"], quiet=arguments.quiet)
     if found.inverted:
         print(f"slideviz: {_inverted_sentence(found, report, folded)}", file=sys.stderr)
         return INVERTED

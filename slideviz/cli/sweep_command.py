@@ -104,7 +104,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     report["results"] = str(folder / RESULTS)
     if not save_json(arguments.json, report) and not arguments.quiet:
         _print_sweep(report)
-    _warn(case.warnings, found)
+    _warn(case.warnings, found, arguments.quiet)
     if report["failed"] == len(found):
         raise CaseError(f"no design could be computed; {folder / RESULTS} says why for each")
     return DONE
@@ -237,11 +237,11 @@ def _print_sweep(report: dict[str, Any]) -> None:
     print(f"results: {report['results']}")
 
 
-def _warn(warnings: Sequence[str], rows: Sequence[Row]) -> None:
+def _warn(warnings: Sequence[str], rows: Sequence[Row], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason once."""
     from slideviz.cli.report import print_remarks
 
-    print_remarks(warnings)
+    print_remarks(warnings, quiet=quiet)
     reasons: dict[str, list[int]] = {}
     for row in sorted(rows, key=_number):
         if row.problem:

@@ -48,11 +48,14 @@ class Given:
         The zone in it.
     text : Text or None
         What it is the binary form of.
+    is_left : bool
+        Whether a stopped run has left that binary form.
     """
 
     path: Path
     zone: int | None
     text: Text | None = None
+    is_left: bool = False
 
     def text_size(self, place: ZonePlace) -> int:
         """Return about how many bytes the mesh, whose binary form stands there, has as a text."""
@@ -194,13 +197,14 @@ def given_for(
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
     with partial_file(output, plan.size, about, resume=resume, more=".binary") as copy:
-        if not copy.done:
+        is_left = bool(copy.done)
+        if not is_left:
             require_room(output, output, plan.size + _later(plan, is_text))
             head = fill(plan, copy.path, _from(tick, SCANNED, COPIED), ranks)
             finish_head(copy.file, head)
             copy.note([1])
         with told_of(text, copy.path):
-            yield Given(copy.path, None, text)
+            yield Given(copy.path, None, text, is_left)
         copy.remove()
 
 
@@ -244,8 +248,8 @@ def require_room(place: Path, path: Path, size: int) -> None:
     free = shutil.disk_usage(folder).free
     if size > free:
         raise MeshError(
-            f"{path}: {size / 1e9:.1f} GB of disk are needed in {folder} while this lasts, but "
-            f"{free / 1e9:.1f} GB are free; free some space or choose another disk"
+            f"{path}: {size / 1e6:,.0f} MB of disk are needed in {folder} while this lasts, but "
+            f"{free / 1e6:,.0f} MB are free; free some space or choose another disk"
         )
 
 

@@ -85,9 +85,9 @@ def require_one_way(signs: NDArray[np.int8], name: str, first: int, also: str = 
     """
     if len(signs) > 1:
         raise MeshError(
-            f"{name}: some cells are numbered the other way round than others (near element "
-            f"{first}), which only the whole mesh can tell from folded ones; {also}run it without "
-            "--stream, or mesh again"
+            f"{name}: some cells are numbered the other way round than others (from element "
+            f"{first} on), which only the whole mesh can tell from folded ones; {also}run it "
+            "without --stream, or mesh again"
         )
 
 

@@ -112,6 +112,10 @@ class Output:
         done, total = self._opened().done, len(parts(self._place.n_points))
         if done:
             return f"{self._path.name}: goes on after {done} of {total} parts"
+        if self._given.is_left:
+            return (
+                f"{self._path.name}: goes on with the text as it was read; no part is written yet"
+            )
         return (
             f"{self._path.name}: there is nothing to go on with, of this case, mesh and version; "
             "it is made from the beginning"

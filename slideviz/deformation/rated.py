@@ -80,7 +80,7 @@ def rated_blocks(
             base = now.with_points(before.points(before.before, nodes)) if before else None
             found = quality(now, base, metric)
             signs = ways_of(np.concatenate([signs, found.signs]))
-            also = "" if before else "give --reference UNDEFORMED, "
+            also = "" if before else "rate a deformed mesh with --reference UNDEFORMED, "
             require_one_way(signs, source.name, block.first, also)
             yield Rated(block.ids, nodes, now, base, found)
             tick((block.first + len(block.types)) / place.cells.count)

@@ -379,7 +379,9 @@ class Deformer:
             largest = part * float(np.linalg.norm(target, axis=1).max(initial=0.0))
             reach = max(largest, part * self._least)
             if far[k] > GROWTH * reach or lost[k] > HOPELESS * largest:
-                solution = Solution(coords[k], 0, 0.0, self.nodes[:0], np.nan, lost=float(lost[k]))
+                solution = Solution(
+                    coords[k], 0, 0.0, self.nodes[:0], self._condition(), lost=float(lost[k])
+                )
                 setup = replace(self._setup, target=target)
                 unsound = unsoundness(setup, self.mesh, solution, coords[k], part, self._least)
                 if unsound:

@@ -97,12 +97,12 @@ class Box:
         return i, j, k
 
     def describe(self, dim: int) -> str:
-        """Return degrees, blending and the number of surface nodes in words, of 2D or 3D."""
+        """Return degrees, blending and the number of surface points in words, of 2D or 3D."""
         words = f"degree {' x '.join(map(str, self.degrees[:dim]))}, "
         words += "Bézier" if self.orders is None else "uniform B-splines of order "
         words += " x ".join(map(str, (self.orders or ())[:dim]))
-        count = len(np.unique([node for nodes, _ in self.embedded.values() for node in nodes]))
-        return words + f", {count:,} surface nodes of {', '.join(self.embedded)}" * bool(count)
+        count = sum(len(nodes) for nodes, _ in self.embedded.values())
+        return words + f", {count:,} surface points of {', '.join(self.embedded)}" * bool(count)
 
     def factors(self, uvw: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return the blending functions of each direction and their slopes, (m, count) each."""

@@ -275,6 +275,7 @@ def test_a_run_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch, smal
             told: list[str] = []
             stream(case, out, note=told.append, resume=True)
         assert (f"goes on after {stop} of {parts} parts" in told[0]) == (stop > 0)
+        assert ("goes on with the text as it was read" in told[0]) == (stop == 0)
         assert bool(made_again) == (stop == -1)
         assert len(moved) == parts - max(stop, 0)
         assert out.read_bytes() == whole
@@ -395,7 +396,7 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
     with pytest.raises(MeshError, match=r"far.su2: point 19 is at .*1e\+60.* larger than 1e\+50"):
         stream(case.change(mesh_file=tmp_path / "far.su2"), out)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(9, 9, 1000))
-    with pytest.raises(MeshError, match=r"GB of disk are needed in .* but 0.0 GB are free"):
+    with pytest.raises(MeshError, match=r"MB of disk are needed in .* but 0 MB are free"):
         stream(case, out)
     assert not out.exists()
     assert not list(tmp_path.glob(".*"))

@@ -104,7 +104,7 @@ def keep(path: Path, words: str) -> None:
 
 def left() -> str:
     """Return in words what is left when the process ends now."""
-    return "; ".join(_kept.values()) or NOTHING_LEFT
+    return next(reversed(_kept.values()), NOTHING_LEFT)
 
 
 def is_alive(pid: str) -> bool:

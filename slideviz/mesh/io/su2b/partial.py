@@ -181,7 +181,7 @@ def finish_head(file: BinaryIO, head: bytes) -> None:
 
 
 def _kept_words(ours: Path) -> str:
-    return f"what is done is kept in {ours.name}; go on with --resume"
+    return f"what is done is kept in {ours}; go on with --resume"
 
 
 def _noted(note: Path, about: str) -> list[int]:
