@@ -9,6 +9,7 @@ from qtpy.QtTest import QTest
 
 import slideviz as sv
 from slideviz.design import sweep as sweeping
+from slideviz.design.sweep_row import Row
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import plot_canvas
 from slideviz.gui.widgets.plot_image import Paper, Place, picture
@@ -115,6 +116,24 @@ def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     panel.show_design(2)
     assert panel.said.text().startswith("Design 2: PERIODIC_MODE= moving needs")
     assert panel.shown is None
+
+
+def test_what_is_said_is_seen_whole_and_begins_with_the_reason(window, passage, qtbot):
+    panel = passage
+    window.resize(1280, 800)
+    fill(panel, "STEPS", "1, 2")
+    why = f"the cells around the tip of the blade turn over in step 1. {'Make more steps. ' * 8}"
+    name = window.store.session.mesh.name
+    panel.mesh = window.store.session.mesh
+    panel.table = panel.table.with_results([Row(1, problem=f"{name}: {why}"), Row(2, inverted=3)])
+    panel._ended("", wrong=False)
+    assert panel.said.text().startswith("1 failed: the cells around")
+    assert panel.said.text().endswith("2 designs done; 1 with inverted cells")
+    qtbot.waitUntil(lambda: panel.said.height() > 2 * panel.fontMetrics().height())
+    assert panel.said.width() > 0.9 * panel.width()
+    assert panel.said.height() >= panel.said.heightForWidth(panel.said.width())
+    panel.show_design(1)
+    assert panel.said.text() == f"Design 1: {why}"
 
 
 def test_mistakes_are_told_and_change_nothing(passage):

@@ -18,7 +18,7 @@ from slideviz.gui.panels.designs_plot import DesignPlot
 from slideviz.gui.panels.designs_rows import DesignRows
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import QuietBar, in_column, in_row, push_button, set_style
-from slideviz.gui.widgets.labels import ElidedLabel
+from slideviz.gui.widgets.labels import wide_label, wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import Services
 from slideviz.mesh.model import Mesh
@@ -61,7 +61,7 @@ class DesignsPanel(Panel):
         split.addWidget(self.plot)
         split.setChildrenCollapsible(False)
         foot = self._make_foot()
-        in_column(split, foot, wide=[split], spacing=4, on=self, margins=(6, 4, 6, 4))
+        in_column(split, foot, self.said, wide=[split], spacing=4, on=self, margins=(6, 4, 6, 4))
         self._connect()
         self.follow()
 
@@ -89,10 +89,10 @@ class DesignsPanel(Panel):
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(110)
-        self.said = ElidedLabel()
-        self.said.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self.said = wide_label(lines=3)
+        self.said.hide()
         files = (self.load, self.save, self.remove)
-        return in_row(self.run, self.stop, self.bar, self.said, *files, wide=[self.said], spacing=4)
+        return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
 
     def _connect(self) -> None:
         self.rows.model.edited = self._edited
@@ -145,12 +145,11 @@ class DesignsPanel(Panel):
         count = len(self.table.rows)
         self.run.setText(f"Run {count} design{'' if count == 1 else 's'}" if rows else "Run")
         self.bar.setVisible(busy)
-        for button in (self.load, self.remove):  # the words about what runs need the room
-            button.setVisible(not busy)
 
     def _say(self, text: str, wrong: bool = False) -> None:
         self.said.setText(text)
-        self.said.setToolTip(text)
+        self.said.setToolTip(wrapped(text))
+        self.said.setVisible(bool(text))
         set_style(self.said, "bad", wrong)
 
     # What the user does ----------------------------------------------------------------
@@ -238,7 +237,7 @@ class DesignsPanel(Panel):
             return  # only its boundary is in memory
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
-            self._say(f"Design {number}: {row.problem}", wrong=True)
+            self._say(f"Design {number}: {self._reason(row)}", wrong=True)
             return
         try:
             values = self.table.designs()[number - 1]
@@ -283,12 +282,17 @@ class DesignsPanel(Panel):
         failed = [row for row in self.table.results.values() if row.problem]
         bad = sum(row.inverted > 0 for row in self.table.results.values())
         if not text:
-            parts = [f"{len(self.table.results):,} designs done"]
+            parts = [f"{len(failed)} failed: {self._reason(failed[0])}"] if failed else []
+            parts += [f"{len(self.table.results):,} designs done"]
             parts += [f"{bad} with inverted cells"] * bool(bad)
-            parts += [f"{len(failed)} failed: {failed[0].problem}"] if failed else []
             text = "; ".join(parts)
         self._say(text, wrong or bool(failed))
         self._sync()
+
+    def _reason(self, row: Row) -> str:
+        """Return why a design failed, without the name of the mesh, which is open."""
+        name = self.mesh.name if self.mesh is not None else ""
+        return row.problem.removeprefix(f"{name}: ")
 
     def end(self) -> None:
         """End what runs, without a word: the window closes."""

@@ -103,6 +103,18 @@ class ElidedLabel(QLabel):
         )
 
 
+def wide_label(lines: int) -> QLabel:
+    """Return a label over the whole width, for a text in as many lines as it needs, up to some."""
+    label = QLabel()
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    label.setWordWrap(True)
+    label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+    label.setMaximumHeight(lines * label.fontMetrics().lineSpacing() + 2)
+    # A long word may not make what it stands in wider.
+    label.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+    return label
+
+
 class _Narrow(QStyledItemDelegate):
     """Asks for no width, so that the text of an item ends where the list does."""
 
