@@ -232,7 +232,7 @@ def test_closing_asks_about_designs_that_go_on(window, passage, qtbot, in_a_thre
     QTest.mouseClick(passage.run, LEFT)
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
-    assert "The designs go on: 0 of 500 are done." in asked[0][0]
+    assert "The sweep still runs (0 of 500 designs are done) and will be stopped." in asked[0][0]
     assert passage.runner.busy
     passage.stop.click()
     qtbot.waitUntil(lambda: not passage.runner.busy, timeout=60_000)

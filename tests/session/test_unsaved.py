@@ -64,7 +64,7 @@ def test_a_case_is_asked_about_by_the_name_of_its_file(session):
 
 
 def test_designs_are_asked_about_in_the_same_question(session):
-    words = "The designs go on: 2 of 9 are done."
+    words = "The sweep still runs (2 of 9 designs are done) and will be stopped."
     alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)
     assert not alone.can_save
     assert alone.question("closing") == f"{words} Lose their results?"

@@ -159,7 +159,7 @@ class DesignsPanel(Panel):
         """Return what would be lost with this panel, in a sentence, or nothing."""
         done, count = len(self.table.results), len(self.table.rows)
         if self.runner.busy:
-            return f"The designs go on: {done:,} of {count:,} are done."
+            return f"The sweep still runs ({done:,} of {count:,} designs are done) and will be stopped."
         if not done or self.table is self.written:
             return ""
         return f"The table of designs, {done:,} with results, is not saved."
