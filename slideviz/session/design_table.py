@@ -21,6 +21,7 @@ from slideviz.design.sweep_designs import read_designs
 from slideviz.design.sweep_row import NUMBERS, Row
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.model import Mesh
 
 MOST = 100_000
 """Designs that a table in the window has room for."""
@@ -109,6 +110,20 @@ class DesignTable:
     def designs(self) -> list[dict[str, str]]:
         """Return the designs, as `slideviz.sweep` takes them."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
+    def reason(self, number: int, mesh: Mesh | None) -> str:
+        """Return why a design failed, without the name of the mesh at the beginning."""
+        name = mesh.name if mesh is not None else ""
+        return self.results[number].problem.removeprefix(f"{name}: ")
+
+    def summary(self, mesh: Mesh | None) -> str:
+        """Return in words how the designs went on a mesh: first why one failed."""
+        failed = [number for number, row in self.results.items() if row.problem]
+        bad = sum(row.inverted > 0 for row in self.results.values())
+        parts = [f"{len(failed):,} failed: {self.reason(failed[0], mesh)}"] if failed else []
+        parts += [f"{len(self.results):,} designs done"]
+        parts += [f"{bad:,} with inverted cells"] * bool(bad)
+        return "; ".join(parts)
 
 
 def read_table(case: Case, path: Path) -> DesignTable:

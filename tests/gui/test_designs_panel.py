@@ -107,6 +107,22 @@ def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, 
     driver.settle()
 
 
+def test_the_design_shown_is_none_of_another_table(passage, answers, tmp_path):
+    panel = passage
+    fill(panel, "STEPS", "1, 2, 3")
+    panel.shown = 2
+    panel.rows.model.setData(panel.rows.model.index(2, 0), "4")
+    assert panel.shown == 2
+    file = tmp_path / "designs.csv"
+    file.write_text("STEPS\n1\n5\n")
+    answers("ask_table", file)
+    QTest.mouseClick(panel.load, LEFT)
+    assert panel.shown is None
+    panel.shown = 1
+    fill(panel, "airfoil.rotate.angle_deg", "-1, -2")
+    assert panel.shown is None
+
+
 def test_designs_that_fail_say_why(passage, qtbot, in_a_thread):
     panel = passage
     fill(panel, "SLIDING_MODE", "ps, none")

@@ -121,7 +121,10 @@ class DesignsPanel(Panel):
         self._sync()
 
     def _put(self, table: DesignTable) -> None:
-        """Show another table."""
+        """Show another table; the design that is shown is none of it if it has other values."""
+        at = slice((self.shown or 1) - 1, self.shown)
+        if table.columns != self.table.columns or table.rows[at] != self.table.rows[at]:
+            self.shown = None
         self.table = table
         self._sync()
 
@@ -159,7 +162,8 @@ class DesignsPanel(Panel):
         """Return what would be lost with this panel, in a sentence, or nothing."""
         done, count = len(self.table.results), len(self.table.rows)
         if self.runner.busy:
-            return f"The sweep still runs ({done:,} of {count:,} designs are done) and will be stopped."
+            so_far = f"{done:,} of {count:,} designs are done"
+            return f"The sweep still runs ({so_far}) and will be stopped."
         if not done or self.table is self.written:
             return ""
         return f"The table of designs, {done:,} with results, is not saved."
@@ -237,7 +241,7 @@ class DesignsPanel(Panel):
             return  # only its boundary is in memory
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
-            self._say(f"Design {number}: {self._reason(row)}", wrong=True)
+            self._say(f"Design {number}: {self.table.reason(number, self.mesh)}", wrong=True)
             return
         try:
             values = self.table.designs()[number - 1]
@@ -279,20 +283,9 @@ class DesignsPanel(Panel):
         self._say(words)
 
     def _ended(self, text: str, wrong: bool) -> None:
-        failed = [row for row in self.table.results.values() if row.problem]
-        bad = sum(row.inverted > 0 for row in self.table.results.values())
-        if not text:
-            parts = [f"{len(failed)} failed: {self._reason(failed[0])}"] if failed else []
-            parts += [f"{len(self.table.results):,} designs done"]
-            parts += [f"{bad} with inverted cells"] * bool(bad)
-            text = "; ".join(parts)
-        self._say(text, wrong or bool(failed))
+        failed = any(row.problem for row in self.table.results.values())
+        self._say(text or self.table.summary(self.mesh), wrong or failed)
         self._sync()
-
-    def _reason(self, row: Row) -> str:
-        """Return why a design failed, without the name of the mesh, which is open."""
-        name = self.mesh.name if self.mesh is not None else ""
-        return row.problem.removeprefix(f"{name}: ")
 
     def end(self) -> None:
         """End what runs, without a word: the window closes."""
