@@ -265,6 +265,13 @@ def test_all_mistakes_of_a_file_are_told_with_their_rows(window, passage, answer
     told = window.banner.dialog.text.toPlainText()
     assert all(f"designs.csv:{line}: " in told for line in (3, 4, 5, 6, 7))
     window.banner.dialog.close()
+    # They go with a file that has none; what else is told there stays.
+    file.write_text("STEPS\n1\n")
+    QTest.mouseClick(passage.load, LEFT)
+    assert not window.banner.isVisible()
+    window.banner.tell("Something else.")
+    QTest.mouseClick(passage.load, LEFT)
+    assert window.banner.isVisible()
 
 
 def test_its_key_shows_and_hides_the_panel(window, passage, qtbot):

@@ -51,6 +51,7 @@ class DesignsPanel(Panel):
         self.shown: int | None = None
         self.written: DesignTable | None = None
         self._drawn: tuple[object, object] = (None, None)
+        self._mistakes = ""
         self.job = DesignsJob(self._ended, self)
         self.runner = self.job.runner
         self.rows = DesignRows(self._add)
@@ -170,12 +171,15 @@ class DesignsPanel(Panel):
 
     def _try(self, change: Callable[[], DesignTable]) -> None:
         """Change the table, or say why that cannot be."""
+        self.services.banner.withdraw(self._mistakes)
+        self._mistakes = ""
         try:
             table = change()
         except SlidevizError as error:
             first, *more = str(error).splitlines()
             self._say(f"{first} (and {len(more)} more)" if more else first, wrong=True)
             if more:
+                self._mistakes = str(error)
                 self.services.banner.tell_error(error)
             return
         self._say(f"{len(table.rows):,} designs" if table.rows else "")

@@ -62,7 +62,7 @@ class Banner(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("banner")
-        self._full = self._brief = ""
+        self._text = self._full = self._brief = ""
         self.text = rich_label("")
         self.text.setWordWrap(True)
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -83,6 +83,7 @@ class Banner(QFrame):
     def tell(self, text: str, full: str = "", calm: bool = True) -> None:
         """Show a message, with a longer text behind “Details”; calm ones are no error."""
         set_style(self, "calm", calm)
+        self._text = text
         lines = text.splitlines() or [""]
         brief = "\n".join(lines[:MOST_LINES]) + ("\n…" if len(lines) > MOST_LINES else "")
         self._brief = html.escape(brief, quote=False).replace("\n", "<br>")
@@ -101,6 +102,11 @@ class Banner(QFrame):
             kind = type(error).__name__
             text = f"Something unexpected went wrong ({kind}): {error}"
             self.tell(text, details_of(error), calm=False)
+
+    def withdraw(self, text: str) -> None:
+        """Hide a message that no longer holds, if it is still the one that is shown."""
+        if text and text == self._text:
+            self.hide()
 
     def ask(
         self,
