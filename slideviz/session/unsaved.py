@@ -94,7 +94,10 @@ class Unsaved:
 def title_of(session: Session) -> str:
     """Return the title of the window that shows a session, with a star if something is unsaved."""
     file = session.case.source or session.path
-    # The mesh of a run that the case on disk repeats is not what is unsaved of it.
-    lost = session.unsaved_mesh and not session.repeatable
+    # The mesh of a run that the case on disk repeats is not what is unsaved of it, nor is that of
+    # a design, which comes again at a click.
+    run = session.run_shown
+    comes_again = session.repeatable or (run is not None and run.panels is not None)
+    lost = session.unsaved_mesh and not comes_again
     star = "*" if session.unsaved_case or lost else ""
     return f"{star}{file.name} – slideviz" if file else "slideviz"

@@ -15,6 +15,7 @@ from slideviz.gui.widgets import plot_canvas
 from slideviz.gui.widgets.plot_image import Paper, Place, picture
 from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
+from slideviz.session import changes
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -86,6 +87,16 @@ def test_designs_are_run_drawn_and_shown(window, passage, qtbot, in_a_thread, dr
         driver.settle()
         assert window.store.session.run_shown.name == f"design {number}"
     assert len(window.store.session.runs) == 2
+    # Nothing was changed by looking at them.
+    assert window.windowTitle() == "passage.cfg – slideviz"
+    panel.show_design(1)
+    driver.settle()
+    text = window.run_panel.text
+    assert text.text().startswith("The panels differ from design 1. <a ")
+    window.store.change(changes.set_case, steps=4)
+    assert "Settings changed since the last run." in text.text()
+    text.linkActivated.emit("settings")
+    assert text.text() == "Done."
 
 
 def test_the_last_of_several_clicks_counts(window, passage, qtbot, in_a_thread, driver):
@@ -185,8 +196,6 @@ def test_tables_are_loaded_and_saved(passage, answers, tmp_path):
 
 
 def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread):
-    from slideviz.session import changes
-
     panel = passage
     fill(panel, "STEPS", "1, 2")
     run(panel, qtbot)
@@ -292,8 +301,6 @@ def test_its_key_shows_and_hides_the_panel(window, passage, qtbot):
 def test_a_design_is_shown_whole_and_without_the_ghost_of_the_motion_panel(
     window, passage, qtbot, in_a_thread, driver
 ):
-    from slideviz.session import changes
-
     def ghosts():
         return [
             actor.visibility

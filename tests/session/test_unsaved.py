@@ -63,6 +63,16 @@ def test_a_case_is_asked_about_by_the_name_of_its_file(session):
     assert title_of(replace(named, saved=named.case)) == "a.cfg – slideviz"
 
 
+def test_a_design_that_is_looked_at_makes_no_star(session):
+    named = replace(session.case, source=Path("a.cfg"))
+    opened = replace(session, case=named, saved=named)
+    frame = session.runs[0].frames[0]
+    design = replace(named, steps=7)
+    assert title_of(replace(opened, runs=(Run(1, design, (frame,), "done"),), shown=1))[0] == "*"
+    looked_at = Run(1, design, (frame,), "done", name="design 1", panels=named)
+    assert title_of(replace(opened, runs=(looked_at,), shown=1)) == "a.cfg – slideviz"
+
+
 def test_designs_are_asked_about_in_the_same_question(session):
     words = "The sweep still runs (2 of 9 designs are done) and will be stopped."
     alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)

@@ -124,11 +124,13 @@ class RunPanel(Panel):
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
             self.text.setToolTip(wrapped("\n".join([help_for(run.case)] * bool(bad) + [*notes])))
-        elif run is session.runs[-1]:
+        elif run is session.runs[-1] and run.panels != session.case:
             self._tell_ready("Settings changed since the last run.", session)
         else:
             link = f"<a href='{SETTINGS}'>Use its settings</a>"
-            self.text.setText(f"The panels differ from run {run.number}. {link}")
+            design = run.panels is not None and html.escape(run.name)
+            name = design or f"run {run.number}"
+            self.text.setText(f"The panels differ from {name}. {link}")
         set_style(self.text, "bad", bool(bad))
 
     def _tell_ready(self, text: str, session: Session) -> None:
