@@ -162,14 +162,22 @@ def write_results(path: Path, table: DesignTable) -> None:
         file.write(out.getvalue().encode())
 
 
-def column_choices(case: Case) -> dict[str, str]:
-    """Return the columns that there can be, with what the case has there: numbers, then keys."""
+def column_choices(case: Case, dim: int) -> dict[str, str]:
+    """Return the columns that there can be, with what the case has there: numbers, then keys.
+
+    In 2D those numbers are left out that do nothing there: of axes, and along z.
+    """
+    numbers = {
+        name: place
+        for name, place in numbers_of(case).items()
+        if dim == 3 or not (place.field == "axis" or place.component == 2)
+    }
     keys = {
         name: name
         for name, key in KEYS.items()
         if key.group not in (FILES, VIEW, MOTION) and key.get(case) is not None
     }
-    found = own_values(case, {**numbers_of(case), **keys})
+    found = own_values(case, {**numbers, **keys})
     return {name: _shown(value) for name, value in found.items()}
 
 

@@ -207,7 +207,14 @@ def test_other_settings_make_results_old(window, passage, qtbot, in_a_thread):
     assert panel.case.sliding == "ds"
 
 
-def test_another_mesh_has_other_designs(window, passage, driver, passage_file):
+def test_another_mesh_has_other_designs(window, passage, driver, passage_file, tmp_path):
+    fill(passage, "STEPS", "1, 2")
+    window.store.change(changes.set_case, sliding="ds")
+    assert passage.rows.column.currentData() == "STEPS"
+    window.store.change(changes.set_case, sliding=window.store.session.saved.sliding)
+    driver.open(tmp_path / "passage.cfg")
+    assert passage.rows.column.currentData() == "airfoil.rotate.angle_deg"
+    assert not passage.rows.values.text()
     fill(passage, "STEPS", "1, 2")
     driver.open(passage_file)
     assert passage.rows.model.rowCount() == 0

@@ -84,11 +84,27 @@ def passage():
 
 
 def test_choices_have_what_the_case_has(passage):
-    found = column_choices(passage.case)
+    found = column_choices(passage.case, 2)
     assert found["airfoil.rotate.angle_deg"] == "-8"
     assert found["airfoil.translate.y"] == "0.12"
     assert found["STEPS"] == "5"
     assert not {"MOTION", "MESH_FILENAME", "DEFORMATION_FILENAME"} & set(found)
+
+
+def test_choices_leave_out_what_does_nothing_in_2d(passage):
+    case = passage.case.change(
+        motions=(
+            sv.Rotate("airfoil", 5.0, point=(0.1, 0.2)),
+            sv.Ffd("airfoil", "BOX", (1, 0, 0), (0.1, 0.2, 0.0)),
+            sv.Radial("airfoil", 1.1),
+        )
+    )
+    parts = {name.removeprefix("airfoil.") for name in column_choices(case, 2) if "." in name}
+    ffd = {"ffd.BOX.1.0.0.x", "ffd.BOX.1.0.0.y"}
+    radial = {f"radial.{part}" for part in ("factor", "distance", "point_x", "point_y")}
+    assert parts == {f"rotate.{n}" for n in ("angle_deg", "point_x", "point_y")} | ffd | radial
+    spatial = column_choices(case, 3)
+    assert {"airfoil.rotate.axis_z", "airfoil.ffd.BOX.1.0.0.z"} <= set(spatial)
 
 
 def test_files(passage, tmp_path):

@@ -116,7 +116,7 @@ class DesignsPanel(Panel):
             self._put(DesignTable())
             self._say("")
         self._drawn = now
-        self.rows.show_columns(session.case if session.mesh is not None else None)
+        self.rows.show_columns(session.case, session.mesh)
         if self.table.results and self.case != session.case and not self.runner.busy:
             self._say("The settings have changed since: Run does all designs again.")
         self._sync()

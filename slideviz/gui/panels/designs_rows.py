@@ -16,6 +16,7 @@ from slideviz.case.model import Case
 from slideviz.gui.panels.designs_model import DesignsModel
 from slideviz.gui.widgets.build import Do, hint_label, in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
+from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable, column_choices
 
 ABOUT = (
@@ -37,6 +38,7 @@ class DesignRows(QWidget):
 
     def __init__(self, add: Do) -> None:
         super().__init__()
+        self._mesh: Mesh | None = None
         self.column = Choice({}, "What varies: a number of a motion, or a setting.", "column")
         self.values = QLineEdit()
         self.values.setObjectName("values")
@@ -73,12 +75,15 @@ class DesignRows(QWidget):
         heads.setResizeContentsPrecision(50)
         return view
 
-    def show_columns(self, case: Case | None) -> None:
-        """Offer what can vary in a case."""
-        chosen = self.column.currentData()
+    def show_columns(self, case: Case, mesh: Mesh | None) -> None:
+        """Offer what can vary in a case of a mesh, of another mesh the first number of a motion."""
+        chosen = self.column.currentData() if mesh is self._mesh else None
+        if mesh is not self._mesh:
+            self.values.clear()
+        self._mesh = mesh
         self.column.clear()
-        if case is not None:
-            for name, value in column_choices(case).items():
+        if mesh is not None:
+            for name, value in column_choices(case, mesh.dim).items():
                 self.column.addItem(f"{name}   (now {value})", name)
         self.column.show_value(chosen)
 
