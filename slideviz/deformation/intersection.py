@@ -51,9 +51,17 @@ def intersection_message(
         if hit is not None:
             return (
                 f"the motion puts {name} through {hit.marker} near {_place(hit)}; move {name} "
-                f"less, or let {hit.marker} move with it (role moving, internal or periodic)"
+                f"less, or {_giving_way(case, hit.marker)}"
             )
     return _outside(case, mesh, nodes, after)
+
+
+def _giving_way(case: Case, wall: str) -> str:
+    """Return what would let a boundary move with the one that goes through it."""
+    if case.roles.get(wall) == "periodic":
+        mode = "fixed" if case.sliding == "none" else "moving"
+        return f"choose PERIODIC_MODE= {mode}, with which {wall} moves along"
+    return f"let {wall} move with it (role moving, internal or periodic)"
 
 
 def _new_crossing(

@@ -11,13 +11,15 @@ from slideviz.deformation.intersection import folding_message, intersection_mess
 from slideviz.errors import SlidevizError
 from slideviz.mesh.model import Mesh
 from slideviz.session.jobs import Report, Stopped
+from slideviz.session.run_messages import in_window_words
 from slideviz.session.state import Session
 
 
 def intersection_key(session: Session) -> tuple[object, ...]:
     """Return what an intersection depends on: the check holds while this is the same."""
     case = session.case
-    return (session.mesh, case.motions, tuple(sorted(case.roles.items())), case.periodic)
+    roles = tuple(sorted(case.roles.items()))
+    return (session.mesh, case.motions, roles, case.periodic, case.sliding)
 
 
 def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped) -> tuple[str, str]:
@@ -37,7 +39,8 @@ def find_intersection(case: Case, mesh: Mesh, _report: Report, stopped: Stopped)
         folded = None if found else folding_message(case, mesh, moved.nodes, moved.vectors)
     except SlidevizError as error:
         return _first_line(error, files), ""
-    return (found[0].upper() + found[1:] + "." if found else ""), (f"{folded}." if folded else "")
+    said = in_window_words(found[0].upper() + found[1:] + ".") if found else ""
+    return said, (f"{folded}." if folded else "")
 
 
 def _first_line(error: SlidevizError, files: list[Path]) -> str:

@@ -69,6 +69,11 @@ def test_a_periodic_boundary_that_moves_along_may_be_passed(square):
     free = case.change(roles=roles, periodic="moving")
     up = Translate("BLOCK", (0.0, 0.49))
     assert message(*moved(free, mesh, up)) is None
+    for sliding, mode in (("ps", "moving"), ("none", "fixed")):
+        kept = free.change(periodic="none", sliding=sliding)
+        text = message(*moved(kept, mesh, up))
+        assert text.endswith(f"or choose PERIODIC_MODE= {mode}, with which UPPER moves along")
+        assert message(*moved(kept.change(periodic=mode), mesh, up)) is None
     assert "through UPPER" in message(*moved(free.change(periodic="periodic"), mesh, up))
     assert "through UPPER" in message(*moved(case, mesh, up))
 

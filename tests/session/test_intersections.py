@@ -30,7 +30,8 @@ def shifted(passage):
 def test_an_intersection_is_a_sentence_with_a_place_and_a_remedy(shifted, passage):
     text = look(shifted(-0.4), passage.mesh)
     assert text.startswith("The motion puts airfoil through periodic_1 near (")
-    assert text.endswith(").")
+    remedy = "Periodicity “periodic, fixed vertices”, with which periodic_1 moves along."
+    assert text.endswith(f"or choose {remedy}")
     assert "; move airfoil less" in text
 
 
