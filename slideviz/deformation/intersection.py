@@ -46,7 +46,7 @@ def intersection_message(
     """
     after = np.array(mesh.points)
     after[nodes] += vectors
-    for name in case.markers_with("moving"):
+    for name in _movers(case, mesh, nodes, vectors):
         hit = _new_crossing(mesh, after, mesh.marker(name).cells, _others(case, mesh, name))
         if hit is not None:
             return (
@@ -54,6 +54,14 @@ def intersection_message(
                 f"less, or {_giving_way(case, hit.marker)}"
             )
     return _outside(case, mesh, nodes, after)
+
+
+def _movers(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[str]:
+    """Return the moving markers, last those of which most nodes stay where they are."""
+    still = np.ones(len(mesh.points))
+    still[nodes] = ~vectors.any(axis=1)
+    stays = {n: still[mesh.marker(n).nodes].sum() for n in case.markers_with("moving")}
+    return sorted(stays, key=lambda name: bool(2 * stays[name] > len(mesh.marker(name).nodes)))
 
 
 def _giving_way(case: Case, wall: str) -> str:
@@ -101,7 +109,8 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     """
     after = np.array(mesh.points)
     after[nodes] += vectors
-    parts = [mesh.marker(name).cells for name in case.markers_with("moving")]
+    names = _movers(case, mesh, nodes, vectors)
+    parts = [mesh.marker(name).cells for name in names]
     if not 0 < sum(map(len, parts)) <= MOST:
         return None
     types, corners = ([getattr(p, name) for p in parts] for name in ("types", "connectivity"))
@@ -110,7 +119,7 @@ def folding_message(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray
     if hit is None or self_crossing(mesh.points, body) is not None:
         return None
     ends = np.cumsum([len(part) for part in parts])
-    first, other = (case.markers_with("moving")[np.searchsorted(ends, k, "right")] for k in hit[1:])
+    first, other = (names[k] for k in sorted(np.searchsorted(ends, hit[1:], "right")))
     where = "itself" if first == other else other
     place = ", ".join(f"{value:.4g}" for value in hit[0])
     return f"{first} goes through {where} near ({place}); cells will be inverted there"
