@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from slideviz.case.model import Case, FromFile, Motion, named
-from slideviz.session.opening import has_ffd, with_periodicity
+from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
 from slideviz.session.rows import replaced, without
 from slideviz.session.state import Place, Session
 from slideviz.session.undoable import undoable
@@ -21,6 +21,10 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
     changed = tuple(names)
     roles = dict(session.case.roles) | dict.fromkeys(changed, role)
     guesses = {name: guess for name, guess in session.guesses.items() if name not in changed}
+    for name in _left_alone(session, changed, role):
+        if name in guesses:
+            del guesses[name]
+            roles[name] = "fixed"
     still = (_of_moving(motion, roles) for motion in session.case.motions)
     motions = tuple(motion for motion in still if motion is not None)
     case = session.case.change(roles=roles, motions=motions)
@@ -30,6 +34,14 @@ def set_role(session: Session, names: Iterable[str], role: Role) -> Session:
         mine = (p for p in session.pairs if {p.first, p.second} & set(changed))
         case = with_periodicity(case, next(mine, None))
     return replace(session, case=case, guesses=guesses)
+
+
+def _left_alone(session: Session, changed: Sequence[str], role: Role) -> Iterator[str]:
+    """Yield the boundaries guessed periodic for nothing but a match with one that is not."""
+    for pair in session.pairs if role != "periodic" else ():
+        for name, other in ((pair.first, pair.second), (pair.second, pair.first)):
+            if other in changed and guess_by_name(name) is None:
+                yield name
 
 
 def _of_moving(motion: Motion, roles: Mapping[str, Role]) -> Motion | None:

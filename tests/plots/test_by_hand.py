@@ -11,10 +11,11 @@ from slideviz.case.model import Translate
 from slideviz.errors import MeshError
 from slideviz.mesh.io.files import write
 from slideviz.mesh.periodic import find_pairs, pair_up
+from slideviz.mesh.quality import quality
 from slideviz.plots.written import figure_bytes
 from slideviz.session import changes
 from slideviz.session.motions import found_text
-from slideviz.session.opening import guess_by_name
+from slideviz.session.opening import guess_by_name, open_mesh
 from slideviz.session.run_messages import in_window_words
 from slideviz.session.runs_table import best
 from slideviz.session.state import Frame, Run
@@ -47,6 +48,21 @@ def test_the_role_periodic_switches_periodicity_on(plain, sliding, mode):
     assert more.case.periodic == "none"
     none = changes.set_role(both, ("left", "right"), "fixed")
     assert none.case.periodic == "none"
+
+
+def test_a_guess_for_a_match_goes_with_the_role_of_the_other_side(square):
+    markers = tuple(
+        replace(m, name={"left": "x_m", "right": "x_p"}.get(m.name, m.name)) for m in square.markers
+    )
+    mesh = replace(square, markers=markers)
+    session = open_mesh(Frame(mesh, quality(mesh)), None, find_pairs(mesh))
+    assert session.role("x_m") == session.guesses["x_m"].role == "periodic"
+    kept = changes.set_role(session, ("x_p",), "periodic")
+    assert "x_m" in kept.guesses
+    alone = changes.set_role(session, ("x_p",), "moving")
+    assert "x_m" not in alone.guesses
+    assert alone.role("x_m") == "fixed"
+    assert alone.case.periodic == "none"
 
 
 def test_the_axis_of_what_matches_comes_with_it(plain):
