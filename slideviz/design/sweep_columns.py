@@ -185,9 +185,10 @@ def _meant(case: Case, name: str, known: Mapping[str, Place]) -> Place | str:
     if several:
         raise CaseError(f"several motions have it; say which, as {_listed(shortest)}")
     there = f"the motions have {_listed(shortest)}" if shortest else "the motions have no numbers"
+    close = nearest(name, [*shortest, *KEYS])
     raise CaseError(
-        f"there is no such number of a motion, and no such key{nearest(name, [*shortest, *KEYS])}; "
-        f"{there}; `slideviz keys` lists the keys"
+        "there is no such number of a motion, and no such key"
+        f"{close or f'; {there}; `slideviz keys` lists the keys'}"
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -104,14 +105,13 @@ def _read_csv(case: Case, path: Path) -> Designs:
     (first, head), *rest = lines
     separator = max(_SEPARATORS, key=head.count) if "," not in head else ","
     names = [column_name(name) for name in _split(head, separator)]
+    problems: list[tuple[int, str]] = []
     try:
         columns = columns_of(case, names)
     except CaseError as problem:
-        raise CaseError(listed(path, [(first, line) for line in str(problem).splitlines()])) from (
-            problem
-        )
+        problems += [(first, said) for said in str(problem).splitlines()]
+        columns = _known(case, names)
     designs: list[Design] = []
-    problems = []
     for at, (line, content) in enumerate(rest, start=1):
         cells = [cell.strip() for cell in _split(content, separator)]
         try:
@@ -119,13 +119,23 @@ def _read_csv(case: Case, path: Path) -> Designs:
                 raise CaseError(
                     f"has {len(cells)} values, and the head {len(names)} columns; give as many"
                 )
-            values: dict[str, Value] = dict(zip(names, cells, strict=True))
+            row = zip(names, cells, strict=True)
+            values: dict[str, Value] = {name: cell for name, cell in row if name in columns}
             designs.append(_design(case, columns, at, values))
         except CaseError as problem:
             problems += [(line, said) for said in str(problem).splitlines()]
     if problems:
         raise CaseError(listed(path, problems))
     return Designs(columns, tuple(designs))
+
+
+def _known(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
+    """Return the columns that mean something, so that the mistakes in their rows are told, too."""
+    found: dict[str, Place | str] = {}
+    for name in names:
+        with suppress(CaseError):
+            found |= columns_of(case, [name])
+    return found
 
 
 def _design(

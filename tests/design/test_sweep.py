@@ -186,7 +186,7 @@ def test_markers_that_differ_in_capitals_alone():
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (["airfoil.rotat.angle_deg"], "did you mean airfoil.rotate.angle_deg"),
+        (["airfoil.rotat.angle_deg"], r"no such key; did you mean airfoil.rotate.angle_deg\?$"),
         (["zzz"], r"the motions have airfoil.rotate.angle_deg, .*airfoil.translate.y"),
         (["MESH_FILENAME"], "files and the view are those of the case"),
         (["STEPS", "steps"], "means the same as column STEPS"),
@@ -210,6 +210,12 @@ def test_every_wrong_value_is_told_with_its_line(passage, tmp_path):
         f"{table}:5: column 'motion2.y': 'nan' is not a number",
         f"{table}:6: has 3 values, and the head 2 columns; give as many",
     ]
+    table.write_text("motion2.yy,STEPS\n0,x\n1,1\n")
+    with pytest.raises(CaseError) as problem:
+        read_designs(passage.case, table)
+    head, row = str(problem.value).splitlines()
+    assert head.startswith(f"{table}:1: column 'motion2.yy': there is no such number")
+    assert row == f"{table}:2: column 'STEPS': 'x' is not a whole number from 1, or auto"
     with pytest.raises(CaseError, match=r"design 2: column 'motion2.y': inf is not a finite"):
         read_designs(passage.case, {"motion2.y": [0.0, np.inf]})
     with pytest.raises(CaseError, match="different numbers of values"):
