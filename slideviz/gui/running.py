@@ -179,7 +179,8 @@ class Running(QObject):
         self._end("failed")
 
     def _run_done(self, _: Any) -> None:
-        run = self.store.session.runs[-1]
+        session = self.store.session
+        run = session.runs[-1]
         if run.last is None:
             return
         quality = run.last.quality
@@ -194,7 +195,8 @@ class Running(QObject):
         warnings = self._log_remarks(run)
         bad = inverted_words(run)
         if bad:
-            warnings.insert(0, f"{bad}. {help_for(run.case)}")
+            folding = "" if session.outdated else session.folding
+            warnings.insert(0, f"{bad}. {help_for(run.case, folding)}")
         if file is not None:
             warnings.insert(0, f"The deformed mesh is in {file}.")
             log.info("the deformed mesh is in %s", file)

@@ -61,8 +61,17 @@ def inverted_words(run: Run) -> str:
     return f"{count:,} inverted cell{'' if count == 1 else 's'}" if count else ""
 
 
-def help_for(case: Case) -> str:
-    """Return the remedies against inverted cells, most promising first, in a sentence."""
+def help_for(case: Case, folding: str = "") -> str:
+    """Return the remedies against inverted cells, most promising first, in a sentence.
+
+    Parameters
+    ----------
+    folding : str
+        What the motions of the case put through itself, as `Session.folding`.
+    """
+    if folding:
+        crossed = folding.partition("; ")[0]
+        return f"{crossed}, so more steps cannot help; another motion, or a smaller one, may."
     helps = []
     if case.method != "rbf":
         helps.append("radial basis functions as the method")

@@ -53,6 +53,14 @@ def test_it_offers_what_the_case_has_not_used(case, words, not_words):
     assert not any(word in text for word in not_words)
 
 
+def test_where_the_motion_goes_through_itself_no_steps_are_offered():
+    folding = "airfoil goes through itself near (0, 0); cells will be inverted there."
+    assert help_for(Case(steps=2), folding) == (
+        "airfoil goes through itself near (0, 0), so more steps cannot help; another motion, or a "
+        "smaller one, may."
+    )
+
+
 def test_a_large_exact_run_is_told_beforehand(monkeypatch):
     nodes = np.arange(30_000)
     line = Marker("wall", Cells.from_blocks([(3, np.stack([nodes[:-1], nodes[1:]], axis=1))]))

@@ -123,7 +123,8 @@ class RunPanel(Panel):
             count = f"{len(notes)} note{'' if len(notes) == 1 else 's'}"
             link = f" <a href='{NOTES}'>{count}</a>" if notes else ""
             self.text.setText((f"<b>{text}</b>" if bad else text) + link)
-            self.text.setToolTip(wrapped("\n".join([help_for(run.case)] * bool(bad) + [*notes])))
+            remedy = help_for(run.case, session.folding)
+            self.text.setToolTip(wrapped("\n".join([remedy] * bool(bad) + [*notes])))
         elif run is session.runs[-1] and run.panels != session.case:
             self._tell_ready("Settings changed since the last run.", session)
         else:
