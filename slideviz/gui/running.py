@@ -24,7 +24,7 @@ from slideviz.session.run_messages import (
     notes_of,
     warnings_of,
 )
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Frame, Run, Session
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
@@ -57,6 +57,10 @@ class Running(QObject):
         self._finish: Callable[[Any], object] | None = None
         self._next: Callable[[], object] | None = None
         self._deforms = self._shows_design = False
+        # The number of the run that the banner is about.
+        self._about: int | None = None
+        banner.shown.connect(self._forget_run)
+        store.listen(self._hide_other)
         self.runner.doing.connect(self.doing)
         self.runner.doing.connect(self._tell)
         self.runner.kept.connect(lambda frames: store.change(changes.add_frames, frames))
@@ -202,7 +206,17 @@ class Running(QObject):
             log.info("the deformed mesh is in %s", file)
         if warnings:
             self.banner.tell("\n".join(warnings), calm=not bad)
+            self._about = run.number
         self.said.emit(f"Done: {text}")
+
+    def _forget_run(self, _: str) -> None:
+        self._about = None
+
+    def _hide_other(self, _: Session, new: Session) -> None:
+        """Hide what the banner says of a run that is no longer shown."""
+        if self._about not in (None, new.shown):
+            self._about = None
+            self.banner.hide()
 
 
 def _steps_text(frame: Frame) -> str:

@@ -780,6 +780,22 @@ def test_inverted_cells_are_told_in_red_with_what_would_help(ready):
     assert not banner.isVisible()
 
 
+def test_the_banner_is_not_about_a_run_that_is_no_longer_shown(ready):
+    run(ready, 1)
+    ended_badly(ready)
+    window = ready.window
+    first, last = (one.number for one in ready.session.runs)
+    window.store.change(changes.set_view, frame=0)
+    assert window.banner.isVisible()
+    window.store.change(changes.show_run, first)
+    assert not window.banner.isVisible()
+    # What it says of other things stays.
+    window.store.change(changes.show_run, last)
+    window.banner.tell("something else")
+    window.store.change(changes.show_run, first)
+    assert window.banner.isVisible()
+
+
 def test_what_is_harmless_is_counted_beside_the_button_and_not_over_the_view(ready, caplog):
     caplog.set_level("INFO")
     note = Note("24 nodes are no control nodes, so this does no harm")
