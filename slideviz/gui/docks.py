@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from qtpy.QtCore import QByteArray, QEvent, QObject, QSettings, Qt, QTimer
+from qtpy.QtCore import QByteArray, QEvent, QObject, QRect, QSettings, Qt, QTimer
 from qtpy.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget, QWidget
 
 from slideviz.gui.dock_tabs import DockTabs
@@ -34,9 +34,18 @@ NARROWEST = {LEFT: 300, RIGHT: 264}
 """Pixels that they may shrink to on a smaller screen, in proportion."""
 ROOMY = 1280
 """Pixels of the width of a screen with room."""
+FRAME = 40
+"""Pixels of the height of a screen that a window leaves to its own title bar."""
 FIRST = {LEFT: "boundaries", RIGHT: "histogram"}
 SIDE = 0.22
 """Part of the window's width that the panels of a side take, until somebody chooses otherwise."""
+
+
+def room_for(window: QWidget) -> QRect:
+    """Return the part of the screen where a window is seen whole, with the bar of its title."""
+    room = window.screen().availableGeometry()
+    # A window that fills the screen has its title on it.
+    return room if window.isMaximized() or window.isFullScreen() else room.adjusted(0, 0, 0, -FRAME)
 
 
 @dataclass(frozen=True)
@@ -155,7 +164,7 @@ class Docks(QObject):
 
     def _fit_screen(self) -> None:
         """Make the window no larger than the screen, and keep all of it there."""
-        window, room = self.window, self.window.screen().availableGeometry()
+        window, room = self.window, room_for(self.window)
         window.resize(window.size().boundedTo(room.size()))
         corner = window.pos()
         x = min(max(corner.x(), room.left()), room.right() + 1 - window.width())

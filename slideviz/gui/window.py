@@ -19,7 +19,7 @@ from slideviz.gui.actions import Actions
 from slideviz.gui.autosave import Autosave
 from slideviz.gui.dialogs.exporter import Exports
 from slideviz.gui.dialogs.help import Help
-from slideviz.gui.docks import Docks
+from slideviz.gui.docks import Docks, room_for
 from slideviz.gui.files import Files
 from slideviz.gui.intersection_check import IntersectionCheck
 from slideviz.gui.panels.boundaries import BoundariesPanel
@@ -79,7 +79,7 @@ class MainWindow(Services):
         super().__init__()
         self.settings = settings or QSettings("slideviz", "slideviz")
         self.setObjectName("slideviz")
-        room = self.screen().availableGeometry().size()
+        room = room_for(self).size()
         self.setMinimumSize(QSize(900, 620).boundedTo(room))
         self.resize(QSize(1280, 800).boundedTo(room))
         self.setAcceptDrops(True)
