@@ -360,15 +360,15 @@ class ShownTerm(Term):
         The key of the keyboard that switches it.
     at_first : bool
         Whether it is drawn until somebody chooses.
-    not_in_2d : str
-        Why it cannot be chosen for a 2D mesh; empty where it can.
+    why_not : str
+        Why it cannot be chosen for some meshes; empty where it can for all.
     in_bar : bool
         Whether the tool bar has a button for it; there is little room.
     """
 
     shortcut: str = ""
     at_first: bool = False
-    not_in_2d: str = ""
+    why_not: str = ""
     in_bar: bool = True
 
 
@@ -400,13 +400,14 @@ SHOWN: dict[Shown, ShownTerm] = {
         "FFD boxes",
         "Draw the control points of the boxes for free-form deformation.",
         shortcut="B",
+        why_not="There are no boxes: neither in the mesh file nor in the case (FFD_DEFINITION).",
         in_bar=False,
     ),
     "perspective": ShownTerm(
         "Perspective",
         "Perspective instead of parallel projection (3D meshes).",
         shortcut="P",
-        not_in_2d="A 2D mesh is always shown in parallel projection.",
+        why_not="A 2D mesh is always shown in parallel projection.",
     ),
 }
 """What is drawn or not; a case file writes them with hyphens."""

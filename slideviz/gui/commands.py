@@ -18,6 +18,7 @@ from slideviz.gui.widgets.command import (
     Command,
     Menu,
     Now,
+    boxed,
     flat,
     idle,
     opened,
@@ -230,14 +231,12 @@ _THEMES = Menu("theme", "&Theme", "Light or dark colours.", (
 ), one_of=True)
 
 
-def _keys(keys: str) -> tuple[str, ...]:
-    return (keys,) if keys else ()
-
-
 def _toggle(name: Shown, term: ShownTerm) -> Command:
-    return Command(name, term.name, term.tip, partial(_switch, name), _keys(term.shortcut),
-                   name if name in STROKES else "", solid if term.not_in_2d else opened,
-                   checked=lambda now: name in now.session.view.drawn)
+    able = {"ffd": boxed, "perspective": solid}.get(name, opened)
+    image = name if name in STROKES else ""
+    return Command(name, term.name, term.tip, partial(_switch, name), (term.shortcut,),
+                   image, able, checked=lambda now: name in now.session.view.drawn,
+                   tip_now=lambda now: term.why_not if opened(now) and not able(now) else "")
 
 
 def _section(kind: str, row: ShapeTerms) -> Command:
@@ -246,7 +245,7 @@ def _section(kind: str, row: ShapeTerms) -> Command:
         return "" if words is None else words.action
 
     return Command(f"add_{kind}", row.words[3].action, row.tip_to_add, partial(_add_section, kind),
-                   _keys(row.key), enabled=opened, title_now=title)
+                   (row.key,) if row.key else (), enabled=opened, title_now=title)
 
 
 COMPARE = Menu("compare", "Co&mpare with",

@@ -33,5 +33,5 @@ def test_each_toggle_of_the_view_is_a_command_that_says_whether_it_is_on(session
     assert COMMANDS[name].checked(Now(session)) == SHOWN[name].at_first
     switched = changes.set_view(session, **{name: not SHOWN[name].at_first})
     assert COMMANDS[name].checked(Now(switched)) != SHOWN[name].at_first
-    assert COMMANDS[name].enabled(Now(session)) == (not SHOWN[name].not_in_2d)
+    assert COMMANDS[name].enabled(Now(session)) == (not SHOWN[name].why_not)
     assert not COMMANDS[name].enabled(Now(Session()))

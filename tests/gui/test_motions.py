@@ -10,10 +10,12 @@ from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.gui.dialogs.motion_table import TableDialog
 from slideviz.gui.panels.motion_form import control_point
+from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
 from slideviz.session.motion_table import Rows
 from slideviz.session.motions import Ghosts
 from slideviz.session.run_messages import run_requirements
+from slideviz.terms import SHOWN
 from tests.slow import one_of_each_fast
 
 NOISE = 3.7e-13
@@ -270,6 +272,23 @@ def square_with_boxes():
     )
     corners = plane_corners(np.array([[-0.1, -0.1], [1.1, -0.1], [1.1, 0.2], [-0.1, 0.2]]))
     return with_boxes(mesh, [regular_box(name, corners, (3, 1, 1), None) for name in ("A", "B")])
+
+
+def test_boxes_can_be_drawn_where_there_are_some(driver, passage_file, tmp_path):
+    shown = driver.window.docks_.panels["display"].shown["ffd"]
+    action = driver.window.actions_.by_name["ffd"]
+    driver.open(passage_file)
+    assert not shown.isEnabled()
+    assert not action.isEnabled()
+    assert shown.toolTip() == wrapped(SHOWN["ffd"].why_not)
+    sv.write(tmp_path / "boxed.su2", square_with_boxes())
+    driver.open(tmp_path / "boxed.su2")
+    assert shown.isEnabled()
+    assert action.isEnabled()
+    assert shown.toolTip() == wrapped(SHOWN["ffd"].tip)
+    shown.click()
+    assert "ffd" in driver.session.view.drawn
+    assert action.isChecked()
 
 
 def test_motion_of_a_box_is_shown_edited_and_kept(boxed, tmp_path):

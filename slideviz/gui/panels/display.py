@@ -241,7 +241,7 @@ class DisplayPanel(Panel):
             box.setChecked(name in view.drawn)
             able, term = COMMANDS[name].enabled(Now(session)), SHOWN[name]
             box.setEnabled(able)
-            box.setToolTip(wrapped(term.not_in_2d if opened and not able else term.tip))
+            box.setToolTip(wrapped(term.why_not if opened and not able else term.tip))
 
     def _sync_passages(self, session: Session, pair: Pair | None) -> None:
         tip, count = NOT_PERIODIC, 0

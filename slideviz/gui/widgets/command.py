@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QMenu
 
 from slideviz.gui.widgets.icons import set_icon
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.session.motions import box_names
 from slideviz.session.state import IN_FILE, Session
 
 if TYPE_CHECKING:
@@ -174,6 +175,11 @@ def flat(now: Now) -> bool:
 def solid(now: Now) -> bool:
     """Tell whether a mesh of three dimensions is open."""
     return opened(now) and not flat(now)
+
+
+def boxed(now: Now) -> bool:
+    """Tell whether there are boxes for free-form deformation, or they are to be drawn."""
+    return opened(now) and ("ffd" in now.session.view.drawn or bool(box_names(now.session)))
 
 
 def valued(now: Now) -> bool:
