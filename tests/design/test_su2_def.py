@@ -634,7 +634,7 @@ def test_boxes_that_the_surface_leaves_behind_are_told(here, capsys):
     assert run(["def", "a.cfg", "-q"]) == 0
     Path("out.su2").rename("mesh.su2")
     config("DV_KIND= TRANSLATION\nDV_PARAM= (0, 1, 0)\nDV_VALUE= 0.02\n")
-    assert run(["def", "a.cfg", "-q"]) == 0
+    assert run(["def", "a.cfg"]) == 0
     said = capsys.readouterr().err
     assert "boxes in out.su2 follow their control points only, and not TRANSLATION" in said
     Path("out.su2").rename("mesh.su2")

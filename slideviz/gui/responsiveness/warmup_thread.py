@@ -71,7 +71,12 @@ class WarmupThread(QObject):
 
     def _run(self) -> None:
         # Numba's threads begin here, and stay as far back as this one.
-        jit_warmup.warm_up(self._begun, self._stop.is_set)
+        try:
+            jit_warmup.warm_up(self._begun, self._stop.is_set)
+        except RuntimeError:  # a program that ends gives its threads no more work
+            if not self._stop.is_set():
+                raise
+            return
         # What was imported stays: to look through all of it for garbage takes 100 ms each time.
         gc.freeze()
         if self._compiles:
