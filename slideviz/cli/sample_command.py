@@ -20,7 +20,7 @@ def add_sample(calls: argparse._SubParsersAction) -> None:
         type=str.lower,
         choices=tuple(FILE_FORMATS),
         default="su2",
-        help="of the mesh; su2b (binary) for a stator of up to 200 million cells (default: su2)",
+        help="of the mesh; su2b (binary) for up to 200 million cells (default: su2)",
     )
     call.add_argument("--variant", metavar="NAME", help="other motions; listed without NAME")
     call.add_argument("--force", action="store_true", help="replace files that exist")

@@ -12,9 +12,9 @@ twist, lean and bumps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
@@ -25,12 +25,10 @@ from slideviz.samples.blade import Section, Shares, camber, counts
 from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points
 from slideviz.samples.refined import refined
 from slideviz.samples.reshaping import reshaped
+from slideviz.samples.structured import LARGEST, QUADRILATERAL, mesh_of, zone_of
 from slideviz.samples.thesis import FILE
 
-QUADRILATERAL, HEXAHEDRON = 9, 12
 SIZES = (5_000, 5_000_000)
-LARGEST = 200_000_000
-"""Cells of a mesh that is written block by block."""
 BLADES = 41
 RADII = (0.25, 0.275, 0.3)
 DEPTH = 0.1143
@@ -68,10 +66,7 @@ def stator_mesh(size: int) -> Mesh:
             f"size {size} is out of range; a stator has {SIZES[0]} to {SIZES[1]}, or up to "
             f"{LARGEST} as an SU2 binary mesh (slideviz sample stator --format su2b)"
         )
-    stack = stator_stack(size)
-    cells = Cells.from_blocks([(HEXAHEDRON, stack.hexahedra(np.arange(stack.n_cells)))])
-    points = stack.points(np.arange(stack.n_points))
-    return Mesh(points, cells, stack.markers(), name="stator")
+    return mesh_of(stator_stack(size), "stator")
 
 
 def stator_zone(size: int) -> tuple[Zone, Displacements]:
@@ -85,25 +80,8 @@ def stator_zone(size: int) -> tuple[Zone, Displacements]:
     if not SIZES[0] <= size <= LARGEST:
         raise CaseError(f"size {size} is out of range; a stator has {SIZES[0]} to {LARGEST}")
     stack = stator_stack(size)
-    markers = stack.markers()
-
-    def types(i: int, j: int) -> NDArray[np.uint8]:
-        return np.full(j - i, HEXAHEDRON, np.uint8)
-
-    def cells(i: int, j: int) -> tuple[NDArray[np.uint8], IntArray, IntArray]:
-        ids = np.arange(i, j)
-        return types(i, j), stack.hexahedra(ids).ravel(), ids
-
-    zone = Zone(
-        dim=3,
-        n_cells=stack.n_cells,
-        n_points=stack.n_points,
-        cells=cells,
-        types=types,
-        points=lambda i, j: stack.points(np.arange(i, j)),
-        markers=markers,
-    )
-    nodes = markers[0].nodes
+    zone = zone_of(stack)
+    nodes = zone.markers[0].nodes
     return zone, stator_displacement(nodes, stack.points(nodes))
 
 
@@ -122,6 +100,7 @@ class Stack:
     grid: Grid
     planes: FloatArray
     layers: int
+    dim: ClassVar[int] = 3
 
     @property
     def n_points(self) -> int:
@@ -149,7 +128,7 @@ class Stack:
         )
         return np.stack([radius * np.cos(theta), radius * np.sin(theta), z], axis=1)
 
-    def hexahedra(self, ids: IntArray) -> IntArray:
+    def cells(self, ids: IntArray) -> IntArray:
         """Return the nodes of cells (k, 8)."""
         layer, place = np.divmod(ids, len(self.grid.quads))
         nodes = self.planes.shape[1]

@@ -16,7 +16,7 @@ from slideviz.mesh.io.su2b.write import Zone, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
-from slideviz.samples.thesis import FILE, thesis_case
+from slideviz.samples.thesis import FILE, thesis_case, thesis_zone
 from slideviz.samples.turbine_row import row_case, row_mesh
 from slideviz.terms import FileFormat
 
@@ -70,18 +70,22 @@ class SampleKind:
         by MOTION keys; ``translate``: the case of thesis Figure 4.4, which moves the block close
         to two sides; ``flat``: that of Figure 4.14, without a component in z.
     stream : callable or None
-        Returns the sample of a size with a mesh that is made while it is written.
+        The same, with a mesh that is made while it is written.
     """
 
     about: str
     size: int
     make: Callable[[str, int, str], Sample]
     variants: tuple[str, ...] = ("motion",)
-    stream: Callable[[int], Streamed] | None = None
+    stream: Callable[[str, int, str], Streamed] | None = None
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:
     return Sample(name, *thesis_case(name, size, variant))
+
+
+def _streamed_thesis(name: str, size: int, variant: str) -> Streamed:
+    return Streamed(*thesis_zone(name, size, variant))
 
 
 def _passage(name: str, size: int, _variant: str) -> Sample:
@@ -99,7 +103,7 @@ def _stator(name: str, size: int, _variant: str) -> Sample:
     return Sample(name, mesh, stator_case(), moved)
 
 
-def _streamed_stator(size: int) -> Streamed:
+def _streamed_stator(_name: str, size: int, _variant: str) -> Streamed:
     zone, displacement = stator_zone(size)
     return Streamed(zone, stator_case(), displacement)
 
@@ -110,24 +114,28 @@ SAMPLES: Mapping[str, SampleKind] = {
         25,
         _thesis,
         ("file", "motion", "translate"),
+        _streamed_thesis,
     ),
     "polar": SampleKind(
         "2D: block in a 30 degree sector, rotationally periodic (thesis 4.1.2)",
         25,
         _thesis,
         ("file",),
+        _streamed_thesis,
     ),
     "hexahedron": SampleKind(
         "3D: turned block in a cube, periodic in y (thesis 4.2.1)",
         25,
         _thesis,
         ("file", "motion", "flat"),
+        _streamed_thesis,
     ),
     "cylindrical": SampleKind(
         "3D: block in a 30 degree sector, rotationally periodic (thesis 4.2.2)",
         25,
         _thesis,
         ("file",),
+        _streamed_thesis,
     ),
     "passage": SampleKind(
         "2D: turbine blade in a periodic passage; size: cells along the inflow (36)", 36, _passage
@@ -193,8 +201,8 @@ def write_sample(
 ) -> list[Path]:
     """Write ``mesh.su2``, ``displacement.txt`` where there is one, and ``NAME.cfg``; return them.
 
-    As SU2's binary (``mesh.su2b``) a stator is written block by block, and never as a whole in
-    memory.
+    As SU2's binary (``mesh.su2b``) a stator and the thesis's cases are written block by block, and
+    never as a whole in memory.
 
     Parameters are those of ``sample`` and:
 
@@ -215,10 +223,10 @@ def write_sample(
     from slideviz.case.cfg import write_case
     from slideviz.mesh.io.files import write
 
-    row, _ = _row(name, variant)
+    row, kind = _row(name, variant)
     made: Sample | Streamed
     if file_format == "su2b" and row.stream is not None:
-        made = row.stream(row.size if size is None else size)
+        made = row.stream(name, row.size if size is None else size, kind)
     else:
         made = sample(name, size, variant)
     folder = Path(folder)

@@ -202,9 +202,19 @@ def test_a_stream_writes_what_memory_holds(tmp_path, monkeypatch, block):
     assert np.array_equal(asked.vectors, whole.displacement.vectors)
 
 
-def test_other_samples_are_written_as_binary_from_memory(tmp_path):
-    write_sample("square", tmp_path, 7, file_format="su2b")
-    assert sv.read(tmp_path / "mesh.su2b").cells.same_as(made("square", 7).mesh.cells)
+@pytest.mark.parametrize("name", ["square", "polar", "hexahedron", "cylindrical"])
+def test_the_cases_of_the_thesis_are_streamed_too(tmp_path, monkeypatch, name):
+    from slideviz.mesh.io.su2b import write as su2b_write
+
+    monkeypatch.setattr(su2b_write, "BLOCK", 100)
+    write_sample(name, tmp_path, 30, file_format="su2b")
+    sv.write(tmp_path / "memory.su2b", made(name, 30).mesh)
+    assert (tmp_path / "mesh.su2b").read_bytes() == (tmp_path / "memory.su2b").read_bytes()
+
+
+def test_a_passage_is_written_as_binary_from_memory(tmp_path):
+    write_sample("passage", tmp_path, 24, file_format="su2b")
+    assert sv.read(tmp_path / "mesh.su2b").cells.same_as(made("passage", 24).mesh.cells)
 
 
 def test_a_grid_finer_than_those_that_are_smoothed_is_as_good(monkeypatch):
@@ -227,3 +237,5 @@ def test_sizes_that_are_out_of_range_are_told(tmp_path):
         stator_mesh(6_000_000)
     with pytest.raises(CaseError, match="out of range; a stator has 5000 to 200000000"):
         stator_zone(10**9)
+    with pytest.raises(CaseError, match=r"728[0-9]+ cells are too many; a sample has 200000000"):
+        write_sample("hexahedron", tmp_path, 900, file_format="su2b")
