@@ -360,14 +360,17 @@ class ShownTerm(Term):
         The key of the keyboard that switches it.
     at_first : bool
         Whether it is drawn until somebody chooses.
+    needs : {"", "boxes", "3d"}
+        What a mesh must have for it.
     why_not : str
-        Why it cannot be chosen for some meshes; empty where it can for all.
+        Why it cannot be chosen for other meshes.
     in_bar : bool
         Whether the tool bar has a button for it; there is little room.
     """
 
     shortcut: str = ""
     at_first: bool = False
+    needs: Literal["", "boxes", "3d"] = ""
     why_not: str = ""
     in_bar: bool = True
 
@@ -400,6 +403,7 @@ SHOWN: dict[Shown, ShownTerm] = {
         "FFD boxes",
         "Draw the control points of the boxes for free-form deformation.",
         shortcut="B",
+        needs="boxes",
         why_not="There are no boxes: neither in the mesh file nor in the case (FFD_DEFINITION).",
         in_bar=False,
     ),
@@ -407,6 +411,7 @@ SHOWN: dict[Shown, ShownTerm] = {
         "Perspective",
         "Perspective instead of parallel projection (3D meshes).",
         shortcut="P",
+        needs="3d",
         why_not="A 2D mesh is always shown in parallel projection.",
     ),
 }

@@ -13,9 +13,10 @@ from slideviz.deformation import solver
 from slideviz.errors import Cancelled, CaseError, DeformError, MeshError
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.rbf import exact as solve
+from slideviz.terms import SLIDING
 from tests import builders
 
-METHODS = ["none", "ps", "ds"]
+METHODS = list(SLIDING)
 BOX = dict.fromkeys(("x_m", "x_p", "y_m", "y_p", "z_m", "z_p"), "sliding")
 
 

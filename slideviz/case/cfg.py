@@ -239,7 +239,10 @@ def describe_keys() -> str:
         for key in KEYS.values():
             if key.group == group:
                 mark = " " if key.rbf_slide else "+"
-                lines.append(f"{mark} {key.name}= {key.kind.allowed}   [{key.default}]")
+                head = f"{mark} {key.name}= {key.kind.allowed}   [{key.default}]"
+                lines += textwrap.wrap(
+                    head, 100, subsequent_indent="        ", break_on_hyphens=False
+                )
                 lines += textwrap.wrap(
                     key.meaning, 90, initial_indent="      ", subsequent_indent="      "
                 )

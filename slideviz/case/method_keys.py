@@ -10,6 +10,8 @@ from slideviz.case.values import MAX_STEPS, YES_NO, Kind, one_of, real, whole
 from slideviz.errors import CaseError
 from slideviz.terms import KERNELS, METHODS, SLIDING, names
 
+_WAYS = " or ".join(f"{name} ({way})" for way, name in names(SLIDING).items() if way != "none")
+
 
 def nothing_slides(case: Case) -> str:
     """Return why it does not matter in a case how nodes slide."""
@@ -61,7 +63,7 @@ METHOD_ROWS = (
         METHOD,
         one_of(SLIDING),
         "sliding",
-        "How nodes slide: not, pseudo sliding (ps) or direct sliding (ds).",
+        f"How nodes slide: not, {_WAYS}.",
         label="Sliding",
         form="main",
         tip="Whether the nodes of sliding boundaries stay (none), slide and are put back on the "

@@ -33,9 +33,16 @@ _SHOWN = "shown: "
 
 @dataclass(frozen=True)
 class Paper:
-    """Width and most height of a picture in pixels, and pixels per inch where it is for paper.
+    """The format of a section's picture.
 
-    Also whether it has a title, and numbers along its axes.
+    Attributes
+    ----------
+    size : (int, int)
+        Width and maximum height in pixels.
+    dpi : float or None
+        Pixels per inch of a picture for paper.
+    title, axes : bool
+        Whether it has a title, and numbers along its axes.
     """
 
     size: tuple[int, int]

@@ -232,7 +232,7 @@ _THEMES = Menu("theme", "&Theme", "Light or dark colours.", (
 
 
 def _toggle(name: Shown, term: ShownTerm) -> Command:
-    able = {"ffd": boxed, "perspective": solid}.get(name, opened)
+    able = {"": opened, "boxes": boxed, "3d": solid}[term.needs]
     image = name if name in STROKES else ""
     return Command(name, term.name, term.tip, partial(_switch, name), (term.shortcut,),
                    image, able, checked=lambda now: name in now.session.view.drawn,

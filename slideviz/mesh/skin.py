@@ -140,7 +140,7 @@ def _cells_near(
 
 
 def index_of(ids: IntArray) -> Index:
-    """Return numbers (k,) as a slice where they follow each other: it is short and quick."""
+    """Return ids (k,) as a slice where they are consecutive, which reads faster; else as given."""
     first = int(ids[0])
     if np.array_equal(ids, np.arange(first, first + len(ids))):
         return slice(first, first + len(ids))

@@ -165,7 +165,7 @@ def _draw_curve(
 
 
 def nearest_design(axes: Axes, curves: Sequence[DesignCurve], x: float, y: float) -> int | None:
-    """Return the design whose point is nearest to a place in pixels of the figure, from below."""
+    """Return the design whose point is nearest to (x, y): pixels of the figure, y upwards."""
     best: tuple[float, int] | None = None
     for curve in curves:
         for values in (curve.values, curve.mean):

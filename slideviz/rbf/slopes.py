@@ -25,7 +25,7 @@ from slideviz.rbf.kernels import KERNELS, SHAPE
 NEAR = 1e-12
 """Parts of R below which two nodes are one."""
 
-INVERSE = 14
+INVERSE = len(KERNELS)
 """The number of xi^-power, the weight of inverse distance weighting."""
 
 TINY = 1e-24
@@ -69,8 +69,10 @@ def _slope(kind, power, q, count):  # type: ignore[no-untyped-def]
             q[j] = -30.0 + ((-15.0 * x + 90.0) * x - 45.0) * x - 90.0 * x * np.log(x)
         elif kind == 7:
             q[j] = -20.0 + ((-40.0 * x - 60.0) * x + 120.0) * x + 120.0 * x * x * np.log(x)
-        else:
+        elif kind == 8:
             q[j] = np.log(x) + 0.5
+        else:  # a function whose slope nobody has written
+            q[j] = np.nan
 
 
 @njit(inline="always", **OPTIONS)

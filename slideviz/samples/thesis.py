@@ -113,8 +113,8 @@ def _polar_shift(points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Box:
-    """The places of a grid of m in each direction but for those in a box, numbered in order.
+class HollowGrid:
+    """The places of a grid, m in each direction, without those in a box; numbered in order.
 
     The first axis is fastest; ``linear`` counts the places in the box, too.
 
@@ -228,13 +228,13 @@ class Layout:
         return (*named, Marker("BLOCK", Cells.from_blocks([(kind, np.concatenate(block))])))
 
     @cached_property
-    def _nodes(self) -> Box:
+    def _nodes(self) -> HollowGrid:
         """Return the places of nodes: those inside the block are left out."""
-        return Box(self.n + 1, tuple(a + 1 for a in self.start), self.stop)
+        return HollowGrid(self.n + 1, tuple(a + 1 for a in self.start), self.stop)
 
     @cached_property
-    def _cells(self) -> Box:
-        return Box(self.n, self.start, self.stop)
+    def _cells(self) -> HollowGrid:
+        return HollowGrid(self.n, self.start, self.stop)
 
     @property
     def _strides(self) -> IntArray:

@@ -16,6 +16,8 @@ from slideviz.session.state import Frame, Guess, Run, Session, ViewState
 from slideviz.terms import ColourBy, Role
 
 RELATIVE_TOLERANCE = 1e-5
+STEPS = 5
+"""Of a mesh whose boundaries slide, until somebody chooses."""
 
 
 def open_mesh(
@@ -121,7 +123,7 @@ def guess_case(mesh: Mesh, guesses: dict[str, Guess], pairs: Sequence[Pair]) -> 
     case = Case(roles=roles, zone=mesh.zone if mesh.zones > 1 else None)
     if "sliding" in roles.values():
         # A role that the method does not use would be no help.
-        case = case.change(sliding="ps", steps=5)
+        case = case.change(sliding="ps", steps=STEPS)
     for pair in pairs:
         if roles[pair.first] == roles[pair.second] == "periodic":
             return with_periodicity(case, pair)

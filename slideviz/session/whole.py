@@ -18,13 +18,12 @@ from slideviz.mesh.io.su2b.layout import Source, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
 from slideviz.mesh.threads import Tick
+from slideviz.session.inspect import WORST
 from slideviz.session.results import Frame
 from slideviz.terms import Metric
 
 FINE = 10_000
 """Intervals of 0 to 1 in which cells are counted; a histogram puts some of them together."""
-LISTED = 100
-"""Worst cells that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +118,13 @@ class Tallying:
         self._inverted += len(ids) - len(right)
         self._unproven += int(np.count_nonzero(status == UNPROVEN))
         self._sums.append(float(values.sum()))
-        if len(values) > LISTED:
-            limit = np.partition(values, LISTED - 1)[LISTED - 1]
+        if len(values) > WORST:
+            limit = np.partition(values, WORST - 1)[WORST - 1]
             near = np.flatnonzero(values <= limit)
             ids, values = ids[near], values[near]
         old_ids, old = self._worst
         ids, values = np.concatenate([old_ids, ids]), np.concatenate([old, values])
-        order = np.lexsort((ids, values))[:LISTED]
+        order = np.lexsort((ids, values))[:WORST]
         self._worst = ids[order], values[order]
 
     def tally(self) -> Tally:

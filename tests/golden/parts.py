@@ -11,6 +11,7 @@ from unittest.mock import patch
 
 from PIL import Image
 
+from slideviz.terms import PERIODIC_MODES, SLIDING
 from tests.golden.desk import Desk, keep_picture
 
 SIZES = {
@@ -38,7 +39,7 @@ COMMANDS = (
     "shots",
 )
 
-SLIDING, PERIODIC = ("none", "ps", "ds"), ("none", "periodic", "fixed", "moving")
+PERIODIC = tuple(PERIODIC_MODES)
 REDUCED = ("DATA_REDUCTION=YES", "DATA_RED_TOLERANCE=1e-3")
 METHODS: tuple[tuple[str, ...], ...] = (
     *((f"SLIDING_MODE={way}", f"PERIODIC_MODE={mode}") for way in SLIDING for mode in PERIODIC),

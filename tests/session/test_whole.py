@@ -7,8 +7,7 @@ import slideviz as sv
 from slideviz.mesh.quality import quality
 from slideviz.mesh.skin import read_skin
 from slideviz.samples.table import sample
-from slideviz.session import whole
-from slideviz.session.inspect import cell_info, worst_cells
+from slideviz.session.inspect import WORST, cell_info, worst_cells
 from slideviz.session.large import frame_of
 from slideviz.session.results import Frame
 from slideviz.session.whole import PartQuality, Tallying, measure_all, tally_of
@@ -38,7 +37,7 @@ def test_numbers_of_all_cells(folded):
     assert part.mean == pytest.approx(found.mean, rel=1e-14)
     for bins in (10, 20, 25):
         np.testing.assert_array_equal(part.histogram(bins)[0], found.histogram(bins)[0])
-    np.testing.assert_array_equal(part.all.worst, found.worst(whole.LISTED))
+    np.testing.assert_array_equal(part.all.worst, found.worst(WORST))
 
 
 @pytest.mark.parametrize("size", [1, 17, 100, 1000])
@@ -50,7 +49,7 @@ def test_blocks_in_any_order_give_the_same(folded, size):
     for first in np.random.default_rng(2).permutation(starts):
         part = slice(first, first + size)
         made.add(np.arange(len(found))[part], found.values[part], found.status[part])
-    np.testing.assert_array_equal(made.tally().worst, found.worst(whole.LISTED))
+    np.testing.assert_array_equal(made.tally().worst, found.worst(WORST))
     assert made.tally().mean == pytest.approx(found.mean, rel=1e-13)
     np.testing.assert_array_equal(made.tally().counts, tally_of(found).counts)
 
@@ -87,4 +86,4 @@ def test_the_worst_cells_are_those_of_the_mesh_in_memory(folded):
         assert one.size_skew == other.size_skew
         np.testing.assert_allclose(one.jacobians, other.jacobians, rtol=1e-12)
     assert not frame.has(None)
-    assert not frame.has(len(skin.cells) + whole.LISTED)
+    assert not frame.has(len(skin.cells) + WORST)

@@ -10,7 +10,7 @@ import numpy as np
 from slideviz.case.model import Case, Motion, Radial, Reduction, Rotate, Scale, Translate
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.kernels import KERNELS, PLAIN
-from slideviz.terms import Role
+from slideviz.terms import SLIDING, Role
 from tools.laws.draw import Rng
 from tools.laws.made import Made, Period
 from tools.laws.meshes import nearest_neighbour, random_mesh
@@ -91,7 +91,8 @@ def _roles(rng: Rng, made: Made, moving: tuple[str, ...], period: Period | None)
 
 def _method(rng: Rng, period: Period | None) -> dict[str, Any]:
     """Return method, way of sliding and periodicity."""
-    sliding = str(rng.choice(["none", "ps", "ds"], p=[0.2, 0.4, 0.4]))
+    others = len(SLIDING) - 1
+    sliding = str(rng.choice([*SLIDING], p=[0.2, *[0.8 / others] * others]))
     out: dict[str, Any] = {
         "method": str(rng.choice(["rbf", "idw", "elastic"], p=[0.84, 0.08, 0.08])),
         "sliding": sliding,

@@ -15,6 +15,7 @@ from slideviz.export.section_job import Paper, save_section
 from slideviz.gui.panels.section_editor import SectionEditor
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import (
+    Part,
     boxed,
     check_box,
     hint_label,
@@ -42,6 +43,7 @@ HINTS = {
     3: f"Cut the mesh with a {names()} to see its cells inside.",
     2: f"Lay a {names(2)} through the mesh to see the cells on it, and their quality along it.",
 }
+BUTTONS_IN_ROW = 3
 UNSEEN = "Tick the section in the list to show it."
 SIZES = {
     "8.5 cm wide, a column…": Paper.of_cm(8.5, 6.4),
@@ -127,11 +129,14 @@ class SectionsPanel(Panel):
             part.setChecked(True)
 
     def _place(self) -> None:
-        add = in_row(*self.add.values(), None, self.remove, spacing=5)
+        buttons = list(self.add.values())
+        rows = [buttons[i : i + BUTTONS_IN_ROW] for i in range(0, len(buttons), BUTTONS_IN_ROW)]
+        add: list[Part] = [in_row(*rows[0], None, self.remove, spacing=5)]
+        add += [in_row(*row, None, spacing=5) for row in rows[1:]]
         tools = (self.handle, self.flat, None, self.look, self.picture)
         self.tools, self.rest = boxed(in_row(*tools, spacing=5)), QWidget()
         self.rest.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        parts = (add, self.hint, self.list, self.editor, self.tools, self.rest)
+        parts = (*add, self.hint, self.list, self.editor, self.tools, self.rest)
         in_column(*parts, wide=[self.list], spacing=5, on=self, margins=(6, 6, 6, 6))
 
     # What is shown ---------------------------------------------------------------------

@@ -37,7 +37,7 @@ from slideviz.terms import COLOUR_BY
 
 
 class WorstPanel(Panel):
-    """The table of the hundred worst cells; the marked cell is the current row.
+    """The table of the worst cells (`WORST` of them); the marked cell is the current row.
 
     Parameters
     ----------

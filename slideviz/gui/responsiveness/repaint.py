@@ -14,10 +14,10 @@ from slideviz.gui.responsiveness.timers import later
 class RepaintCoalescer(QObject):
     """The coalescer of repaints: a view and the widgets around it are painted together, soon.
 
-    Clicks and timers come between what changed a scene and the drawing of it, which takes as long
-    again where no graphics card draws. The labels around the view, which tell of the same change,
-    would be painted before: but around a view drawn by OpenGL the whole window goes to the screen
-    for each of them, 10 to 20 ms each time.
+    After a scene has changed, Qt answers clicks and timers first; then the view is drawn. Labels
+    around the view change at the same time, and Qt would paint each of them at once. Beside a view
+    that OpenGL draws, every such paint sends the whole window to the screen, 10 to 20 ms each
+    time; so they wait for the view.
     """
 
     def __init__(self, view: QWidget) -> None:
