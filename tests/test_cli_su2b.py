@@ -69,16 +69,14 @@ def test_a_format_that_is_none_is_told(square, capsys):
 def test_what_a_binary_mesh_loses_is_said_before_the_work(square, capsys):
     with Path("mesh.su2").open("a") as file:
         file.write(FFD)
-    words = "will not have its other sections (FFD_NBOX, FFD_NLEVEL) of mesh.su2; write a .su2 file"
+    words = "will not have its FFD boxes of mesh.su2; write a .su2 file"
     for call in (["convert", "mesh.su2", "out.su2b"], ["run", "square.cfg", "-o", "out.su2b"]):
         assert run(call) == 0
         assert f"slideviz: warning: out.su2b is an SU2 binary mesh and {words}" in (
             capsys.readouterr().err
         )
     mesh = sv.read("mesh.su2")
-    assert left_out(Path("a.su2b"), mesh) == (
-        "a.su2b does not hold its other sections (FFD_NBOX, FFD_NLEVEL)."
-    )
+    assert left_out(Path("a.su2b"), mesh) == "a.su2b does not hold its FFD boxes."
     assert left_out(Path("a.su2"), mesh) == left_out(Path("a.su2b"), sv.read("out.su2b")) == ""
 
 
@@ -105,7 +103,7 @@ def test_convert_tells_what_every_zone_loses(tmp_path, monkeypatch, capsys):
     with Path("two.su2").open("a") as file:
         file.write(FFD)
     assert run(["convert", "two.su2", "again.su2b"]) == 0
-    assert "sections (FFD_NBOX, FFD_NLEVEL) of two.su2, zone 2; write" in capsys.readouterr().err
+    assert "will not have its FFD boxes of two.su2, zone 2; write" in capsys.readouterr().err
 
 
 def test_a_halo_is_refused_before_the_work(square, capsys):
@@ -135,3 +133,47 @@ def test_convert_has_all_zones_or_one(tmp_path, monkeypatch, capsys):
     assert "no mesh format has the ending .nothing" in capsys.readouterr().err
     assert run(["convert", "two.su2b", "two.su2b"]) == 1
     assert "is the input mesh" in capsys.readouterr().err
+
+
+HALO = "MARKER_TAG= SEND_RECEIVE\nMARKER_ELEMS= 1\nSEND_TO= 1\n1 0 0\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "lost"),
+    [
+        ("", ""),
+        (FFD, "its FFD boxes"),
+        ("NPERIODIC= 0\nANGLE= 1\n", "its other sections (NPERIODIC, ANGLE)"),
+        (FFD + HALO, "its halo (SEND_RECEIVE; its cells are as any others now) and its FFD boxes"),
+    ],
+)
+def test_convert_says_exactly_what_a_vtu_file_loses(square, capsys, more, lost):
+    text = Path("mesh.su2").read_text() + more
+    Path("mesh.su2").write_text(text.replace("NMARK= 5", f"NMARK= {5 + text.count('SEND_TO')}"))
+    assert run(["convert", "mesh.su2", "out.vtu"]) == 0
+    told = f"slideviz: note: out.vtu does not hold {lost}.\n" if lost else ""
+    assert capsys.readouterr().err == told
+
+
+def test_convert_says_once_that_other_zones_are_lost(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("two.su2b").write_bytes(packed([TWO_D, THREE_D]))
+    assert run(["convert", "two.su2b", "second.vtu", "--zone", "2"]) == 0
+    assert capsys.readouterr().err.count("zone") == 1
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".vtkhdf"])
+def test_convert_writes_the_quality_for_paraview(square, ending):
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+    assert run(["convert", "mesh.su2", f"out{ending}"]) == 0
+    reader = vtkHDFReader() if ending == ".vtkhdf" else vtkXMLUnstructuredGridReader()
+    reader.SetFileName(f"out{ending}")
+    reader.Update()
+    found = reader.GetOutput()
+    grid = found.GetPartition(0, 0) if ending == ".vtkhdf" else found
+    expected = sv.quality(sv.read("mesh.su2")).values
+    values = vtk_to_numpy(grid.GetCellData().GetArray("size-skew"))
+    assert np.array_equal(values[: len(expected)], expected)

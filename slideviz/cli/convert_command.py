@@ -22,11 +22,12 @@ def convert(arguments: argparse.Namespace) -> int:
     import sys
     from dataclasses import replace
 
-    from slideviz import read
+    from slideviz import quality, read
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import Output, require_places, tell_lost
+    from slideviz.cli.report import cell_data
     from slideviz.mesh.io.convert import convert as write_converted
-    from slideviz.session.formats import left_out
+    from slideviz.session.formats import holds_quality, left_out
 
     require_places(arguments, Output(arguments.output, "OUT", is_mesh=True))
     mesh = read(arguments.mesh, zone=arguments.zone)
@@ -37,8 +38,11 @@ def convert(arguments: argparse.Namespace) -> int:
         for zone in range(2, mesh.zones + 1):
             other = read(arguments.mesh, zone=zone)
             tell_lost(arguments.output, replace(other, zones=1, name=f"{mesh.name}, zone {zone}"))
-    write_converted(arguments.mesh, arguments.output, arguments.zone, mesh)
-    lost = "" if binary else left_out(arguments.output, mesh)
+    values = None
+    if holds_quality(arguments.output) and (arguments.zone or mesh.zones == 1):
+        values = cell_data(arguments.output, quality(mesh))
+    write_converted(arguments.mesh, arguments.output, arguments.zone, mesh, values)
+    lost = "" if binary else left_out(arguments.output, replace(mesh, zones=1))
     if lost:
         print(f"slideviz: note: {lost}", file=sys.stderr)
     print(arguments.output)

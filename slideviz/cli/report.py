@@ -19,6 +19,7 @@ from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import Quality
+from slideviz.session.formats import holds_quality
 
 LISTED = 100
 """Inverted cells named in a report."""
@@ -275,6 +276,6 @@ def quality_lines(quality: Quality, undeformed: Quality | None = None) -> str:
 
 def cell_data(path: Path, found: Quality) -> dict | None:
     """Return the qualities for formats that hold cell data, None for the others."""
-    if path.suffix.lower() not in (".vtu", ".vtkhdf", ".vtk", ".xdmf"):
+    if not holds_quality(path):
         return None
     return {"size-skew": found.values, "size": found.size, "skew": found.skew}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from slideviz.mesh.io.su2b.write import lost_in_binary
+from slideviz.mesh.io.su2b.write import listed, lost_in_binary, lost_of_mesh
 from slideviz.mesh.model import Mesh
 
 
@@ -69,11 +69,9 @@ def left_out(path: Path, mesh: Mesh) -> str:
             lost.append("the names of the boundaries (they are numbers now)")
         if row is None or not row.quality:
             lost.append("the quality of the cells")
-        if mesh.source is not None and mesh.source.suffix.lower() == ".su2":
-            lost.append("what else was in the SU2 file, such as FFD boxes and other zones")
+        lost += lost_of_mesh(mesh)
     if mesh.origin.ending == ".cgns":
         lost.append("what else was in the CGNS file, such as its zones and solutions")
     if not lost:
         return ""
-    words = lost[0] if len(lost) == 1 else f"{', '.join(lost[:-1])} and {lost[-1]}"
-    return f"{path.name} does not hold {words}."
+    return f"{path.name} does not hold {listed(lost)}."

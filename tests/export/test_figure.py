@@ -378,8 +378,10 @@ def test_formats_and_what_they_leave_out(square, cube):
     assert left_out(Path("a.su2"), square) == ""
     plain = replace(square, source=None)
     assert left_out(Path("a.vtu"), plain) == ""
-    from_su2 = replace(square, source=Path("x.su2"))
-    assert "FFD boxes" in left_out(Path("a.vtu"), from_su2)
+    boxed = replace(plain, zones=2, origin=replace(plain.origin, ffd=b"FFD_NBOX= 1\n"))
+    assert left_out(Path("a.vtu"), boxed) == (
+        "a.vtu does not hold its FFD boxes and its other zones."
+    )
     assert left_out(Path("a.msh"), plain) == "a.msh does not hold the quality of the cells."
     assert "numbers now" in left_out(Path("a.off"), plain)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+
+from numpy.typing import ArrayLike
 
 from slideviz.mesh.check import path_error
 from slideviz.mesh.io.atomic import atomic_write
@@ -17,7 +19,11 @@ _ZONED = {".su2": "su2", ".su2b": "su2b"}
 
 
 def convert(
-    source: str | Path, target: str | Path, zone: int | None = None, first: Mesh | None = None
+    source: str | Path,
+    target: str | Path,
+    zone: int | None = None,
+    first: Mesh | None = None,
+    cell_data: Mapping[str, ArrayLike] | None = None,
 ) -> Mesh:
     """Write a mesh in the format that the ending of ``target`` names; return its first zone.
 
@@ -29,6 +35,8 @@ def convert(
         The zone to convert, from 1; all of them when left out.
     first : Mesh, optional
         The zone, or the first one, if it was read already.
+    cell_data : mapping of str to (n_cells,) or (n_cells, k), optional
+        Values on its cells by name, as of `slideviz.write`.
 
     Raises
     ------
@@ -48,10 +56,11 @@ def convert(
     mesh = read(source, zone) if first is None else first
     kind = _ZONED.get(target.suffix.lower())
     if mesh.zones == 1 or (zone is None and mesh.origin.ending == f".{kind}"):
-        write(target, mesh)  # which keeps what else the file has
+        write(target, mesh, cell_data=cell_data)  # which keeps what else the file has
         return mesh
     if zone is not None:
-        write(target, replace(mesh, zone=1, zones=1, origin=Origin()))
+        alone = replace(mesh, zone=1, zones=1, origin=Origin())
+        write(target, alone, cell_data=cell_data)
         return mesh
     if kind is None:
         raise path_error(

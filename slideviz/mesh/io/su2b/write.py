@@ -9,7 +9,7 @@ is read back with its cells in the order that it had.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from slideviz.errors import MeshError
 from slideviz.mesh.check import check_mesh
 from slideviz.mesh.elements import SIZES
 from slideviz.mesh.io.su2.read import Document
+from slideviz.mesh.io.su2.sections import is_ffd
 from slideviz.mesh.io.su2b.elements import BLOCK
 from slideviz.mesh.io.su2b.layout import NAME_BYTES, SEND_RECEIVE
 from slideviz.mesh.io.su2b.read import BinaryForm
@@ -121,20 +122,39 @@ def require_binary_names(mesh: str, names: Iterable[str]) -> None:
 
 
 def lost_in_binary(mesh: Mesh) -> tuple[str, ...]:
-    """Return what an SU2 binary file does not keep of the text file of a mesh, in words."""
+    """Return what an SU2 binary file does not keep of the file of a mesh, in words."""
+    is_binary = isinstance(mesh.origin, BinaryForm)
+    return lost_of_mesh(replace(mesh, zones=1) if is_binary else mesh)
+
+
+def lost_of_mesh(mesh: Mesh) -> tuple[str, ...]:
+    """Return what the file of a mesh has beside points, cells and boundaries, in words."""
     document = mesh.origin
-    boxes = ("its FFD boxes",) if document.ffd else ()
-    if not isinstance(document, Document):
-        return boxes
-    keys = [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
-    return lost_of_text(keys, mesh.zones) if keys else (*boxes, *lost_of_text((), mesh.zones))
+    keys = ["FFD_NBOX"] if document.ffd else []
+    has_halo = mesh.halo is not None
+    if isinstance(document, Document):
+        keys += [document.raw[a:b].partition(b"=")[0].strip().decode() for a, b in document.kept]
+        has_halo = has_halo or bool(document.sends)
+    halo = (f"its halo ({SEND_RECEIVE}; its cells are as any others now)",) if has_halo else ()
+    return (*halo, *lost_of_text(keys, mesh.zones))
 
 
 def lost_of_text(keys: Iterable[str], zones: int) -> tuple[str, ...]:
     """Return what is lost of a text of so many zones, with unknown sections of these keys."""
-    named = ", ".join(dict.fromkeys(key.upper() for key in keys))
-    lost = (f"its other sections ({named})",) if named else ()
-    return (*lost, "its other zones") if zones > 1 else lost
+    unique = dict.fromkeys(key.upper() for key in keys)
+    others = ", ".join(key for key in unique if not is_ffd(key.encode()))
+    lost = {
+        "its FFD boxes": any(is_ffd(key.encode()) for key in unique),
+        f"its other sections ({others})": bool(others),
+        "its other zones": zones > 1,
+    }
+    return tuple(words for words, is_lost in lost.items() if is_lost)
+
+
+def listed(lost: Sequence[str]) -> str:
+    """Return things in a row, in words."""
+    *first, last = lost
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def sentence_of_lost(output: Path, name: str, lost: Sequence[str]) -> str:
@@ -142,7 +162,7 @@ def sentence_of_lost(output: Path, name: str, lost: Sequence[str]) -> str:
     if not lost:
         return ""
     return (
-        f"{output} is an SU2 binary mesh and will not have {' and '.join(lost)} of {name}; write a "
+        f"{output} is an SU2 binary mesh and will not have {listed(lost)} of {name}; write a "
         ".su2 file to keep them"
     )
 
