@@ -76,14 +76,26 @@ def ffd_problems(case: Case, mesh: Mesh, motion: Ffd) -> tuple[str, ...]:
     except SlidevizError as problem:
         return (str(problem),)
     if motion.box not in boxes:
-        has = f"there are {', '.join(boxes)}" if boxes else "none is in it, or in FFD_DEFINITION"
-        why = nearest(motion.box, boxes) or f"; {has}"
-        return (f"{mesh.name} has no FFD box {motion.box!r}{why}",)
+        none = "none is in it, or in FFD_DEFINITION"
+        return (missing_box(mesh, motion.box, boxes, none),)
     unknown = boxes[motion.box].problem(motion.index)
     found = [unknown] if unknown else []
     if mesh.dim == 2 and motion.vector[2]:
         found.append(f"dz is {motion.vector[2]:g}, which leaves the plane; in 2D write 0")
     return tuple(found)
+
+
+def missing_box(mesh: Mesh, name: str, boxes: Iterable[str], none: str) -> str:
+    """Return a sentence on a box that a mesh has not; ``none`` is said where it has none."""
+    zone = mesh.origin.ffd_elsewhere.get(name)
+    if zone is not None:
+        return (
+            f"{mesh.name}: the FFD box {name!r} is in zone {zone}, and this is zone {mesh.zone}; "
+            f"choose that zone (ZONE= {zone} in a case, or --zone {zone}), or a box of this one"
+        )
+    known = ", ".join(boxes)
+    why = nearest(name, boxes) or f"; {f'it has {known}' if known else none}"
+    return f"{mesh.name} has no FFD box {name!r}{why}"
 
 
 def embedding(box: Box, mesh: Mesh, marker: str) -> tuple[Embedding, float]:

@@ -61,6 +61,8 @@ def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Qual
             }
             for box in boxes
         ]
+    if fault:
+        report["ffd_fault"] = fault
     if save_json(arguments.json, report):
         return DONE
     zone = f", zone {mesh.zone} of {mesh.zones}" if mesh.zones > 1 else ""

@@ -11,11 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
-from slideviz.case.boxes import boxes_for, defined_boxes, embedding, off_points
+from slideviz.case.boxes import boxes_for, defined_boxes, embedding, missing_box, off_points
 from slideviz.case.check import raise_all
 from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.model import Case, Prescribed
-from slideviz.case.words import nearest
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.steps import Step
 from slideviz.design.su2_config import Su2Config
@@ -219,9 +218,8 @@ def _require_boxes(config: Su2Config, mesh: Mesh, known: dict[str, Box]) -> None
         if variable.kind not in BOXED:
             continue
         if variable.box not in known:
-            has = f"it has {', '.join(known)}" if known else "define it with FFD_DEFINITION"
-            why = nearest(variable.box, known) or f"; {has}"
-            problems.append(f"variable {place}: {mesh.name} has no FFD box {variable.box!r}{why}")
+            said = missing_box(mesh, variable.box, known, "define it with FFD_DEFINITION")
+            problems.append(f"variable {place}: {said}")
         elif wrong := known[variable.box].problem(variable.index):
             problems.append(f"variable {place}: {wrong}")
         elif mesh.dim == 2 and variable.numbers[2]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -184,10 +184,16 @@ class Origin:
         Of the files whose format it is; "" where nothing is kept.
     ffd : bytes or None
         The boxes for free-form deformation that an SU2 file gets in place of those it had.
+    ffd_at : tuple of range
+        The lines of the file, from 0, on which its boxes stand, if that is known.
+    ffd_elsewhere : dict of str to int
+        The boxes that other zones of the file have, and their zones.
     """
 
     ending: ClassVar[str] = ""
     ffd: bytes | None = field(default=None, kw_only=True)
+    ffd_at: tuple[range, ...] = field(default=(), kw_only=True)
+    ffd_elsewhere: Mapping[str, int] = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -31,7 +31,7 @@ def skin_of_text(text: Text, path: Path, tick: Tick, ranks: Alone = ALONE) -> Me
         zone=zone.bounds.number,
         zones=zone.bounds.zones,
         source=text.path.resolve(),
-        origin=Origin(ffd=text.boxes()),
+        origin=Origin(ffd=text.boxes(), ffd_at=zone.ffd_at, ffd_elsewhere=text.boxes_elsewhere),
     )
 
 

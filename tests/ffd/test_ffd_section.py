@@ -1,10 +1,13 @@
 """The boxes of SU2 mesh files: read, moved, written back."""
 
+import json
+
 import numpy as np
 import pytest
 from ffd_samples import DESIGN, REAL, square, unpacked
 
 import slideviz as sv
+from slideviz.cli import run
 from slideviz.errors import MeshError
 from slideviz.ffd.box import CORNERS, plane_corners, regular_box
 from slideviz.ffd.section import boxes_of, with_boxes
@@ -186,7 +189,15 @@ def test_mesh_without_boxes_has_none():
         ("BEZIER", "NURBS", "FFD_BLENDING is NURBS; needed is BEZIER or BSPLINE_UNIFORM"),
         ("POINTS= 4", "POINTS= 8", "FFD_CORNER_POINTS is 8; needed is 4"),
         ("1.1 0.1\n", "", "3 rows follow FFD_CORNER_POINTS= 4; correct the count"),
-        ("1.1 0.1\n", "1.1 wide\n", "a row of FFD_CORNER_POINTS has not the numbers"),
+        ("1.1 0.1\n", "1.1 wide\n", "the row '1.1 wide' of FFD_CORNER_POINTS needs 2 finite numb"),
+        (
+            "NBOX= 1",
+            "NBOX= 3",
+            r"FFD_NBOX= 3, but the FFD boxes that follow are 1 \(MAIN\); correct",
+        ),
+        ("NBOX= 1", "NBOX= one", "FFD_NBOX= one, but the FFD boxes"),
+        ("FFD_NBOX= 1\n", "", "FFD_NBOX= is missing; write FFD_NBOX= 1 before the FFD boxes"),
+        (SECTION[12:], "", "FFD_NBOX= 1, but the FFD boxes that follow are none"),
         ("CONTROL_POINTS= 0", "CONTROL_POINTS= 2", "FFD_CONTROL_POINTS is 2; needed is 12"),
         ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", "names node 999, which is none"),
     ],
@@ -196,6 +207,44 @@ def test_mistakes_are_told_with_box_and_remedy(old, new, message, tmp_path):
     mesh = sv.read(written(tmp_path, SECTION.replace(old, new)))
     with pytest.raises(MeshError, match=message):
         boxes_of(mesh)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "row"),
+    [
+        ("NBOX= 1", "NBOX= 3", 0),
+        ("FFD_LEVEL= 0", "FFD_LEVEL= 1", 3),
+        ("FFD_DEGREE_J= 1\n", "", 2),
+        ("1.1 0.1\n", "1.1 wide\n", 12),
+        ("SURFACE_POINTS= 0", "SURFACE_POINTS= 1\nlow 999 0 0 0", 16),
+    ],
+)
+def test_mistakes_are_told_with_their_line_streamed_or_not(old, new, row, tmp_path, capsys):
+    before = len(written(tmp_path, "").read_text().splitlines())
+    path = written(tmp_path, SECTION.replace(old, new))
+    for more in ([], ["--stream"]):
+        assert run(["info", str(path), "--json", "-", *more]) == 0
+        fault = json.loads(capsys.readouterr().out)["ffd_fault"]
+        assert fault.startswith(f"square.su2:{before + row + 1}: ")
+        assert run(["info", str(path), *more]) == 0
+        assert f"FFD boxes: {fault}\n" in capsys.readouterr().out
+
+
+def test_box_of_another_zone_is_told_with_its_zone(tmp_path, capsys):
+    path = written(tmp_path)
+    body, bare = path.read_text(), path.read_text().partition("FFD_NBOX")[0]
+    path.write_text(f"NZONE= 2\nIZONE= 1\n{bare}IZONE= 2\n{body}")
+    case = tmp_path / "a.cfg"
+    case.write_text(
+        "MESH_FILENAME= square.su2\nMARKER_MOVING= (y_low)\n"
+        "MOTION= (y_low, ffd, MAIN, 1, 0, 0, 0, 0.01, 0)\n"
+    )
+    for more in ([], ["--stream"]):
+        assert run(["run", str(case), "-o", str(tmp_path / "out.su2"), *more]) == 1
+        said = "square.su2: the FFD box 'MAIN' is in zone 2, and this is zone 1; choose that zone"
+        assert said in capsys.readouterr().err
+    call = ["run", str(case), "-q", "--zone", "2", "-o", str(tmp_path / "out.su2")]
+    assert run(call) == 0
 
 
 def test_double_control_points_and_boxes_are_told(tmp_path):

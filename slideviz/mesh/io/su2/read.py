@@ -11,7 +11,7 @@ from slideviz.mesh.io.su2.halo import find_halo
 from slideviz.mesh.io.su2.lines import Rows, number_of
 from slideviz.mesh.io.su2.numbers import parse_cells, parse_points
 from slideviz.mesh.io.su2.scan import Progress, scan
-from slideviz.mesh.io.su2.sections import find_bounds, find_sections
+from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections
 from slideviz.mesh.io.su2.zone import find_zone
 from slideviz.mesh.model import Cells, FloatArray, Marker, Mesh, Origin
 
@@ -95,6 +95,8 @@ def read_su2(raw: Source, zone: int | None, progress: Progress) -> Mesh:
         zone=lines.bytes_of((found.bounds.begin, found.bounds.end))[0],
         sends=lines.bytes_of(*((part.begin, part.end) for part in found.sends)),
         kept=lines.bytes_of(*((part.line, part.stop) for part in found.kept)),
+        ffd_at=found.ffd_at,
+        ffd_elsewhere=boxes_elsewhere(sections, found.bounds),
     )
     mesh = Mesh(
         points=points,

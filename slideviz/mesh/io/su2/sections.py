@@ -86,6 +86,17 @@ def find_bounds(lines: Lines, sections: list[Section], number: int | None) -> Bo
     return Bounds(chosen, zones, begin + 1, min(later, default=len(lines)))
 
 
+def boxes_elsewhere(sections: list[Section], bounds: Bounds) -> dict[str, int]:
+    """Return the boxes for free-form deformation that other zones have, and their zones."""
+    found, zone = {}, 1
+    for section in sections:
+        if section.key == "IZONE":
+            zone = int(section.value.split()[0])
+        elif section.key == "FFD_TAG" and zone != bounds.number and bounds.zones > 1:
+            found[section.value.decode("utf-8", "replace")] = zone
+    return found
+
+
 def _zone_heads(lines: Lines, sections: list[Section]) -> dict[int, Section]:
     """Return the ``IZONE`` line of each zone by number; none when the file has no zones."""
     totals = [s for s in sections if s.key == "NZONE"]

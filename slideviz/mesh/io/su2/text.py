@@ -8,16 +8,17 @@ from pathlib import Path
 from slideviz.mesh.io.source import open_source
 from slideviz.mesh.io.su2.lines import Lines, number_of
 from slideviz.mesh.io.su2.scan import Progress, scan
-from slideviz.mesh.io.su2.sections import find_bounds, find_sections, is_ffd
+from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections, is_ffd
 from slideviz.mesh.io.su2.zone import Zone, find_zone
 
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """One zone of an SU2 text file: its lines, and where its parts are."""
+    """One zone of an SU2 text file: its lines, where its parts are, and the boxes of others."""
 
     lines: Lines
     zone: Zone
+    boxes_elsewhere: dict[str, int]
 
     @property
     def path(self) -> Path:
@@ -55,4 +56,5 @@ def find_text(path: Path, zone: int | None, progress: Progress = lambda _: None)
     """
     lines = scan(open_source(path), progress)
     sections = find_sections(lines)
-    return Text(lines, find_zone(lines, sections, find_bounds(lines, sections, zone)))
+    bounds = find_bounds(lines, sections, zone)
+    return Text(lines, find_zone(lines, sections, bounds), boxes_elsewhere(sections, bounds))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.io.su2.lines import ROWS, Lines, Rows, number_of, show
-from slideviz.mesh.io.su2.sections import KNOWN, Bounds, Section, count_of, misspelt
+from slideviz.mesh.io.su2.sections import KNOWN, Bounds, Section, count_of, is_ffd, misspelt
 
 SEND_RECEIVE = "SEND_RECEIVE"
 _NAME_IT = "; name the marker"
@@ -128,6 +128,12 @@ class Zone:
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
     kept: tuple[Section, ...]
+
+    @property
+    def ffd_at(self) -> tuple[range, ...]:
+        """Return the lines of the boxes for free-form deformation."""
+        boxes = (part for part in self.kept if is_ffd(part.key.encode()))
+        return tuple(range(part.line, part.stop) for part in boxes)
 
 
 def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:

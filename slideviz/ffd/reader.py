@@ -1,0 +1,232 @@
+"""The boxes of an SU2 mesh file, read from the lines of its section ``FFD_NBOX=``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice
+from math import isfinite
+
+import numpy as np
+
+from slideviz.errors import CaseError, MeshError
+from slideviz.ffd.box import Box, Index, plane_corners, regular_box
+from slideviz.mesh.model import FloatArray, IntArray, Mesh
+
+_LETTERS = "IJK"
+
+
+Row = tuple[int, list[str]]
+"""A line of numbers, by its place in the section, as words."""
+
+
+@dataclass
+class Entry:
+    """A keyword line, and the rows that follow it, as words."""
+
+    value: str
+    line: int
+    rows: list[Row] = field(default_factory=list)
+
+
+Entries = dict[str, Entry]
+"""The keyword lines of a box."""
+
+
+def read_boxes(mesh: Mesh, lines: list[str]) -> tuple[Box, ...]:
+    """Return the boxes in the lines of a section.
+
+    Raises
+    ------
+    MeshError
+        The section has a mistake, or nested boxes, which are not supported.
+    """
+    entries = entries_of(lines)
+    boxes = tuple(_Reader(mesh, one).box() for one in entries)
+    names = [box.name for box in boxes]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            line = entries[k]["FFD_TAG"].line
+            raise _error(mesh, line, f"the FFD box {name!r} stands twice; rename one")
+    _require_count(mesh, lines, names)
+    return boxes
+
+
+def _require_count(mesh: Mesh, lines: list[str], names: list[str]) -> None:
+    """Raise where ``FFD_NBOX=`` does not say how many boxes follow."""
+    given = [(at, line) for at, line in enumerate(lines) if key_of(line) == "FFD_NBOX"]
+    if not given:
+        if names:
+            raise _error(
+                mesh, 0, f"FFD_NBOX= is missing; write FFD_NBOX= {len(names)} before the FFD boxes"
+            )
+        return
+    at, line = given[0]
+    word = _value(line)
+    if not word.isdecimal() or int(word) != len(names):
+        has = f"{len(names)} ({', '.join(names)})" if names else "none"
+        raise _error(
+            mesh, at, f"FFD_NBOX= {word}, but the FFD boxes that follow are {has}; correct it"
+        )
+
+
+def _error(mesh: Mesh, line: int, sentence: str) -> MeshError:
+    """Return the error about a line of the section, with its place in the file if it is known."""
+    at = next(islice(chain.from_iterable(mesh.origin.ffd_at), line, None), None)
+    place = mesh.name if at is None else f"{mesh.name}:{at + 1}"
+    return MeshError(f"{place}: {sentence}")
+
+
+def key_of(line: str) -> str:
+    """Return the key of a keyword line; "" of another."""
+    head, sign, _ = line.partition("%")[0].partition("=")
+    return head.strip().upper() if sign else ""
+
+
+def _value(line: str) -> str:
+    return line.partition("%")[0].partition("=")[2].strip()
+
+
+def entries_of(lines: list[str]) -> list[Entries]:
+    """Return the keyword lines of each box, with their rows."""
+    found: list[Entries] = []
+    entry = None
+    for number, line in enumerate(lines):
+        text = line.partition("%")[0]
+        if key := key_of(line):
+            entry = Entry(_value(line), number)
+            if key == "FFD_TAG":
+                found.append({})
+            if found:
+                found[-1][key] = entry
+        elif entry is not None and (words := text.replace(",", " ").split()):
+            entry.rows.append((number, words))
+    return found
+
+
+class _Reader:
+    """Reads one box, and tells what is wrong with it."""
+
+    def __init__(self, mesh: Mesh, entries: Entries) -> None:
+        self.mesh, self.entries = mesh, entries
+        self.name = entries["FFD_TAG"].value
+
+    def box(self) -> Box:
+        """Return the box."""
+        for key in ("FFD_LEVEL", "FFD_PARENTS", "FFD_CHILDREN"):
+            if key in self.entries and self.count(key):
+                raise self.error(f"{key} is {self.count(key)}: nested boxes are not supported", key)
+        flat = self.mesh.dim == 2
+        letters = _LETTERS[: self.mesh.dim]
+        i, j, k = (*(self.count(f"FFD_DEGREE_{letter}") for letter in letters), 1)[:3]
+        degrees = i, j, k
+        corners = self.numbers("FFD_CORNER_POINTS", 4 if flat else 8, self.mesh.dim)
+        corners = plane_corners(corners) if flat else corners
+        try:
+            box = regular_box(self.name, corners, degrees, self.orders(letters))
+        except CaseError as problem:
+            raise self.error(str(problem)) from problem
+        if self.count("FFD_CONTROL_POINTS"):
+            box = replace(box, points=self.control_points(degrees))
+        if "FFD_SURFACE_POINTS" in self.entries and self.count("FFD_SURFACE_POINTS"):
+            box = replace(box, embedded=self.surface_points())
+        return box
+
+    def orders(self, letters: str) -> Index | None:
+        """Return the orders of the B-splines, or None."""
+        entry = self.entries.get("FFD_BLENDING")
+        kind = "BEZIER" if entry is None else entry.value.upper()
+        if kind == "BEZIER":
+            return None
+        if kind != "BSPLINE_UNIFORM":
+            raise self.error(
+                f"FFD_BLENDING is {kind}; needed is BEZIER or BSPLINE_UNIFORM", "FFD_BLENDING"
+            )
+        keys = [f"BSPLINE_ORDER_{letter}" for letter in letters]
+        keys = [key if key in self.entries else f"FFD_{key}" for key in keys]
+        i, j, k = (*(self.count(key) for key in keys), 2)[:3]
+        return i, j, k
+
+    def control_points(self, degrees: tuple[int, ...]) -> FloatArray:
+        """Return the control points (I, J, K, 3), each of which must be there once."""
+        shape = tuple(degree + 1 for degree in degrees)
+        rows = self.numbers("FFD_CONTROL_POINTS", int(np.prod(shape)), 6)
+        index = rows[:, :3]
+        points = np.full((*shape, 3), np.nan)
+        whole = (index == np.floor(index)) & (index >= 0) & (index <= degrees)
+        if whole.all():
+            points[tuple(index.astype(int).T)] = rows[:, 3:]
+        if np.isnan(points).any():
+            limits = ", ".join(map(str, degrees))
+            raise self.error(
+                "FFD_CONTROL_POINTS must have each (i, j, k) from (0, 0, 0) to "
+                f"({limits}) once; write the boxes again with DV_KIND= FFD_SETTING",
+                "FFD_CONTROL_POINTS",
+            )
+        return points
+
+    def surface_points(self) -> dict[str, tuple[IntArray, FloatArray]]:
+        """Return nodes and parametric coordinates on each marker, sorted by node."""
+        key, part = "FFD_SURFACE_POINTS", self.mesh.part
+        n_points = len(self.mesh.points) if part is None else part.n_points
+        on: dict[str, list[Row]] = {}
+        for line, words in self.rows(key, self.count(key)):
+            on.setdefault(words[0], []).append((line, words[1:]))
+        found = {}
+        for marker, tails in on.items():
+            table = self.table(key, tails, 4)
+            nodes = table[:, 0].astype(np.int64)
+            bad = (nodes != table[:, 0]) | (nodes < 0) | (nodes >= n_points)
+            if bad.any():
+                line, words = tails[int(np.argmax(bad))]
+                raise self.error(f"{key} names node {words[0]}, which is none", line)
+            nodes, first = np.unique(nodes, return_index=True)
+            if part is not None:  # which has all nodes of markers
+                inside = np.isin(nodes, part.points)
+                nodes, first = np.searchsorted(part.points, nodes[inside]), first[inside]
+            found[marker] = nodes, table[first, 1:]
+        return found
+
+    def count(self, key: str) -> int:
+        """Return the whole number after a key."""
+        word = (self.entry(key).value.split() or [""])[0]
+        if not word.isdecimal():
+            raise self.error(f"{key}= {word} is no whole number from 0", key)
+        return int(word)
+
+    def numbers(self, key: str, count: int, width: int) -> FloatArray:
+        """Return the rows of numbers (count, width) after a key."""
+        if self.count(key) != count:
+            raise self.error(f"{key} is {self.count(key)}; needed is {count}", key)
+        return self.table(key, self.rows(key, count), width)
+
+    def rows(self, key: str, count: int) -> list[Row]:
+        """Return the rows after a key, which must be so many."""
+        rows = self.entry(key).rows
+        if len(rows) != count:
+            raise self.error(f"{len(rows)} rows follow {key}= {count}; correct the count", key)
+        return rows
+
+    def table(self, key: str, rows: list[Row], width: int) -> FloatArray:
+        """Return rows as numbers, (rows, width)."""
+        table = np.empty((len(rows), width))
+        for k, (line, words) in enumerate(rows):
+            try:
+                numbers = [float(word) for word in words]
+            except ValueError:
+                numbers = []
+            if len(numbers) != width or not all(map(isfinite, numbers)):
+                said = f"the row '{' '.join(words)[:60]}' of {key} needs {width} finite numbers"
+                raise self.error(said, line)
+            table[k] = numbers
+        return table
+
+    def entry(self, key: str) -> Entry:
+        """Return the line of a key."""
+        if key not in self.entries:
+            raise self.error(f"{key}= is missing")
+        return self.entries[key]
+
+    def error(self, sentence: str, at: str | int = "FFD_TAG") -> MeshError:
+        """Return the error about the box, at the line of a key or at another line."""
+        line = self.entries[at].line if isinstance(at, str) else at
+        return _error(self.mesh, line, f"FFD box {self.name!r}: {sentence}")
