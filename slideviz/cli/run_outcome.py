@@ -26,19 +26,31 @@ def tell(
     folded: Mapping[int, tuple[int, int]],
 ) -> int:
     """Write and print the report of a run, and return the exit code."""
-    from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.report import print_remarks, save_history, save_json
-
-    if arguments.history:
-        save_history(arguments.history, report)
-    if not save_json(arguments.json, report) and not arguments.quiet:
+    if not save_report(arguments, report) and not arguments.quiet:
         files |= {"report": arguments.json, "picture": arguments.picture}
         files |= {"convergence": arguments.history, "mesh of every step": arguments.steps_dir}
         files |= {"all steps": arguments.steps_file}
         _print_run(report, found, before, files)
-    print_remarks(report["warnings"], quiet=arguments.quiet)
-    if found.inverted:
-        print(f"slideviz: {_inverted_sentence(found, report, folded)}", file=sys.stderr)
+    return tell_warnings(report, folded, quiet=arguments.quiet)
+
+
+def save_report(arguments: argparse.Namespace, report: dict) -> bool:
+    """Write the report, and the convergence, where asked for; tell whether it was printed."""
+    from slideviz.cli.report import save_history, save_json
+
+    if arguments.history:
+        save_history(arguments.history, report)
+    return save_json(arguments.json, report)
+
+
+def tell_warnings(report: dict, folded: Mapping[int, tuple[int, int]], *, quiet: bool) -> int:
+    """Print the warnings of a run, and which cells are inverted; return the exit code."""
+    from slideviz.cli.exit_codes import DONE, INVERTED
+    from slideviz.cli.report import print_remarks
+
+    print_remarks(report["warnings"], quiet=quiet)
+    if report["quality"]["inverted"]:
+        print(f"slideviz: {_inverted_sentence(report, folded)}", file=sys.stderr)
         return INVERTED
     return DONE
 
@@ -89,17 +101,18 @@ def _print_run(
             print(f"{name}: {path}")
 
 
-def _inverted_sentence(found: Quality, report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
+def _inverted_sentence(report: dict, folded: Mapping[int, tuple[int, int]]) -> str:
     """Return which cells are inverted, and what helps."""
     from slideviz.mesh.elements import ELEMENTS
 
+    inverted, cells = report["quality"]["inverted"], report["quality"]["cells"]
     named = ", ".join(
         f"{cell} ({ELEMENTS[vtk].name}, step {step})"
         for cell, (vtk, step) in list(folded.items())[:5]
     )
-    more = f" and {found.inverted - 5} more" if found.inverted > 5 else ""
+    more = f" and {inverted - 5} more" if inverted > 5 else ""
     return (
-        f"{found.inverted} of {found.cells} cells are inverted: {named}{more}; more STEPS, "
+        f"{inverted} of {cells} cells are inverted: {named}{more}; more STEPS, "
         f"{_advice(report)} may help"
     )
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.run_outcome import CELLS, tell, write_qualities
+from slideviz.cli.run_outcome import CELLS, save_report, tell, tell_warnings, write_qualities
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -83,9 +83,16 @@ def run_streamed(
     """Deform a mesh from file to file, with the same report as ``run``."""
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import LISTED, run_report
-    from slideviz.deformation.streaming import stream
+    from slideviz.cli.run_finished import finished, note_finished
+    from slideviz.deformation.streaming import about_run, stream
     from slideviz.mesh.ranks import ALONE
 
+    about = about_run(case)
+    made = [path for path in (output, qualities) if path]
+    if arguments.resume and (known := finished(about, made)):
+        _say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
+        save_report(arguments, known[0])
+        return tell_warnings(*known, quiet=arguments.quiet)
     with Bar(not arguments.quiet) as bar:
         done = stream(
             case,
@@ -114,5 +121,6 @@ def run_streamed(
         undeformed=done.undeformed,
         folded=done.folded,
     )
+    note_finished(about, made, report, done.folded)
     files = {"mesh": output, CELLS: qualities}
     return tell(arguments, report, files, done.quality, done.undeformed, done.folded)

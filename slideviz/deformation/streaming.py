@@ -144,7 +144,7 @@ def stream(
             output,
             watch,
             ranks,
-            _about(case, path),
+            about_run(case),
             is_text=is_text,
             resume=resume,
             replaces=replaces,
@@ -248,8 +248,10 @@ def missing_memory(case: Case) -> str:
     return f"{path.name} needs about {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free"
 
 
-def _about(case: Case, path: Path) -> str:
+def about_run(case: Case) -> str:
     """Return what tells apart runs that give other points: case, files and program."""
+    path = case.mesh_file
+    assert path is not None
     text = repr(
         (
             __version__,

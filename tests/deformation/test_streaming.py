@@ -140,6 +140,51 @@ def test_the_command_writes_the_same_files_and_report(tmp_path, monkeypatch, cap
     assert Path("mesh.su2b").read_bytes() == texts[0][1]
 
 
+FOLDING = (
+    "MESH_FILENAME= mesh.su2b\nMARKER_MOVING= (BLOCK)\nMOTION= (BLOCK, rotate, 170, 0.5, 0.5)\n"
+    "SLIDING_MODE= none\nPERIODIC_MODE= none\nSTEPS= 1\n"
+)
+
+
+@pytest.mark.parametrize(("case", "code"), [("square.cfg", 0), ("folding.cfg", 3)])
+def test_resume_does_nothing_where_the_run_is_finished(tmp_path, monkeypatch, capsys, case, code):
+    monkeypatch.chdir(tmp_path)
+    made(tmp_path, "square", 25)
+    Path("folding.cfg").write_text(FOLDING)
+    call = ["run", case, "-o", "out.su2b", "-q", "--stream", "--resume", "--json"]
+    assert run([*call, "one.json"]) == code
+    first = [
+        line for line in capsys.readouterr().err.splitlines() if "nothing to go on" not in line
+    ]
+    monkeypatch.setattr(output, "move", lambda *_: pytest.fail("it is done again"))
+    assert run([*call, "other.json"]) == code
+    done = "slideviz: note: out.su2b: is finished, of this case, mesh and version; nothing is done"
+    assert capsys.readouterr().err.splitlines() == [done, *first]
+    assert Path("other.json").read_bytes() == Path("one.json").read_bytes()
+
+
+@pytest.mark.parametrize("change", ["mesh", "quality", "case", "note"])
+def test_resume_does_again_what_is_not_as_it_was_left(tmp_path, monkeypatch, capsys, change):
+    monkeypatch.chdir(tmp_path)
+    made(tmp_path, "square", 25)
+    call = ["run", "square.cfg", "-o", "out.su2b", "-q", "--resume"]
+    assert run(call) == 0
+    whole = Path("out.su2b").read_bytes()
+    if change == "mesh":
+        Path("out.su2b").write_bytes(whole[:-1])
+    elif change == "quality":
+        Path("out_qual.txt").unlink()
+    elif change == "case":
+        call += ["--steps", "3"]
+    else:
+        Path(".out.su2b.finished").write_text("no note")
+    capsys.readouterr()
+    assert run(call) == 0
+    assert "there is nothing to go on with" in capsys.readouterr().err
+    assert (Path("out.su2b").read_bytes() == whole) is (change != "case")
+    assert Path("out_qual.txt").exists()
+
+
 class KilledError(BaseException):
     """What ends a process without a chance to tidy up."""
 
