@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.solver import folded_at
-from slideviz.errors import MeshError
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.su2b.elements import Block
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace
@@ -77,30 +76,12 @@ def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
     return np.unique([signs.min(), signs.max()])
 
 
-def require_one_way(signs: NDArray[np.int8], name: str, first: int, also: str = "") -> None:
-    """Raise where cells, up to those of the block that begins with ``first``, are numbered unlike.
-
-    Only their neighbours tell cells that are numbered the other way round from folded ones.
-    ``also`` is one more remedy.
-    """
-    if len(signs) > 1:
-        raise MeshError(
-            f"{name}: some cells are numbered the other way round than others (from element "
-            f"{first} on), which only the whole mesh can tell from folded ones; {also}run it "
-            "without --stream, or mesh again"
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class Measured:
     """The quality of a block of cells, before and after.
 
     Attributes
     ----------
-    name : str
-        The mesh.
-    first : int
-        Number of the first element by its place in the file.
     ids : index of (k,)
         The numbers of the cells.
     values, before : (k,) float64
@@ -113,8 +94,6 @@ class Measured:
         Type and nodes of the inverted cells with the lowest numbers.
     """
 
-    name: str
-    first: int
     ids: Index
     values: FloatArray
     before: FloatArray
@@ -130,8 +109,6 @@ def measured(block: Block, base: Mesh, moved: Mesh, metric: Metric, listed: int)
     ends, inverted = moved.cells.offsets, np.flatnonzero(other.status == INVERTED)
     lowest = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
     return Measured(
-        base.name,
-        block.first,
         index_of(block.ids),
         other.values,
         one.values,
@@ -165,12 +142,16 @@ class Rating:
     def add(self, found: Measured, listed: int) -> None:
         """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
         self._signs = ways_of(np.concatenate([self._signs, found.signs]))
-        require_one_way(self._signs, found.name, found.first)
         ids = found.ids
         self._values[ids], self._status[ids] = found.values, found.status
         self._before[ids], self._old[ids] = found.before, found.old
         self.inverted = dict(sorted((self.inverted | found.inverted).items())[:listed])
         self._release()
+
+    @property
+    def is_both_ways(self) -> bool:
+        """Return whether cells are numbered in both directions, as their volumes have it."""
+        return len(self._signs) > 1
 
     def quality(self) -> Quality:
         """Return the quality of the deformed cells, without size and skew."""

@@ -17,6 +17,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from slideviz.deformation.both_ways import facing, require_right
 from slideviz.deformation.given_mesh import Given, text_blocks
 from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
@@ -79,7 +80,7 @@ class Output:
                 output, given.path, about, resume=resume, replaces=replaces, ranks=ranks
             )
         self._partial = stack.enter_context(made)
-        self._is_ready = False
+        self._is_ready = self._is_right = False
         self._rating: Rating | None = None
 
     def _opened(self) -> Partial:
@@ -151,6 +152,10 @@ class Output:
             for (_, end), found in zip(parts(count), do(parts(count)), strict=True):
                 self._rating.add(found, listed)
                 tick(end / count)
+        if self._rating.is_both_ways and not self._is_right:
+            with self._ranks.sharing(facing, self._mesh_file, self._zone) as do:
+                require_right(do(parts(count)), self.files.before.name)
+            self._is_right = True
         return self._rating
 
     def finish(self, ffd: bytes | None) -> None:

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, require_one_way, ways_of
+from slideviz.deformation.both_ways import facing, require_right
+from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, ways_of
 from slideviz.errors import MeshError
 from slideviz.mesh.io.su2b.elements import Block, element_blocks
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
+from slideviz.mesh.ranks import ALONE
 from slideviz.mesh.skin import index_of
 from slideviz.mesh.threads import Tick
 from slideviz.terms import Metric
@@ -62,7 +64,7 @@ def rated_blocks(
     Raises
     ------
     MeshError
-        A file has a mistake, or cells are numbered in both directions.
+        A file has a mistake, or cells are numbered in both directions and some are folded.
     """
     with ExitStack() as stack:
         source, place = _opened(stack, mesh)
@@ -79,11 +81,19 @@ def rated_blocks(
             now = Mesh(files.points(source, nodes), cells, name=source.name)
             base = now.with_points(before.points(before.before, nodes)) if before else None
             found = quality(now, base, metric)
-            signs = ways_of(np.concatenate([signs, found.signs]))
-            also = "" if before else "rate a deformed mesh with --reference UNDEFORMED, "
-            require_one_way(signs, source.name, block.first, also)
+            known, signs = len(signs), ways_of(np.concatenate([signs, found.signs]))
+            if known < 2 == len(signs):
+                _require_right(reference or mesh, source.name, place.cells.count, before is None)
             yield Rated(block.ids, nodes, now, base, found)
             tick((block.first + len(block.types)) / place.cells.count)
+
+
+def _require_right(mesh: Zone, name: str, count: int, alone: bool) -> None:
+    """Raise where cells that are numbered in both directions may be folded."""
+    also = "rate a deformed mesh with --reference UNDEFORMED, " if alone else ""
+    parts = [(first, min(first + CELLS, count)) for first in range(0, count, CELLS)]
+    with ALONE.sharing(facing, *mesh) as do:
+        require_right(do(parts), name, also)
 
 
 def has_cells_of(mesh: Zone, other: Zone) -> bool:

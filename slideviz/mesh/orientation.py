@@ -19,6 +19,8 @@ from slideviz.mesh.model import Mesh, frozen_array
 from slideviz.mesh.threads import in_parts
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from slideviz.mesh.model import Cells, FloatArray, IntArray
@@ -109,19 +111,12 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
 def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
     """Return pairs of cells with a common facet (p,), (p,), and whether they agree (p,)."""
     owners, facets, turns = [], [], []
-    for vtk, (ids, nodes) in cells.by_type.items():
-        for local in ELEMENTS[vtk].facets:
-            facet = nodes[:, local]
-            least = facet.argmin(axis=1)
-            rows, size = np.arange(len(facet)), len(local)
-            after = facet[rows, (least + 1) % size]
-            before = facet[rows, (least - 1) % size]
-            owners.append(ids)
-            # Two nodes: after and before are one, and which comes first is the direction.
-            turns.append(after < before if size > 2 else least == 0)
-            padded = np.full((len(facet), 4), -1, np.int64)
-            padded[:, :size] = np.sort(facet, axis=1)
-            facets.append(padded)
+    for ids, nodes, turn in facets_of(cells):
+        padded = np.full((len(nodes), 4), -1, np.int64)
+        padded[:, : nodes.shape[1]] = nodes
+        owners.append(ids)
+        facets.append(padded)
+        turns.append(turn)
     owner, facet, turn = np.concatenate(owners), np.concatenate(facets), np.concatenate(turns)
     order = np.lexsort(facet.T)
     owner, facet, turn = owner[order], facet[order], turn[order]
@@ -129,3 +124,17 @@ def _neighbours(cells: Cells) -> tuple[IntArray, IntArray, NDArray[np.bool_]]:
     # A facet of three cells or more tells nothing: only pairs that stand alone are used.
     start = np.flatnonzero(same[1:-1] & ~same[:-2] & ~same[2:])
     return owner[start], owner[start + 1], turn[start] != turn[start + 1]
+
+
+def facets_of(cells: Cells) -> Iterator[tuple[IntArray, IntArray, NDArray[np.bool_]]]:
+    """Yield facets of cells: cell (k,), nodes (k, n), ascending, and direction (k,) of each."""
+    for vtk, (ids, nodes) in cells.by_type.items():
+        for local in ELEMENTS[vtk].facets:
+            facet = nodes[:, local]
+            least = facet.argmin(axis=1)
+            rows, size = np.arange(len(facet)), len(local)
+            after = facet[rows, (least + 1) % size]
+            before = facet[rows, (least - 1) % size]
+            # Two nodes: after and before are one, and which comes first is the direction.
+            turn = after < before if size > 2 else least == 0
+            yield ids, np.sort(facet, axis=1), turn

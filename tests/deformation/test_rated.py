@@ -136,13 +136,34 @@ def test_mistakes_of_the_file_are_told(small):
         assert run([*words, "mesh.su2b", "--stream"]) == 1
 
 
-def test_cells_numbered_both_ways_are_refused(small, capsys):
+def turned_half(points=None):
+    """Return a square whose cells are numbered in both directions."""
     mesh = grid((8, 8))
     turned = mesh.cells.connectivity.reshape(-1, 4).copy()
     turned[32:] = turned[32:, ::-1]
     cells = sv.Cells.from_types(mesh.cells.types, turned.ravel())
-    sv.write("mesh.su2b", replace(mesh, cells=cells))
-    assert run(["quality", "mesh.su2b"]) == 0
+    return replace(mesh, cells=cells, points=mesh.points if points is None else points)
+
+
+def test_cells_numbered_both_ways_are_those_in_memory(small, capsys):
+    mesh = turned_half()
+    sv.write("mesh.su2b", mesh)
+    points = mesh.points.copy()
+    points[40] += 0.9
+    sv.write("moved.su2b", turned_half(points))
+    for words in (["mesh.su2b"], ["moved.su2b", "--reference", "mesh.su2b"]):
+        told = []
+        for more in ([], ["--stream"]):
+            assert run(["quality", *words, "--json", "-", *more]) in (0, 3)
+            told.append(capsys.readouterr().out)
+        assert told[0] == told[1]
+    assert sv.quality(sv.read("moved.su2b"), mesh).inverted
+
+
+def test_cells_numbered_both_ways_or_folded_are_refused(small, capsys):
+    points = grid((8, 8)).points.copy()
+    points[40] += 0.9
+    sv.write("mesh.su2b", turned_half(points))
     assert run(["quality", "mesh.su2b", "--stream"]) == 1
     said = capsys.readouterr().err
     assert "numbered the other way round" in said

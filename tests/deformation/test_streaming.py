@@ -324,24 +324,45 @@ def test_what_cannot_be_streamed_is_told(tmp_path, monkeypatch, capsys):
         assert words in capsys.readouterr().err
 
 
-def test_cells_numbered_both_ways_are_told(tmp_path):
-    mesh = grid((4, 4))
-    turned = mesh.cells.connectivity.reshape(-1, 4).copy()
-    turned[:8] = turned[:8, ::-1]
-    cells = sv.Cells.from_types(mesh.cells.types, turned.ravel())
-    sv.write(tmp_path / "mesh.su2b", replace(mesh, cells=cells))
-    case = sv.Case(
+def both_ways(tmp_path, kind="plain", **changes):
+    """Write a mesh whose first cells are numbered the other way round, and return its case."""
+    mesh = grid((4, 4, 3), kind=kind)
+    cells = mesh.cells.connectivity.reshape(len(mesh.cells), -1).copy()
+    size = cells.shape[1] // 2
+    cells[:13] = cells[:13][:, [*range(size, 2 * size), *range(size)]]
+    turned = sv.Cells.from_types(mesh.cells.types, cells.ravel())
+    sv.write(tmp_path / "mesh.su2b", replace(mesh, cells=turned, **changes))
+    return sv.Case(
         mesh_file=tmp_path / "mesh.su2b",
         roles={"x_p": "moving"},
-        motions=(sv.Translate("x_p", (0.1, 0.0)),),
+        motions=(sv.Translate("x_p", (0.1, 0.0, 0.0)),),
     )
-    whole = output.CHUNK
-    output.CHUNK = 8
-    try:
-        with pytest.raises(MeshError, match=r"numbered the other way round .* without --stream"):
-            stream(case, tmp_path / "out.su2b")
-    finally:
-        output.CHUNK = whole
+
+
+@pytest.mark.parametrize("kind", ["plain", "prism"])
+def test_cells_numbered_both_ways_give_the_bits_of_a_run_in_memory(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(output, "CHUNK", 5)
+    case = both_ways(tmp_path, kind)
+    mesh = sv.read(case.mesh_file)
+    assert set(sv.quality(mesh).signs) == {1, -1}
+    *_, last = sv.deform(case, mesh)
+    sv.write(tmp_path / "memory.su2b", last.mesh)
+    done = stream(case, tmp_path / "out.su2b")
+    assert (tmp_path / "out.su2b").read_bytes() == (tmp_path / "memory.su2b").read_bytes()
+    assert np.array_equal(done.quality.values, sv.quality(last.mesh, mesh).values)
+    assert done.quality.inverted == 0
+
+
+@pytest.mark.parametrize("change", ["folded", "unmarked"])
+def test_cells_numbered_both_ways_are_told_where_some_may_be_folded(tmp_path, monkeypatch, change):
+    monkeypatch.setattr(output, "CHUNK", 8)
+    mesh = grid((4, 4, 3))
+    points = mesh.points.copy()
+    points[31] += 2.0
+    changes = {"points": points} if change == "folded" else {"markers": mesh.markers[:-1]}
+    case = both_ways(tmp_path, **changes)
+    with pytest.raises(MeshError, match=r"numbered the other way round .* without --stream"):
+        stream(case, tmp_path / "out.su2b")
     assert not (tmp_path / "out.su2b").exists()
 
 
