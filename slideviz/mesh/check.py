@@ -37,10 +37,7 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
     if len(flat) and (flat.min() < 0 or flat.max() >= n_points):
         at = int(np.argmax((flat < 0) | (flat >= n_points)))
         element = int(np.searchsorted(cells.offsets, at, "right")) - 1
-        return element, (
-            f"node {flat[at]} does not exist: the {n_points} points are numbered "
-            f"from 0 to {n_points - 1}; correct the element or the points"
-        )
+        return element, no_node(str(flat[at]), n_points)
     repeated = _first_repeated(cells)
     if repeated is None:
         return None
@@ -49,6 +46,14 @@ def first_fault(cells: Cells, n_points: int) -> tuple[int, str] | None:
     return element, (
         f"node {node} stands twice in one {name}; replace the collapsed element by one with "
         "fewer nodes"
+    )
+
+
+def no_node(node: str, n_points: int) -> str:
+    """Return the sentence on a node of an element that does not exist."""
+    return (
+        f"node {node} does not exist: the {n_points} points are numbered "
+        f"from 0 to {n_points - 1}; correct the element or the points"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
-from slideviz.mesh.check import first_fault
+from slideviz.mesh.check import first_fault, no_node
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.in_order import in_order
 from slideviz.mesh.io.su2.lines import Lines, Piece, Rows, number_of, show
@@ -20,6 +20,8 @@ _SUPPORTED = ", ".join(str(vtk) for vtk, row in ELEMENTS.items() if row.dim > 0)
 # VTK's quadratic and higher-order elements, and SU2's own identifiers: 100 more per degree.
 _HIGH_ORDER = (*range(21, 38), *range(60, 82))
 _LONE_SIGN = re.compile(rb"[+-](?![0-9])")
+_DIGITS = 18
+"""Whole numbers of more digits may be too large to be read."""
 _EXTRA_POINT_WORDS = 2
 """After the coordinates: the index, and in partitioned files the global index."""
 
@@ -106,9 +108,9 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
         It is not what it should be.
     """
     numbers = _numbers(lines, index, row, np.int64)
-    vtk, n_numbers = int(numbers[0]), len(numbers) - 1
+    words, vtk, n_numbers = row.split(), int(numbers[0]), len(numbers) - 1
     if vtk not in ELEMENTS or ELEMENTS[vtk].dim != dim:
-        raise _wrong_type(lines, index, vtk, dim)
+        raise _wrong_type(lines, index, vtk, dim, show(words[0]))
     kind = ELEMENTS[vtk]
     if n_numbers not in (kind.n_nodes, kind.n_nodes + 1):
         raise lines.error(
@@ -119,11 +121,14 @@ def _element(lines: Lines, index: int, row: bytes, dim: int, n_points: int) -> t
     nodes = numbers[1 : 1 + kind.n_nodes]
     fault = first_fault(Cells.from_types([vtk], nodes), n_points)
     if fault:
-        raise lines.error(index, fault[1])
+        # Those with more digits are not what was read.
+        large = (word for word in words[1 : 1 + kind.n_nodes] if len(word.lstrip(b"+-0")) > _DIGITS)
+        word = next(large, None)
+        raise lines.error(index, fault[1] if word is None else no_node(show(word), n_points))
     return vtk, nodes
 
 
-def _wrong_type(lines: Lines, index: int, vtk: int, dim: int) -> MeshError:
+def _wrong_type(lines: Lines, index: int, vtk: int, dim: int, word: str) -> MeshError:
     """Return the error for an element of unknown type or wrong dimension."""
     if vtk in ELEMENTS:
         allowed = ", ".join(f"{t} ({e.name})" for t, e in ELEMENTS.items() if e.dim == dim)
@@ -132,7 +137,7 @@ def _wrong_type(lines: Lines, index: int, vtk: int, dim: int) -> MeshError:
             f"element type {vtk} ({ELEMENTS[vtk].name}) has dimension {ELEMENTS[vtk].dim}, but "
             f"dimension {dim} is needed here: {allowed}; correct the element or NDIME",
         )
-    message = f"element type {vtk} is not supported (supported: {_SUPPORTED})"
+    message = f"element type {word} is not supported (supported: {_SUPPORTED})"
     if vtk in _HIGH_ORDER or vtk > 100:
         message += "; it is a high-order element and slideviz needs linear elements, so export the"
         message += " mesh with linear elements"
