@@ -120,9 +120,11 @@ def marker_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
 
 def motion_problems(case: Case, mesh: Mesh) -> tuple[str, ...]:
     """Return which moving markers lack a motion, and which motions the mesh cannot have."""
+    boxed = any(isinstance(motion, Ffd) for motion in case.motions)
+    of_all = ", or let (*, ffd, ...) move what is in the box of all moving markers" if boxed else ""
     found = [
         f"moving marker {marker!r} has no motion; add MOTION= ({marker}, translate, ...) or "
-        "DEFORMATION_FILENAME"
+        f"DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays{of_all}"
         for marker in case.markers_with("moving")
         if not any(moves(motion, marker) for motion in case.motions)
     ]

@@ -76,7 +76,8 @@ SHARED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
             "action": "append",
             "default": [],
             "metavar": "KEY=VALUE",
-            "help": "change a key of the case; may be repeated",
+            "help": "change a key of the case; may be repeated; paths are relative to the current "
+            "folder",
         },
     ),
 }
@@ -91,7 +92,12 @@ def add_shared(call: argparse.ArgumentParser, name: str, **other: Any) -> None:
 
 def add_changes(call: argparse.ArgumentParser) -> None:
     """Add the options ``--set`` and ``--steps``, which change the case for one run."""
-    add_shared(call, "set", help="change a key of the case for this run; may be repeated")
+    add_shared(
+        call,
+        "set",
+        help="change a key of the case for this run; may be repeated; paths "
+        "are relative to the current folder",
+    )
     call.add_argument(
         "--steps", dest="step_count", metavar="N", help="number of steps, or auto (--set STEPS=N)"
     )

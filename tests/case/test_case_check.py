@@ -52,7 +52,7 @@ def test_good_cases(square, case):
             good(roles={"LOWER": "moving"}),
             (
                 "moving marker 'LOWER' has no motion; add MOTION= (LOWER, translate, ...) or "
-                "DEFORMATION_FILENAME"
+                "DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays"
             ),
         ),
         (

@@ -253,11 +253,11 @@ class TestDisplacements:
             "MARKER_MOVING: square.su2 has no marker 'LEFTT'; did you mean LEFT?",
             (
                 "moving marker 'RIGHT' has no motion; add MOTION= (RIGHT, translate, ...) or "
-                "DEFORMATION_FILENAME"
+                "DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays"
             ),
             (
                 "moving marker 'LEFTT' has no motion; add MOTION= (LEFTT, translate, ...) or "
-                "DEFORMATION_FILENAME"
+                "DEFORMATION_FILENAME, or name it in MARKER_FIXED instead if it stays"
             ),
             "motion 1: the shift has 3 components, and the mesh has 2 dimensions; give 2",
         ]

@@ -127,6 +127,20 @@ def test_box_without_a_node_inside_is_told():
         next(sv.deform(case(sv.Ffd("y_low", "FAR", (0, 0, 0), (0, 1, 0))), mesh))
 
 
+def test_moving_marker_without_a_motion_is_told_with_remedies_that_help():
+    ffd = ("BOX", (2, 0, 0), (0.0, 0.1, 0.0))
+    mesh = boxed(square())
+    roles = {"y_low": "moving", "y_high": "moving"}
+    found = check_case(case(sv.Ffd("y_low", *ffd)).change(roles=roles), mesh)
+    assert "moving marker 'y_high' has no motion" in found[0]
+    assert "or name it in MARKER_FIXED instead if it stays, or let (*, ffd, ...) move" in found[0]
+    every = displacements(case(sv.Ffd("", *ffd)).change(roles=roles), mesh)
+    alone = displacements(case(sv.Ffd("y_low", *ffd)), mesh)
+    assert np.array_equal(every.vectors[np.isin(every.nodes, alone.nodes)], alone.vectors)
+    assert not every.vectors[~np.isin(every.nodes, alone.nodes)].any()
+    assert alone.vectors.any()
+
+
 def test_mesh_without_boxes_and_wrong_definitions_are_told():
     motion = sv.Ffd("y_low", "BOX", (0, 0, 0), (0.0, 1.0, 0.0))
     assert "none is in it, or in FFD_DEFINITION" in check_case(case(motion), square())[0]
