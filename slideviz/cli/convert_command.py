@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from slideviz.cli.options import add_shared
+from slideviz.cli.terminal import say
 
 
 def add_convert(calls: argparse._SubParsersAction) -> None:
@@ -14,6 +15,11 @@ def add_convert(calls: argparse._SubParsersAction) -> None:
     call.add_argument("mesh", type=Path, help="the mesh to read")
     call.add_argument("output", type=Path, help="the mesh to write; its ending names the format")
     add_shared(call, "zone", help="one zone, from 1 (default: all)")
+    add_shared(
+        call,
+        "stream",
+        help="for meshes larger than memory: from .su2 to .su2b or back, piece by piece",
+    )
     call.set_defaults(command=convert)
 
 
@@ -30,6 +36,8 @@ def convert(arguments: argparse.Namespace) -> int:
     from slideviz.session.formats import holds_quality, left_out
 
     require_places(arguments, Output(arguments.output, "OUT", is_mesh=True))
+    if _is_to_be_streamed(arguments):
+        return _convert_streamed(arguments)
     mesh = read(arguments.mesh, zone=arguments.zone)
     binary = arguments.output.suffix.lower() == ".su2b"
     # Without --zone no zone is lost.
@@ -45,5 +53,52 @@ def convert(arguments: argparse.Namespace) -> int:
     lost = "" if binary else left_out(arguments.output, replace(mesh, zones=1))
     if lost:
         print(f"slideviz: note: {lost}", file=sys.stderr)
+    print(arguments.output)
+    return DONE
+
+
+def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
+    """Tell whether a mesh is converted piece by piece: as asked for, or for want of memory.
+
+    Raises
+    ------
+    SlidevizError
+        It is asked for and cannot be, or the mesh cannot be read.
+    """
+    from slideviz.deformation.converting import streamed_kind
+    from slideviz.deformation.streaming import missing_memory_of
+    from slideviz.errors import CaseError
+
+    kind = streamed_kind(arguments.mesh, arguments.output)
+    if arguments.stream:
+        if kind is None:
+            raise CaseError(
+                f"{arguments.mesh} to {arguments.output}: --stream converts from .su2 to .su2b and "
+                "back; leave it out, or choose these formats"
+            )
+        return True
+    missing = missing_memory_of(arguments.mesh, kind) if kind else ""
+    if missing:
+        say("note", f"{missing}; it is streamed")
+    return bool(missing)
+
+
+def _convert_streamed(arguments: argparse.Namespace) -> int:
+    """Convert a mesh piece by piece."""
+    from functools import partial
+
+    from slideviz.cli.exit_codes import DONE
+    from slideviz.cli.progress import Bar
+    from slideviz.deformation.converting import convert_streamed
+    from slideviz.deformation.steps import Progress
+
+    with Bar() as bar:
+        convert_streamed(
+            arguments.mesh,
+            arguments.output,
+            arguments.zone,
+            warn=partial(say, "warning"),
+            tick=lambda part: bar.phase(Progress(1, 1, "convert", part)),
+        )
     print(arguments.output)
     return DONE

@@ -23,6 +23,7 @@ _PHASES = {
     "read": "reading",
     "write": "writing the mesh",
     "quality": "measuring cells",
+    "convert": "converting",
 }
 _EVERY = 0.1
 _WIPE = "\r\033[K"

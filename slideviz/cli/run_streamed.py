@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slideviz.cli.run_outcome import CELLS, save_report, tell, tell_warnings, write_qualities
+from slideviz.cli.terminal import say
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
@@ -55,7 +55,7 @@ def is_to_be_streamed(
     able = _is_su2(output, kind) and not _needing_memory(arguments)
     missing = missing_memory(case) if able else ""
     if missing and not arguments.quiet:
-        _say("note", f"{missing}; it is streamed")
+        say("note", f"{missing}; it is streamed")
     return bool(missing)
 
 
@@ -65,11 +65,6 @@ def _needing_memory(arguments: argparse.Namespace) -> list[str]:
 
 def _is_su2(output: Path, kind: FileFormat | None) -> bool:
     return (kind or output.suffix.lower().removeprefix(".")) in ("su2", "su2b")
-
-
-def _say(what: str, text: str) -> None:
-    if text:
-        print(f"slideviz: {what}: {text}", file=sys.stderr, flush=True)
 
 
 def run_streamed(
@@ -90,7 +85,7 @@ def run_streamed(
     about = about_run(case)
     made = [path for path in (output, qualities) if path]
     if arguments.resume and (known := finished(about, made)):
-        _say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
+        say("note", f"{output}: is finished, of this case, mesh and version; nothing is done")
         save_report(arguments, known[0])
         return tell_warnings(*known, quiet=arguments.quiet)
     with Bar(not arguments.quiet) as bar:
@@ -99,8 +94,8 @@ def run_streamed(
             output,
             file_format=kind,
             tell=bar.phase,
-            note=partial(_say, "note"),
-            warn=partial(_say, "warning"),
+            note=partial(say, "note"),
+            warn=partial(say, "warning"),
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,

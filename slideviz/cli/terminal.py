@@ -106,3 +106,9 @@ def control(text: str) -> None:
     """Write text with control sequences, such as a progress bar, to stderr."""
     getattr(sys.stderr, "control", sys.stderr.write)(text)
     sys.stderr.flush()
+
+
+def say(what: str, text: str) -> None:
+    """Print a note or warning where errors go; nothing where the text is empty."""
+    if text:
+        print(f"slideviz: {what}: {text}", file=sys.stderr, flush=True)

@@ -73,10 +73,11 @@ class Given:
         """
         if self.text is None:
             return read_skin(self.path, self.zone, tick, ranks)
-        return skin_of_text(self.text, self.path, _from(tick, COPIED), ranks)
+        return skin_of_text(self.text, self.path, part_of(tick, COPIED), ranks)
 
 
-def _from(tick: Tick, begin: float, end: float = 1.0) -> Tick:
+def part_of(tick: Tick, begin: float, end: float = 1.0) -> Tick:
+    """Return what tells a part of the progress."""
     return lambda done: tick(begin + (end - begin) * done)
 
 
@@ -105,7 +106,7 @@ def _streamable(path: Path, zone: int | None, tick: Tick) -> Text:
     MeshError
         It has a mistake, or a halo, whose copies are no boundary.
     """
-    text = find_text(path, zone, _from(tick, 0.0, SCANNED))
+    text = find_text(path, zone, part_of(tick, 0.0, SCANNED))
     if text.zone.sends:
         raise text.lines.error(
             text.zone.sends[0].begin,
@@ -139,7 +140,7 @@ def given_mesh(
             ours.touch(mode=0o600)
             require_room(ours, path, plan.size)
             os.truncate(ours, plan.size)
-            head = fill(plan, ours, _from(tick, SCANNED, COPIED))
+            head = fill(plan, ours, part_of(tick, SCANNED, COPIED))
             with ours.open("r+b") as file:
                 file.write(head)
         except OSError as problem:
@@ -200,7 +201,7 @@ def given_for(
         is_left = bool(copy.done)
         if not is_left:
             require_room(output, output, plan.size + _later(plan, is_text))
-            head = fill(plan, copy.path, _from(tick, SCANNED, COPIED), ranks)
+            head = fill(plan, copy.path, part_of(tick, SCANNED, COPIED), ranks)
             finish_head(copy.file, head)
             copy.note([1])
         with told_of(text, copy.path):
@@ -221,11 +222,14 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
         place = find_zone(source, zone)
     name = printable(path.name)
     require_text_names(name, (marker.name for marker in place.markers))
-    if source.zones == 1:
-        return ""
+    return lost_zones(output, name, place.number) if source.zones > 1 else ""
+
+
+def lost_zones(output: Path, name: str, zone: int) -> str:
+    """Return in words that a text will have one zone of a binary mesh."""
     return (
-        f"{output} will have zone {place.number} alone, not the others of {name}; write a .su2b "
-        "file to keep them"
+        f"{output} will have zone {zone} alone, not the others of {name}; write a .su2b file to "
+        "keep them"
     )
 
 

@@ -33,6 +33,8 @@ from slideviz.mesh.io.su2b.write import LARGEST_4, SORTED, marker_table, padded,
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.mesh.ranks import ALONE, Alone
 
+HEAD = 8
+"""Bytes before the first zone."""
 PIECES = 16
 """Pieces of a text, each about a megabyte, that are one part of the work."""
 _Task = tuple[str, int, int]
@@ -52,12 +54,18 @@ class Plan:
         Whether the markers have their names, and not numbers, which always fit.
     before : (p + 1, t) int64
         How many elements of each type stand before each piece, and in all.
+    begin : int
+        The first byte of its zone.
+    number : int
+        The number of its zone.
     """
 
     text: Text
     width: int
     named: bool
     before: IntArray
+    begin: int = HEAD
+    number: int = 1
 
     @property
     def conn(self) -> np.dtype:
@@ -72,7 +80,7 @@ class Plan:
     @property
     def offsets(self) -> int:
         """Return the first byte of the offsets of the elements."""
-        return 16 + self.width
+        return self.begin + 8 + self.width
 
     @property
     def entries(self) -> int:
@@ -96,7 +104,7 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """Return the size of the file."""
+        """Return the end of the zone, which is the size of the file if it is the last."""
         sizes = (
             NAME_BYTES + self.width * (2 + 2 * piece_rows + nodes)
             for piece_rows, nodes in (
@@ -116,7 +124,7 @@ _WIDTHS = SIZES[list(SORTED)] + 2
 """Numbers of an element in the list, by type in SU2's order."""
 
 
-def planned(text: Text, *, is_result: bool) -> Plan:
+def planned(text: Text, *, is_result: bool, begin: int = HEAD, number: int = 1) -> Plan:
     """Return where a text mesh stands in its binary form.
 
     Parameters
@@ -124,13 +132,15 @@ def planned(text: Text, *, is_result: bool) -> Plan:
     is_result : bool
         Whether the binary is to be a mesh of its own, as `slideviz.convert` makes it; if not, it
         is as short as can be.
+    begin, number : int
+        The first byte and the number of its zone.
     """
     pieces = text.zone.elements
     before = np.zeros((len(pieces) + 1, len(SORTED)), np.int64)
     np.cumsum(_counted(text), axis=0, out=before[1:])
     length = int(before[-1] @ _WIDTHS)
     short = not is_result and max(length, text.n_points) <= LARGEST_4
-    return Plan(text, 4 if short else 8, is_result, before)
+    return Plan(text, 4 if short else 8, is_result, before, begin, number)
 
 
 def _counted(text: Text) -> IntArray:
@@ -156,6 +166,8 @@ def _counted(text: Text) -> IntArray:
 
 def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> bytes:
     """Write the binary form of a text into a file of its size; return its head, which is left out.
+
+    The head is that of a file of this zone alone.
 
     Raises
     ------
@@ -183,7 +195,8 @@ def fill(plan: Plan, path: Path, progress: Progress, ranks: Alone = ALONE) -> by
     lines.raw.require_same()
     with path.open("r+b") as file:
         for at, content in (
-            (8, np.array([1, zone.dim], "<i4").tobytes() + np.array(text.n_cells, conn).tobytes()),
+            (plan.begin, np.array([plan.number, zone.dim], "<i4").tobytes()),
+            (plan.begin + 8, np.array(text.n_cells, conn).tobytes()),
             (plan.entries - plan.width, np.array(plan.length, conn).tobytes()),
             (plan.points - plan.width, np.array(text.n_points, conn).tobytes()),
             (plan.markers, np.array(len(markers), "<i4").tobytes() + b"".join(markers)),

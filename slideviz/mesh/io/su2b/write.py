@@ -96,11 +96,16 @@ def require_binary(mesh: Mesh) -> None:
         It has a halo, or a boundary has a name that cannot stand in such a file.
     """
     if mesh.halo is not None or (isinstance(mesh.origin, Document) and mesh.origin.sends):
-        raise MeshError(
-            f"{mesh.name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot "
-            "hold; write a .su2 file, or make the mesh without its halo"
-        )
+        raise halo_error(mesh.name)
     require_binary_names(mesh.name, mesh.marker_names)
+
+
+def halo_error(name: str) -> MeshError:
+    """Return the error about a mesh with a halo."""
+    return MeshError(
+        f"{name}: has a halo ({SEND_RECEIVE} markers), which an SU2 binary mesh cannot hold; write "
+        "a .su2 file, or make the mesh without its halo"
+    )
 
 
 def require_binary_names(mesh: str, names: Iterable[str]) -> None:

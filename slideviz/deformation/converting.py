@@ -1,0 +1,138 @@
+"""SU2 meshes larger than memory, converted from text to binary and back, piece by piece."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from slideviz.deformation.given_mesh import Given, lost_zones, part_of, require_room
+from slideviz.deformation.text_of_binary import text_of_binary
+from slideviz.mesh.check import printable
+from slideviz.mesh.io.atomic import atomic_write
+from slideviz.mesh.io.binary_copy import Plan, fill, planned
+from slideviz.mesh.io.files import format_of
+from slideviz.mesh.io.su2.text import Text, find_text
+from slideviz.mesh.io.su2.write import require_text_names
+from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone, find_zones
+from slideviz.mesh.io.su2b.write import (
+    file_head,
+    halo_error,
+    lost_of_text,
+    require_binary_names,
+    sentence_of_lost,
+)
+from slideviz.mesh.skin import read_skin
+from slideviz.mesh.threads import Tick
+from slideviz.terms import FileFormat
+
+Warn = Callable[[str], object]
+"""Is called with a sentence on what the new file will not have of the mesh; "" for nothing."""
+PLACE = 8
+"""Bytes of disk for each cell, while a text is written of cells in another order."""
+
+
+def streamed_kind(source: Path, target: Path) -> FileFormat | None:
+    """Return the format of a mesh that can be converted piece by piece, None if it cannot be.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read.
+    """
+    kind = format_of(source, None)
+    other = target.suffix.lower().removeprefix(".")
+    return kind if kind != other and {kind, other} == {"su2", "su2b"} else None
+
+
+def convert_streamed(
+    source: Path, target: Path, zone: int | None, *, warn: Warn, tick: Tick = lambda _: None
+) -> None:
+    """Convert an SU2 mesh from text to binary or back, with the bytes of `slideviz.convert`.
+
+    Parameters
+    ----------
+    source, target : Path
+        Of such formats (`streamed_kind`); what is at ``target`` is replaced.
+    zone : int or None
+        The zone, from 1; all of them when None.
+
+    Raises
+    ------
+    MeshError
+        The file has a mistake, the format cannot hold the mesh, or the disk has no room.
+    """
+    if format_of(source, None) == "su2":
+        _to_binary(source, target, zone, warn, tick)
+    else:
+        _to_text(source, target, zone, warn, tick)
+
+
+def _to_binary(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
+    texts = [find_text(source, zone, part_of(tick, 0.0, 0.1))]
+    zones = texts[0].zone.bounds.zones
+    if zone is None:
+        texts += [find_text(source, number) for number in range(2, zones + 1)]
+    plans: list[Plan] = []
+    for number, text in enumerate(texts, 1):
+        name = printable(source.name) + (f", zone {number}" if number > 1 else "")
+        _require_binary(text, name)
+        keys = (part.key for part in text.zone.kept)
+        lost = lost_of_text(keys, 1 if zone is None else zones)
+        warn(sentence_of_lost(target, name, lost))
+        begin = plans[-1].size if plans else 8
+        plans.append(planned(text, is_result=True, begin=begin, number=number))
+    require_room(target, target, plans[-1].size)
+    with atomic_write(target) as file:
+        os.truncate(file.fileno(), plans[-1].size)
+        for k, plan in enumerate(plans):
+            share = part_of(tick, 0.1 + 0.9 * k / len(plans), 0.1 + 0.9 * (k + 1) / len(plans))
+            fill(plan, Path(file.name), share)
+        for block in file_head(len(plans)):
+            file.write(block)
+    tick(1.0)
+
+
+def _require_binary(text: Text, name: str) -> None:
+    """Raise where an SU2 binary file cannot hold a zone of a text.
+
+    Raises
+    ------
+    MeshError
+        As of `slideviz.mesh.io.su2b.write.require_binary`.
+    """
+    if text.zone.sends:
+        raise halo_error(name)
+    require_binary_names(name, (marker.name for marker in text.zone.markers))
+
+
+def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
+    with source.open("rb") as file:
+        binary = Source(source, file)
+        places = find_zones(binary) if zone is None else (find_zone(binary, zone),)
+        for place in places:
+            require_text_names(binary.name, (marker.name for marker in place.markers))
+        if len(places) < binary.zones:
+            warn(lost_zones(target, printable(source.name), places[0].number))
+        sizes = [Given(source, place.number).text_size(place) for place in places]
+        more = PLACE * max(place.cells.count for place in places)
+        require_room(target, target, sum(sizes) + more)
+        for place in places:  # every mistake is found as by its reader
+            read_skin(source, place.number, part_of(tick, 0.0, 0.3))
+        written = 0
+        with atomic_write(target) as out:
+            for block in _text_blocks(binary, places, Path(os.path.realpath(target)).parent):
+                out.write(block)
+                written += len(block)
+                tick(min(1.0, 0.3 + 0.7 * written / sum(sizes)))
+    tick(1.0)
+
+
+def _text_blocks(binary: Source, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
+    if len(places) == 1:
+        yield from text_of_binary(binary, places[0], binary, folder)
+        return
+    yield f"NZONE= {len(places)}\n".encode()
+    for number, place in enumerate(places, 1):
+        yield f"IZONE= {number}\n".encode()
+        yield from text_of_binary(binary, place, binary, folder)
