@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from slideviz.mesh.quality import Quality
 
 CELLS = "quality of each cell"
+QUALITY_BYTES = 20
+"""Of a line of the file of qualities: 16 or 17 digits."""
 _ROWS = 1 << 18
 
 

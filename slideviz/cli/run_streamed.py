@@ -8,7 +8,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slideviz.cli.run_outcome import CELLS, save_report, tell, tell_warnings, write_qualities
+from slideviz.cli.run_outcome import (
+    CELLS,
+    QUALITY_BYTES,
+    save_report,
+    tell,
+    tell_warnings,
+    write_qualities,
+)
 from slideviz.cli.terminal import say
 
 if TYPE_CHECKING:
@@ -99,6 +106,7 @@ def run_streamed(
             resume=arguments.resume,
             replaces=case.mesh_file if arguments.force else None,
             listed=LISTED,
+            later=QUALITY_BYTES if qualities else 0,
             ranks=arguments.ranks or ALONE,
         )
     seconds = dict(done.seconds)

@@ -6,7 +6,8 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from slideviz.deformation.given_mesh import Given, lost_zones, part_of, require_room
+from slideviz.deformation.given_mesh import lost_zones, part_of
+from slideviz.deformation.room import require_room, text_size
 from slideviz.deformation.text_of_binary import text_of_binary
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.atomic import atomic_write
@@ -114,7 +115,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
             require_text_names(binary.name, (marker.name for marker in place.markers))
         if len(places) < binary.zones:
             warn(lost_zones(target, printable(source.name), places[0].number))
-        sizes = [Given(source, place.number).text_size(place) for place in places]
+        sizes = [text_size(place) for place in places]
         more = PLACE * max(place.cells.count for place in places)
         require_room(target, target, sum(sizes) + more)
         for place in places:  # every mistake is found as by its reader

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,10 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
+from slideviz.deformation.room import (
+    bytes_left,
+    bytes_of_binary,
+    bytes_of_text,
+    require_room,
+    text_size,
+)
 from slideviz.errors import MeshError
 from slideviz.mesh.check import printable
 from slideviz.mesh.io.atomic import reason_of
-from slideviz.mesh.io.binary_copy import Plan, fill, planned
+from slideviz.mesh.io.binary_copy import fill, planned
 from slideviz.mesh.io.cleanup import draft
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.lines import Piece
@@ -32,8 +38,6 @@ from slideviz.terms import FileFormat
 
 SCANNED, COPIED = 0.15, 0.8
 """Where, of the time for reading a text, its lines are found, and its binary is made."""
-RATED = 18
-"""Bytes of disk for each cell while a run lasts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class Given:
         """Return about how many bytes the mesh, whose binary form stands there, has as a text."""
         if self.text is not None:
             return self.text.lines.raw.size
-        return 8 * (place.cells.length + (2 * place.dim + 1) * place.n_points)
+        return text_size(place)
 
     def skin(self, tick: Tick, ranks: Alone = ALONE) -> Mesh:
         """Return the boundary and the cells at it; the whole mesh is read and checked.
@@ -165,6 +169,7 @@ def given_for(
     warn: Callable[[str], object],
     tick: Tick,
     ranks: Alone,
+    later: int = 0,
 ) -> Iterator[Given]:
     """Return a mesh to be deformed; the binary copy of a text stands beside the output meanwhile.
 
@@ -178,6 +183,8 @@ def given_for(
         Whether to use the copy that a stopped run has left.
     warn : callable
         Called with a sentence on what the output will not have of the mesh; "" for nothing.
+    later : int
+        Bytes for each cell that are written beside the output afterwards.
 
     Raises
     ------
@@ -187,6 +194,8 @@ def given_for(
     if require_su2(path, file_format) == "su2b":
         if is_text:
             warn(_lost_in_text(output, path, zone))
+        size = bytes_of_binary(path, zone, is_text=is_text, later=later)
+        require_room(output, output, size - bytes_left(output))
         yield Given(path, zone)
         return
     text = _streamable(path, zone, tick)
@@ -194,13 +203,13 @@ def given_for(
         require_binary_names(printable(path.name), (m.name for m in text.zone.markers))
         lost = lost_of_text((part.key for part in text.zone.kept), text.zone.bounds.zones)
         warn(sentence_of_lost(output, printable(path.name), lost))
-    plan = planned(text, is_result=not is_text)
+    plan, left = planned(text, is_result=not is_text), bytes_left(output)
     state = path.stat()
     about = f"{version} {path.resolve()} {state.st_size} {state.st_mtime_ns} {zone} {plan.size}"
     with partial_file(output, plan.size, about, resume=resume, more=".binary") as copy:
         is_left = bool(copy.done)
+        require_room(output, output, bytes_of_text(plan, is_text, later) - left)
         if not is_left:
-            require_room(output, output, plan.size + _later(plan, is_text))
             head = fill(plan, copy.path, part_of(tick, SCANNED, COPIED), ranks)
             finish_head(copy.file, head)
             copy.note([1])
@@ -231,30 +240,6 @@ def lost_zones(output: Path, name: str, zone: int) -> str:
         f"{output} will have zone {zone} alone, not the others of {name}; write a .su2b file to "
         "keep them"
     )
-
-
-def _later(plan: Plan, is_text: bool) -> int:
-    """Return how many bytes a run needs on the disk, beside the copy of a text."""
-    points = plan.markers - plan.points
-    result = points + plan.text.lines.raw.size if is_text else plan.size
-    return result + RATED * plan.text.n_cells
-
-
-def require_room(place: Path, path: Path, size: int) -> None:
-    """Raise where the disk has no room for so many bytes.
-
-    Raises
-    ------
-    MeshError
-        It has not; it is said of ``path``.
-    """
-    folder = Path(os.path.realpath(place)).parent
-    free = shutil.disk_usage(folder).free
-    if size > free:
-        raise MeshError(
-            f"{path}: {size / 1e6:,.0f} MB of disk are needed in {folder} while this lasts, but "
-            f"{free / 1e6:,.0f} MB are free; free some space or choose another disk"
-        )
 
 
 def text_blocks(

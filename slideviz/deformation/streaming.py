@@ -83,6 +83,7 @@ def stream(
     resume: bool = False,
     replaces: Path | None = None,
     listed: int = 100,
+    later: int = 0,
     ranks: Alone = ALONE,
 ) -> Streamed:
     """Deform the mesh of a case from file to file; what is in memory is its boundary.
@@ -105,6 +106,9 @@ def stream(
         The input that may be written over.
     listed : int
         Inverted cells that are followed through the steps.
+    later : int
+        Bytes for each cell that the caller writes beside the output afterwards: the disk must
+        have room for them, too.
     ranks : Alone or Ranks
         The processes that share the work; this one is rank 0.
 
@@ -135,6 +139,7 @@ def stream(
                     warn=warn,
                     tick=tick,
                     ranks=ranks,
+                    later=later,
                 )
             )
         out = Output(

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import output, rest, streaming
+from slideviz.deformation import given_mesh, output, rest, streaming
 from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
@@ -364,6 +365,35 @@ def test_cells_numbered_both_ways_are_told_where_some_may_be_folded(tmp_path, mo
     with pytest.raises(MeshError, match=r"numbered the other way round .* without --stream"):
         stream(case, tmp_path / "out.su2b")
     assert not (tmp_path / "out.su2b").exists()
+
+
+@pytest.mark.parametrize(("ending", "bytes_of_cells"), [("su2b", 18 + 20), ("su2", 18)])
+def test_room_is_asked_for_before_the_work(tmp_path, monkeypatch, capsys, ending, bytes_of_cells):
+    monkeypatch.chdir(tmp_path)
+    case = made(tmp_path, "square", 25)
+    mesh = sv.read(case.mesh_file)
+    assert run(["run", "square.cfg", "-q", "--stream", "-o", f"out.{ending}"]) == 0
+    size = Path(f"out.{ending}").stat().st_size
+    needed = size + bytes_of_cells * len(mesh.cells)
+    needed += 24 * len(mesh.points) if ending == "su2" else 0
+    asked = []
+
+    def usage(_):
+        asked.append(room)
+        return shutil._ntuple_diskusage(1, 1, room)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    monkeypatch.setattr(given_mesh, "read_skin", lambda *_: pytest.fail("it has begun"))
+    Path(f"out.{ending}").unlink()
+    room = int(0.7 * needed)
+    assert run(["run", "square.cfg", "-q", "--stream", "-o", f"out.{ending}"]) == 1
+    said = capsys.readouterr().err
+    assert "0 MB of disk are needed in " in said
+    assert "0 MB are free" in said
+    assert asked
+    room = int(1.3 * needed)
+    with pytest.raises(pytest.fail.Exception, match="it has begun"):
+        run(["run", "square.cfg", "-q", "--stream", "-o", f"out.{ending}"])
 
 
 def test_a_node_beyond_the_sector_of_the_boundary_is_told(tmp_path):
