@@ -347,7 +347,9 @@ POINTS_SHOWN: dict[PointsShown, Term] = {
     "control": Term("control nodes"),
 }
 
-Shown = Literal["edges", "undeformed", "motion_ghost", "legend", "triad", "ffd", "perspective"]
+Shown = Literal[
+    "edges", "undeformed", "motion_ghost", "legend", "triad", "inverted", "ffd", "perspective"
+]
 
 
 @dataclass(frozen=True)
@@ -396,6 +398,14 @@ SHOWN: dict[Shown, ShownTerm] = {
         "Axes",
         "Draw the directions of the axes in a corner.",
         shortcut="T",
+        at_first=True,
+        in_bar=False,
+    ),
+    "inverted": ShownTerm(
+        "Inverted cells",
+        "Mark inverted cells with rings of the same size at any zoom, in front of everything.",
+        alone="Rings at inverted cells",
+        shortcut="I",
         at_first=True,
         in_bar=False,
     ),

@@ -81,6 +81,9 @@ _BAR, _LONG = 20.0, 11
 """Pixels that the colour bar is wide; letters of a title that needs all of the strip."""
 _LABEL, _GAP, _HEAD = 14.0, 4.0, 30.0
 """Pixels that a number beside the colour bar is high, those between both, and its title's."""
+_BOTTOM, _NAN, _INDENT = 0.16, 13.0, 4.0
+"""The lower end of the bar, a part of the view; pixels of the field of inverted cells there, and
+those before its word."""
 
 
 @lru_cache(maxsize=1)
@@ -93,8 +96,6 @@ def _font_file() -> str:
 
 def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
     """Give a vtkTextProperty the font, the color scheme's colour, and a size in pixels."""
-    import pyvista as pv
-
     text.SetFontFamily(_VTK_FONT_FILE)
     text.SetFontFile(_font_file())
     text.SetFontSize(round(size))
@@ -104,9 +105,13 @@ def set_letters(text: Any, scheme: ColorScheme, size: float) -> None:
     text.SetShadow(False)
 
 
-ROLE, NODES = "\u25a0", "\u25cf"
-"""The signs of lines about roles and about nodes."""
-_SIGNS = {ROLE: ("legend:", STRIP - 28, 14), NODES: ("legend:nodes:", STRIP - 25, 12)}
+ROLE, NODES, RING = "\u25a0", "\u25cf", "\u25cb"
+"""The signs of lines about roles, about nodes, and about what has a ring."""
+_SIGNS = {
+    ROLE: ("legend:", STRIP - 28, 14),
+    NODES: ("legend:nodes:", STRIP - 25, 12),
+    RING: ("legend:rings:", STRIP - 25, 12),
+}
 """The begin of the names of their actors, the left edge of words and their size, in pixels."""
 
 
@@ -117,23 +122,19 @@ def add_role_legend(stage: Stage, roles: Sequence[Role]) -> None:
 
 
 def add_point_legend(stage: Stage, top: float) -> float:
-    """Write what points mean below ``top`` pixels; return where the last line ends."""
-    for row, (word, colour) in enumerate(stage.point_words, start=1):
-        _line(stage, NODES, colour, word, down=top + 21 * row)
-    return top + 21 * len(stage.point_words)
+    """Write what points and rings mean below ``top`` pixels; return where the last line ends."""
+    words = [(NODES, *line) for line in stage.point_words]
+    words += [(RING, *line) for line in stage.ring_words]
+    for row, (sign, word, colour) in enumerate(words, start=1):
+        _line(stage, sign, colour, word, down=top + 21 * row)
+    return top + 21 * len(words)
 
 
 def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> None:
     """Write a sign in its colour and a word, so far below the top."""
-    import pyvista as pv
-    from vtkmodules.vtkRenderingCore import vtkCoordinate
-
     # A role and the nodes of a type may have the same word.
     prefix, right, size = _SIGNS[sign]
-    # Counted from a corner, the place is right in a view of any size.
-    corner = vtkCoordinate()
-    corner.SetCoordinateSystemToNormalizedViewport()
-    corner.SetValue(1.0, 1.0)
+    corner = _corner(1.0, 1.0)
     for what, shade, edge, letters in (
         (sign, colour, STRIP - 8, 1.4 * size),
         (word, stage.scheme.text, right, size),
@@ -147,6 +148,16 @@ def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> No
         text.prop.SetVerticalJustificationToCentered()
         name = f"{prefix}{word}:{what}"
         stage.plotter.add_actor(text, name=name, reset_camera=False, render=False, pickable=False)
+
+
+def _corner(x: float, y: float) -> Any:
+    """Return a place of the view, of 1 by 1: what is counted from it is right in any size."""
+    from vtkmodules.vtkRenderingCore import vtkCoordinate
+
+    corner = vtkCoordinate()
+    corner.SetCoordinateSystemToNormalizedViewport()
+    corner.SetValue(x, y)
+    return corner
 
 
 def clear_legend(plotter: Any) -> None:
@@ -180,8 +191,17 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
     bar.SetTextPad(round(_GAP * font_scale))
     bar.SetUseCustomLabels(True)
     bar.SetDrawNanAnnotation(inverted)
-    bar.SetDrawAnnotations(inverted)
-    bar.SetNanAnnotation("inverted" if inverted else "")
+    bar.SetNanAnnotation("")
+    if inverted:  # the bar's own word would be to its left, where the mesh is
+        word, right = pv.Text("inverted"), STRIP - 14 - _BAR - _GAP - _INDENT
+        word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))
+        word.GetPositionCoordinate().SetCoordinateSystemToViewport()
+        word.GetPositionCoordinate().SetValue(-right * font_scale, _NAN / 2.0 * font_scale)
+        set_letters(word.prop, scheme, 12 * font_scale)
+        word.prop.SetVerticalJustificationToCentered()
+        stage.plotter.add_actor(
+            word, name="legend:inverted:", reset_camera=False, render=False, pickable=False
+        )
 
 
 def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect:
@@ -190,7 +210,7 @@ def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect
     There its title ends, where lines about points above it do. Return the room of bar and letters.
     """
     width, height = (max(side, 1) for side in plotter.window_size)
-    bar, bottom = plotter.scalar_bars[title], 0.16
+    bar, bottom = plotter.scalar_bars[title], _BOTTOM
     bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
     # The title is in the middle of that: short ones keep away from the edge of the view.
     wide = STRIP - 20 if len(title) >= _LONG else 66

@@ -69,7 +69,12 @@ class LegendLayer(Layer):
         term = COLOUR_BY[what]
         add_colour_bar(stage, self._mapper, term, has_inverted(session))
         end = add_point_legend(stage, 4.0)
-        self._bar, self._end = (term.label, end + (34 if stage.point_words else 0)), end
+        self._bar, self._end = (term.label, end + (34 if self._has_lines else 0)), end
+
+    @property
+    def _has_lines(self) -> bool:
+        """Tell whether there are lines about points or rings, which are above the bar."""
+        return bool(self.stage.point_words or self.stage.ring_words)
 
     def _place(self) -> None:
         """Put colour bar and plate where they belong in a view of this size."""
@@ -81,8 +86,7 @@ class LegendLayer(Layer):
         rect = lines_room(plotter, self._end, scale)
         if self._bar is not None:
             room = place_bar(plotter, *self._bar, scale)
-            # Lines about points are above the bar.
-            rect = (*room[:3], rect[3]) if self.stage.point_words else room
+            rect = (*room[:3], rect[3]) if self._has_lines else room
         if self._plate is not None:
             self._plate.place(rect)
 
@@ -92,7 +96,8 @@ class LegendLayer(Layer):
         names = mesh.marker_names if mesh is not None and view.colour_by == "role" else ()
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         colours = (view.colour_by, view.colour_map, session.colour_range)
-        points, style = self.stage.point_words, (self.stage.scheme, self.stage.font_scale)
+        points = self.stage.point_words, self.stage.ring_words
+        style = self.stage.scheme, self.stage.font_scale
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
         return (id(mesh), shown, colours, said, points, style)
 

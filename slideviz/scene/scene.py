@@ -21,6 +21,7 @@ from slideviz.scene.boxes import BoxLayer
 from slideviz.scene.camera import Camera
 from slideviz.scene.coarse import CoarseLayer
 from slideviz.scene.ghosts import GhostLayer
+from slideviz.scene.inverted import InvertedLayer
 from slideviz.scene.legend import LegendLayer, TriadLayer
 from slideviz.scene.marked_cell import MarkLayer
 from slideviz.scene.mesh import BoundaryLayer, CellLayer
@@ -69,6 +70,7 @@ class Scene:
             BoxLayer(self.stage),
             PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
+            InvertedLayer(self.stage),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
             self._coarse,

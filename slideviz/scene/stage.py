@@ -51,6 +51,8 @@ class Stage:
         The colours of values, and of inverted cells; changed in place.
     point_words : tuple of (str, str)
         Words and colours of the nodes drawn as points, for the legend.
+    ring_words : tuple of (str, str)
+        The same of what is marked by rings.
     has_legend : bool
         Whether the legend is drawn, if it is wanted, and its strip kept free.
     has_plate : bool
@@ -63,6 +65,7 @@ class Stage:
         self.font_scale = font_scale
         self.table = lookup_table()
         self.point_words: tuple[tuple[str, str], ...] = ()
+        self.ring_words: tuple[tuple[str, str], ...] = ()
         self.has_legend = True
         self.has_plate = True
         self._values: tuple[object, FloatArray] | None = None

@@ -153,6 +153,14 @@ def _listed(frame: Frame, extra: Frame, at: int, count: int) -> WorstCells:
     )
 
 
+def inverted_cells(frame: Frame) -> IntArray:
+    """Return the inverted cells of a frame, (k,), without those of a halo."""
+    bad = frame.quality.status == INVERTED
+    if frame.quality.halo is not None:
+        bad &= ~frame.quality.halo
+    return np.flatnonzero(bad)
+
+
 def middles(mesh: Mesh, cells: IntArray) -> FloatArray:
     """Return the means of the nodes of some cells, (k, d)."""
     return np.array([mesh.points[nodes_of(mesh, int(cell))].mean(axis=0) for cell in cells])

@@ -77,6 +77,34 @@ def test_an_inverted_cell_has_its_own_colour(scene, session):
     assert count(image(scene), INVERTED_COLOUR) > 50
 
 
+def test_a_sliver_is_found_by_a_ring_of_the_same_size_at_any_zoom(scene, session):
+    points = session.mesh.points.copy()
+    points[12] = points[6] + [0.5, -0.02]  # of 16 cells, one is hardly inverted
+    mesh = session.mesh.with_points(points)
+    frame = Frame(mesh, quality(mesh, session.mesh))
+    assert frame.quality.inverted
+    session = changes.set_view(opened(scene, session), edges=False)
+    scene.update(session)
+    assert not scene.stage.ring_words
+    session = changes.add_frames(changes.start_run(session), [frame])
+    scene.update(session)
+    word = f"{frame.quality.inverted} inv."
+    assert scene.stage.ring_words == ((word, INVERTED_COLOUR),)
+    assert f"legend:rings:{word}:○" in scene.plotter.actors
+    near = count(image(scene), INVERTED_COLOUR)
+    scene.camera.aim((2.0, 2.0, 0.0), 400.0, 10.0)
+    far = count(image(scene), INVERTED_COLOUR)
+    assert far > 40
+    assert near < 3 * far
+    # No colours of values: what is red are the rings alone, and the line about them.
+    scene.update(changes.set_view(session, inverted=False))
+    assert count(image(scene), INVERTED_COLOUR) == 0
+    scene.update(changes.set_view(session, colour_by="size-skew", threshold=(0.5, 1.0)))
+    assert "points:inverted" not in scene.plotter.actors
+    scene.update(changes.set_view(session, colour_by="size-skew", threshold=(0.0, 1.0)))
+    assert "points:inverted" in scene.plotter.actors
+
+
 def test_steps_move_the_points_in_place(scene, session):
     session = opened(scene, session)
     shape = scene.drawn["top"].shape
