@@ -47,26 +47,52 @@ def conditions(problem: Problem, body: Body, nodes: IntArray, values: FloatArray
         Coinciding nodes are asked to move differently.
     """
     same = problem.same_as
-    n, d = problem.coords.shape
     first, data = merge(problem, nodes, values)
-    given = np.zeros((n, d))
+    given = np.zeros(problem.coords.shape)
     given[first] = data
-    is_known = np.zeros(n, bool)
-    is_known[first] = True
+    place, turn = unknowns(problem, body, first)
+    known = np.where(np.isin(same, first)[:, None], given[same], 0.0)
+    free = _projections(problem, body, place, int(place.max(initial=-1)) + 1)
+    return held(place, turn, free, _cartesian(problem, body.frame, known))
+
+
+def unknowns(problem: Problem, body: Body, known: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the block of unknowns of each node (n,), -1 without, and R_i (n, d, d).
+
+    Parameters
+    ----------
+    known : (m,)
+        Nodes with known displacement, of coinciding ones the one that stands for them.
+    """
+    same = problem.same_as
+    n, d = problem.coords.shape
     used = np.zeros(n, bool)
     for part in body.parts:
         used[part.nodes] = True
-    open_nodes = np.flatnonzero(used & ~is_known[same])
+    open_nodes = np.flatnonzero(used & ~np.isin(same, known))
     place = np.full(n, -1, np.int64)
-    owners, place[open_nodes] = np.unique(same[open_nodes], return_inverse=True)
-    known = np.where(is_known[same, None], given[same], 0.0)
-    free = _projections(problem, body, place, len(owners))
+    place[open_nodes] = np.unique(same[open_nodes], return_inverse=True)[1]
     turn = np.tile(np.eye(d), (n, 1, 1))
     images = open_nodes[same[open_nodes] != open_nodes]
     turn[images] = _turns(problem, body.frame, images)
-    turn[open_nodes] = turn[open_nodes] @ free[place[open_nodes]]
-    plain = np.all(turn == np.eye(d), axis=(1, 2))
-    return Conditions(place, turn, plain, _cartesian(problem, body.frame, known), free)
+    return place, turn
+
+
+def held(place: IntArray, turn: FloatArray, free: FloatArray, known: FloatArray) -> Conditions:
+    """Return the conditions of unknowns that are free as ``free`` (k, d, d) says.
+
+    Parameters
+    ----------
+    place, turn : (n,), (n, d, d)
+        As of ``unknowns``.
+    known : (n, d)
+        g_i.
+    """
+    inside = np.flatnonzero(place >= 0)
+    turn = turn.copy()
+    turn[inside] = turn[inside] @ free[place[inside]]
+    plain = np.all(turn == np.eye(turn.shape[1]), axis=(1, 2))
+    return Conditions(place, turn, plain, known, free)
 
 
 def _cartesian(problem: Problem, frame: Frame, displacement: FloatArray) -> FloatArray:
@@ -94,28 +120,56 @@ def _turns(problem: Problem, frame: Frame, nodes: IntArray) -> FloatArray:
     return (basis.T @ turn @ basis)[:, :d, :d]
 
 
-def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
-    """Return the projections (count, d, d) on the directions in which unknowns are free."""
-    frame, d = body.frame, problem.coords.shape[1]
-    nodes = problem.normal_nodes
-    normals = cartesian_normals(frame, problem.coords[nodes], problem.normals)
+@dataclass(frozen=True, eq=False)
+class HeldRows:
+    """How unknowns are held by the normals of sliding nodes, and by the axis.
+
+    Attributes
+    ----------
+    axis : (a, d) float64
+        Directions of nodes on the axis, which follow the normals.
+    images, back : (i,) int64, (i, d, d) float64
+        Those of them all that are of periodic images, and the rotations back.
+    order, place, turn : (r,) int64
+        Those that hold an unknown, whose block, and which of its directions: 0 for its first.
+    """
+
+    axis: FloatArray
+    images: IntArray
+    back: FloatArray
+    order: IntArray
+    place: IntArray
+    turn: IntArray
+
+
+def held_rows(problem: Problem, body: Body, place: IntArray) -> HeldRows:
+    """Return how blocks of unknowns ``place`` (n,) are held."""
+    nodes, across = problem.normal_nodes, np.zeros((0, problem.coords.shape[1]))
     on_axis = np.flatnonzero(body.axis)
     if len(on_axis):
-        assert frame.axis is not None
-        across = axis_basis(frame.axis)[:2, :d]
+        assert body.frame.axis is not None
+        both = axis_basis(body.frame.axis)[:2, : across.shape[1]]
         nodes = np.concatenate([nodes, np.repeat(on_axis, 2)])
-        normals = np.concatenate([normals, np.tile(across, (len(on_axis), 1))])
+        across = np.tile(both, (len(on_axis), 1))
     images = np.flatnonzero(problem.same_as[nodes] != nodes)
-    back = _turns(problem, frame, nodes[images])
-    normals[images] = np.einsum("mji,mj->mi", back, normals[images])
+    back = np.swapaxes(_turns(problem, body.frame, nodes[images]), 1, 2)
     rows = np.flatnonzero(place[nodes] >= 0)
     rows = rows[np.argsort(place[nodes[rows]], kind="stable")]
-    at, normals = place[nodes[rows]], normals[rows]
-    free = np.tile(np.eye(d), (count, 1, 1))
+    at = place[nodes[rows]]
+    return HeldRows(across, images, back, rows, at, np.arange(len(at)) - np.searchsorted(at, at))
+
+
+def _projections(problem: Problem, body: Body, place: IntArray, count: int) -> FloatArray:
+    """Return the projections (count, d, d) on the directions in which unknowns are free."""
+    nodes, held = problem.normal_nodes, held_rows(problem, body, place)
+    own = cartesian_normals(body.frame, problem.coords[nodes], problem.normals)
+    normals = np.concatenate([own, held.axis])
+    normals[held.images] = np.einsum("mij,mj->mi", held.back, normals[held.images])
+    normals = normals[held.order]
+    free = np.tile(np.eye(problem.coords.shape[1]), (count, 1, 1))
     # The first constraint of each block, then the second of each, and so on.
-    turn = np.arange(len(at)) - np.searchsorted(at, at)
-    for k in range(int(turn.max(initial=-1)) + 1):
-        here, normal = at[turn == k], normals[turn == k]
+    for k in range(int(held.turn.max(initial=-1)) + 1):
+        here, normal = held.place[held.turn == k], normals[held.turn == k]
         left = np.einsum("mij,mj->mi", free[here], normal)
         length = np.linalg.norm(left, axis=1)
         # Normals that are nearly alike are one: those of the two sides of a periodic mesh.

@@ -92,8 +92,8 @@ def solve(
     """
     if not np.any(right):
         return LinearSolution(np.zeros_like(right), 0, 0.0)
-    levels = _while_ticking(lambda: _levels(matrix, modes), tick)
-    return _conjugate_gradients(levels, right, start, tick)
+    levels = _while_ticking(lambda: hierarchy(matrix, modes), tick)
+    return conjugate_gradients(levels, right, start, tick)
 
 
 def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
@@ -122,8 +122,11 @@ def _while_ticking(work: Callable[[], list[Level]], tick: Tick) -> list[Level]:
             tick(MAKING * done)
 
 
-def _levels(matrix: bsr_array, modes: FloatArray) -> list[Level]:
-    """Return the hierarchy, finest first."""
+def hierarchy(matrix: bsr_array, modes: FloatArray) -> list[Level]:
+    """Return the levels of a matrix, finest first.
+
+    Parameters as of ``solve``.
+    """
     import pyamg
 
     with warnings.catch_warnings():
@@ -189,10 +192,25 @@ def _cycle(levels: list[Level], right: FloatArray) -> FloatArray:
     return x
 
 
-def _conjugate_gradients(
-    levels: list[Level], right: FloatArray, start: FloatArray, tick: Tick
+def conjugate_gradients(
+    levels: list[Level],
+    right: FloatArray,
+    start: FloatArray,
+    tick: Tick = no_tick,
+    *,
+    tolerance: float = TOLERANCE,
 ) -> LinearSolution:
-    """Return the solution; Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1."""
+    """Return the solution; Saad, Iterative Methods for Sparse Linear Systems, algorithm 9.1.
+
+    Parameters
+    ----------
+    levels
+        Of the matrix, as ``hierarchy`` makes them.
+    right, start : (n,)
+        Right-hand side, and a guess of the solution.
+    tolerance
+        Fall of the residual at which it ends.
+    """
     matrix = levels[0].matrix
     first = float(right @ _cycle(levels, right))
     x = np.array(start, float)
@@ -201,9 +219,9 @@ def _conjugate_gradients(
     energy, along, fall = float(left @ z), z, np.inf
     for count in range(MAX_ITERATIONS + 1):
         fall = float(np.sqrt(max(energy, 0.0) / first)) if first > 0 else np.nan
-        if not fall > TOLERANCE or count == MAX_ITERATIONS:
+        if not fall > tolerance or count == MAX_ITERATIONS:
             return LinearSolution(x, count, fall)
-        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(fall, 1.0)) / np.log(TOLERANCE)))
+        tick(MAKING + (1.0 - MAKING) * min(1.0, np.log(min(fall, 1.0)) / np.log(tolerance)))
         image = _product(matrix, along)
         size = energy / float(along @ image)
         x += size * along

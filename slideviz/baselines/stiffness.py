@@ -81,13 +81,7 @@ def assemble(
     right = np.zeros((count, d))
     entry = conditions.place, conditions.turn, conditions.plain, conditions.known
     total = sum(len(part.nodes) for part in parts)
-    done = 0
-    volume = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
-    for part in parts:
-        each = np.empty(len(part.nodes))
-        given = points, part.nodes, part.shape.gradients, part.shape.weights
-        volumes(*given, each)
-        np.add.at(volume, part.cell, part.share * each)
+    done, volume = 0, cell_volumes(points, parts)
     for part in parts:
         for start in range(0, len(part.nodes), CHUNK):
             rows = slice(start, start + CHUNK)
@@ -105,6 +99,16 @@ def assemble(
     _hold(indptr, indices, data, conditions.free)
     matrix = bsr_array((data, indices, indptr), shape=(count * d, count * d))
     return matrix, right.ravel()
+
+
+def cell_volumes(points: FloatArray, parts: list[Block]) -> FloatArray:
+    """Return the volumes (areas) of cells, by number."""
+    out = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
+    for part in parts:
+        each = np.empty(len(part.nodes))
+        volumes(points, part.nodes, part.shape.gradients, part.shape.weights, each)
+        np.add.at(out, part.cell, part.share * each)
+    return out
 
 
 def _pattern(parts: list[Block], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:

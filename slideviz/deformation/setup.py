@@ -35,6 +35,7 @@ from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 
 if TYPE_CHECKING:
+    from slideviz.baselines.conditions import Body
     from slideviz.baselines.idw import Weights
 
 REACH = 1.5
@@ -215,7 +216,7 @@ def make_setup(case: Case, mesh: Mesh, moved: Displacements | None = None) -> Se
         fans=fans,
         tracks=tracks,
         pairs=pairs,
-        solve=_method(case, without_halo(mesh)[0], frame, axis),
+        solve=_method(case, mesh, frame, axis),
         halo=mesh.halo,
         warnings=(*mesh.remarks, *notes, *warnings, *loose, *idle_settings(case)),
     )
@@ -230,12 +231,18 @@ def _method(
 
         return partial(deform_idw, weights=idw_weights(case, mesh.dim))
     if case.method == "elastic":
-        from slideviz.baselines.conditions import Body
         from slideviz.baselines.elastic import deform_elastic
-        from slideviz.baselines.shapes import blocks
 
-        return partial(deform_elastic, body=Body(blocks(mesh.cells), frame, axis))
+        return partial(deform_elastic, body=elastic_body(mesh, frame, axis))
     return SLIDING_METHODS[case.sliding]
+
+
+def elastic_body(mesh: Mesh, frame: Frame, axis: np.ndarray) -> Body:
+    """Return the mesh as an elastic body, without its halo."""
+    from slideviz.baselines.conditions import Body
+    from slideviz.baselines.shapes import blocks
+
+    return Body(blocks(without_halo(mesh)[0].cells), frame, axis)
 
 
 def idw_weights(case: Case, dim: int) -> Weights:

@@ -181,10 +181,20 @@ def one_step(
     Of periodic images only the one that stands for them is in the problem, and it is copied to
     the others.
     """
+    found = setup.solve(problem_at(setup, coords, goal, before), watch)
+    first, second = setup.images.T
+    found.displacement[second] = found.displacement[first]
+    return found
+
+
+def problem_at(
+    setup: Setup, coords: FloatArray, goal: FloatArray, before: Solution | None = None
+) -> Problem:
+    """Return what a step at ``coords`` (n, d) solves, with known nodes at ``goal`` (a, d) after."""
     once = setup.once(setup.known)
     known, classes = setup.known[once], setup.classes
     normal_nodes, normals = setup.constraints(coords)
-    problem = Problem(
+    return Problem(
         basis=setup.basis,
         features=setup.frame.features(coords),
         known=known,
@@ -202,10 +212,6 @@ def one_step(
         reduction=setup.reduction,
         before=before,
     )
-    found = setup.solve(problem, watch)
-    first, second = setup.images.T
-    found.displacement[second] = found.displacement[first]
-    return found
 
 
 def moved_by(

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from slideviz.case.model import Case
-from slideviz.deformation.setup import Setup, idw_weights
+from slideviz.deformation.setup import Setup, elastic_body, idw_weights
 from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen_step import FrozenStep
@@ -43,7 +43,8 @@ def choose_steps(
     kept = setup
     setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
     parts, solutions = _reference(case, mesh, replace(setup, target=targets[0]), tell)
-    for target in targets[1:]:
+    # The other methods choose nothing but the number of steps.
+    for target in targets[1:] if case.method == "rbf" else ():
         further = _further(mesh, replace(setup, target=target), parts, solutions, tell)
         # A system that was solved with more rows and digits for one is so for all.
         solutions = [
@@ -57,6 +58,7 @@ def choose_steps(
                 "solution has no derivative; use RBF_KERNEL= wendland-c2, or merge coinciding nodes"
             )
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
+    body = elastic_body(mesh, kept.frame, kept.axis) if case.method == "elastic" else None
     return tuple(
         FrozenStep(
             setup=kept,
@@ -69,6 +71,7 @@ def choose_steps(
             condition=solution.condition,
             refined=solution.refined > 0.0,
             weights=weights,
+            body=body,
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )

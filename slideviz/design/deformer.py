@@ -127,7 +127,6 @@ class Deformer:
         ConditionWarning
             The system is so badly conditioned that derivatives, or points too, have few digits.
         """
-        _require_derivative(case)
         if displacements is not None and not case.motions:
             case = case.change(motions=(Translate("", (0.0,) * mesh.dim),))
         asked = _asked(case, mesh)
@@ -481,11 +480,3 @@ def _usual_edge(setup: Setup) -> float:
 
 def _asked(case: Case, mesh: Mesh) -> Displacements:
     return displacements(case, mesh)
-
-
-def _require_derivative(case: Case) -> None:
-    """Raise DeformError for methods that have no exact derivative here."""
-    if case.method == "elastic":
-        raise DeformError(
-            "METHOD= elastic has no exact derivatives; use METHOD= rbf or idw, or `sv.deform`"
-        )

@@ -1,4 +1,4 @@
-"""The method of a frozen step: regular interpolation, sliding, or inverse distance weighting."""
+"""The method of a frozen step: interpolation, sliding, distance weighting, or elasticity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
+from slideviz.deformation.stepping import problem_at
+from slideviz.design.frozen_elastic import Equilibrium
 from slideviz.design.frozen_fit import FrozenFit, Rows
 from slideviz.design.frozen_spread import Spread, chosen_spread, shares
 from slideviz.design.loops import take_over
@@ -87,6 +90,8 @@ class Method:
         """Return what the method finds."""
         if self._step.weights is not None:
             return self._weighted(self._step.weights)
+        if self._step.body is not None:
+            return self._elastic(self._step.body)
         if self._step.sliding == "ps":
             return self._pseudo()
         if self._step.sliding == "ds" and len(self._normal_nodes):
@@ -157,6 +162,40 @@ class Method:
         displacement = put(displacement, nodes, values, own=True)
         most = errors.max(axis=-1, initial=0.0)
         return _Solved(displacement, None, nodes, most, np.zeros(most.shape))
+
+    def _elastic(self, body: Body) -> _Solved:
+        """Return that of an elastic body (`slideviz.baselines.elastic.deform_elastic`)."""
+        setup, nodes, values = self._setup, self._known, self._values
+        displacement = self._balanced(body, "free", nodes, values)
+        sliding = np.concatenate([self._edge, self._surface])
+        if len(sliding):
+            free = self._within(sliding, take(displacement, sliding))
+            slid = self._project(sliding, free, "slid")
+            nodes, values = np.concatenate([nodes, sliding]), join(values, slid)
+            gap = np.abs(value(slid) - value(free)).max()
+            if self._step.choices("again", lambda: gap > AGREE * setup.basis.radius):
+                displacement = self._balanced(body, "slid", nodes, values)
+        displacement = put(self._in_room(displacement), nodes, values, own=True)
+        nothing = np.zeros(value(displacement).shape[:-2])
+        return _Solved(displacement, None, nodes, nothing, nothing)
+
+    def _balanced(self, body: Body, name: str, nodes: IntArray, values: Array) -> Array:
+        """Return the displacement of an elastic body by that of some nodes."""
+        coords = value(self._coords)
+        merged, data = self._merged(nodes, values)
+        body_at = self._keep(
+            f"{name} body",
+            lambda: Equilibrium(
+                problem_at(self._setup, coords, coords[self._setup.known]),
+                body,
+                self._coords,
+                self._normals,
+                merged,
+                chosen=self._step.choices,
+                name=name,
+            ),
+        )
+        return body_at.displacement(data)
 
     def _off(self, slid: FloatArray, free: FloatArray) -> IntArray:
         """Return which slid nodes leave a straight edge of a curved surface."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
 from slideviz.design.frozen_method import Method
@@ -97,6 +98,8 @@ class FrozenStep:
         Whether they are solved with twice the digits, as at the reference.
     weights : Weights or None
         Of inverse distance weighting, where that is the method.
+    body : Body or None
+        Where it is linear elasticity.
     choices, constants : Kept
         What is discrete, and in the first step also what follows from positions alone.
     """
@@ -111,6 +114,7 @@ class FrozenStep:
     condition: float
     refined: bool = False
     weights: Weights | None = None
+    body: Body | None = None
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from slideviz.baselines.idw import weighted_means
 from slideviz.design.loops import place
-from slideviz.design.tape import Array, Linear, Variable, apply, value
+from slideviz.design.tape import Array, Linear, Link, Variable, apply, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
@@ -89,19 +89,32 @@ def difference(frame: Frame, start: FloatArray, vectors: Array) -> Array:
     return _turned(vectors, out, lambda: coords_slopes(frame, start + v))
 
 
+def difference_from(frame: Frame, start: Array, vectors: Array) -> Array:
+    """Return what ``difference`` does, of points (n, d) that may be variable."""
+    if not frame.cylindrical:
+        return vectors
+    x, v = value(start), value(vectors)
+    out = frame.difference(flat(np.broadcast_to(x, v.shape)), flat(v)).reshape(v.shape)
+    if not any(isinstance(part, Variable) for part in (start, vectors)):
+        return out
+    here, there = coords_slopes(frame, x), coords_slopes(frame, x + v)
+    return apply(out, _by_rows(start, there - here), _by_rows(vectors, there))
+
+
+def _by_rows(x: Array, slopes: FloatArray) -> Link:
+    """Return what a map of rows with derivatives (n, e, d) depends on."""
+    return (
+        x,
+        lambda t: np.einsum("ned,...nd->...ne", slopes, t),
+        lambda g: np.einsum("ned,...ne->...nd", slopes, g),
+    )
+
+
 def _turned(x: Array, out: FloatArray, slopes_of: Callable[[], FloatArray]) -> Array:
     """Return the outcome of a map of rows with derivatives (n, e, d)."""
     if not isinstance(x, Variable):
         return out
-    slopes = slopes_of()
-    return apply(
-        out,
-        (
-            x,
-            lambda t: np.einsum("ned,...nd->...ne", slopes, t),
-            lambda g: np.einsum("ned,...ne->...nd", slopes, g),
-        ),
-    )
+    return apply(out, _by_rows(x, slopes_of()))
 
 
 def radial_sum(
@@ -127,23 +140,23 @@ def radial_sum(
         many(basis, x, c, w, room),
         (
             targets,
-            lambda t: _each(lambda each: push_positions(basis, x, c, w, moved=each), t),
-            lambda g: _each(lambda each: pull_positions(basis, x, c, each, w), g),
+            lambda t: each_of(lambda each: push_positions(basis, x, c, w, moved=each), t),
+            lambda g: each_of(lambda each: pull_positions(basis, x, c, each, w), g),
         ),
         (
             controls,
-            lambda t: _each(lambda each: push_positions(basis, x, c, w, moved_controls=each), t),
-            lambda g: _each(lambda each: pull_positions(basis, c, x, w, each), g),
+            lambda t: each_of(lambda each: push_positions(basis, x, c, w, moved_controls=each), t),
+            lambda g: each_of(lambda each: pull_positions(basis, c, x, w, each), g),
         ),
         (weights, lambda t: many(basis, x, c, t), turned),
     )
 
 
-def _each(work: Linear, stacked: FloatArray) -> FloatArray:
+def each_of(work: Linear, stacked: FloatArray) -> FloatArray:
     """Return what ``work`` makes of each of the arrays (..., n, c)."""
     if stacked.ndim == 2:
         return work(stacked)
-    return np.stack([_each(work, each) for each in stacked])
+    return np.stack([each_of(work, each) for each in stacked])
 
 
 def many(
@@ -212,7 +225,7 @@ def weighted_mean(
     x, c, v = value(targets), value(sources), value(values)
 
     def mean(each: FloatArray) -> FloatArray:
-        return _each(lambda t: weighted_means(basis, x, c, t, own, power=power), each)
+        return each_of(lambda t: weighted_means(basis, x, c, t, own, power=power), each)
 
     out = mean(v)
     if not any(isinstance(part, Variable) for part in (targets, sources, values)):
@@ -248,13 +261,13 @@ def weighted_mean(
         out,
         (
             targets,
-            lambda t: _each(pushed, t),
-            lambda g: _each(partial(pulled, of_sources=False), g),
+            lambda t: each_of(pushed, t),
+            lambda g: each_of(partial(pulled, of_sources=False), g),
         ),
         (
             sources,
-            lambda t: _each(lambda each: pushed(moved_sources=each), t),
-            lambda g: _each(partial(pulled, of_sources=True), g),
+            lambda t: each_of(lambda each: pushed(moved_sources=each), t),
+            lambda g: each_of(partial(pulled, of_sources=True), g),
         ),
-        (values, mean, lambda g: _each(back, g)),
+        (values, mean, lambda g: each_of(back, g)),
     )

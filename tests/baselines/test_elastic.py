@@ -10,6 +10,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.baselines import elastic, multigrid
+from slideviz.baselines.elastic_forces import Forces
 from slideviz.baselines.multigrid import LinearSolution
 from slideviz.baselines.shapes import _CORNERS, blocks, shape
 from slideviz.baselines.stiffness import Conditions, assemble
@@ -525,3 +526,19 @@ def test_a_baffle_of_two_faces_moves_as_one():
     moved = last(case, mesh).mesh.points - mesh.points
     for name in ("below", "above"):
         np.testing.assert_allclose(moved[mesh.marker(name).nodes, 1], 0.1, atol=1e-15)
+
+
+@pytest.mark.parametrize(("dim", "kind"), ALL_KINDS)
+def test_forces_are_those_of_the_matrix_and_have_derivatives(dim, kind):
+    mesh = distorted(dim, kind, n=3)
+    parts, rng = blocks(mesh.cells), np.random.default_rng(0)
+    moved, by, weights = rng.standard_normal((3, *mesh.points.shape))
+    forces = Forces.at(mesh.points, parts)
+    wanted = (stiffness(mesh) @ moved.ravel()).reshape(moved.shape)
+    scale = np.abs(wanted).max()
+    np.testing.assert_allclose(forces.of(moved), wanted, atol=1e-13 * scale)
+    ahead, behind = (Forces.at(mesh.points + s * by, parts).of(moved) for s in (1e-6, -1e-6))
+    pushed = forces.pushed(moved, by)
+    np.testing.assert_allclose(pushed, (ahead - behind) / 2e-6, atol=1e-7 * np.abs(pushed).max())
+    there, back = (weights * pushed).sum(), (forces.pulled(moved, weights) * by).sum()
+    assert there == pytest.approx(back, abs=1e-13 * np.abs(weights * pushed).sum())

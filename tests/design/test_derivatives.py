@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import slideviz as sv
+from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from tests import builders
 from tests.test_halo import MESHES, both, case_of
@@ -55,11 +57,11 @@ def alike(deformer, vectors):
     return out
 
 
-def check(case, mesh):
+def check(case, mesh, agree=2e-12):
     """Both checks at a design that is not the reference, and the result at the reference."""
     deformer = sv.Deformer(mesh, case)
     *_, last = sv.deform(case, mesh)
-    np.testing.assert_allclose(deformer.deform(), last.mesh.points, rtol=0, atol=2e-12)
+    np.testing.assert_allclose(deformer.deform(), last.mesh.points, rtol=0, atol=agree)
     rng = np.random.default_rng(1)
     design = alike(deformer, 1.1 * deformer.displacement)
     direction = alike(deformer, wave(mesh.points[deformer.nodes]))
@@ -200,6 +202,46 @@ def test_inverse_distance_weighting(frame, method, steps, weight):
     make = box_case if frame == "translational" else sector_case
     case = make(mesh, method, motions(mesh, "BLOCK"), **settings)
     check(case.change(method="idw", idw_power=2.5 if weight > 1 else None), mesh)
+
+
+@pytest.mark.parametrize("method", [("ds", "moving"), ("none", "periodic")])
+@pytest.mark.parametrize("steps", [1, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("frame", ["translational", "rotational"])
+def test_linear_elasticity(monkeypatch, frame, dim, steps, method):
+    """Small systems too are solved by conjugate gradients, in a run to eight digits only."""
+    monkeypatch.setattr(multigrid, "COARSE", 20)
+    mesh = box(dim) if frame == "translational" else sector(dim)
+    make = box_case if frame == "translational" else sector_case
+    marker = "blade" if (frame, dim) == ("rotational", 3) else "BLOCK"
+    case = make(mesh, method, motions(mesh, marker), steps=steps)
+    check(case.change(method="elastic"), mesh, agree=1e-8)
+
+
+@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_linear_elasticity_with_curved_boundaries(shape, steps):
+    mesh, roles, motion = SHAPES[shape]()
+    case = Case(roles=roles, motions=motion, sliding="ds", steps=steps, method="elastic")
+    if shape == "on_axis":
+        case = case.change(periodic="moving", periodic_type="rotational")
+    check(case, mesh, agree=1e-8)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_linear_elasticity_with_halo_layers(tmp_path, name):
+    mesh, _, roles = both(name, tmp_path)
+    case = case_of(mesh, roles, 0.05, sliding="ds", periodic="moving", steps=2, method="elastic")
+    check(case, mesh, agree=1e-8)
+
+
+def test_what_elasticity_does_not_solve_to_many_digits_is_refused(monkeypatch):
+    mesh, roles, motion = annulus()
+    monkeypatch.setattr(multigrid, "COARSE", 20)
+    deformer = sv.Deformer(mesh, Case(roles=roles, motions=motion, method="elastic"))
+    monkeypatch.setattr(multigrid, "MAX_ITERATIONS", 2)
+    with pytest.raises(DeformError, match=r"were solved to .* only, in 2 iterations, so that"):
+        deformer.deform(0.5 * deformer.displacement)
 
 
 def test_dropped_nodes_of_a_boundary_layer():

@@ -1,0 +1,231 @@
+"""Forces of an elastic body, f = K(x) u, and their derivatives by the positions x of its nodes.
+
+With G the gradient of the displacement u, and its stress per modulus of the cell
+
+    S = lam tr(G) I + mu (G + G^T),
+
+the force at node a is the sum of E |det J| w S grad N_a over the integration points of its
+elements (see `slideviz.baselines.stiffness`). Where positions change by t, with gradient T,
+
+    dG = -G T,     d grad N_a = -T^T grad N_a,     d|det J| = |det J| tr T,
+
+and the modulus E, the inverse of the cell's volume, changes by -E dV / V.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slideviz.baselines.shapes import Block
+from slideviz.baselines.stiffness import OPTIONS, POISSON, _jacobian, cell_volumes
+from slideviz.mesh.caching import njit
+from slideviz.mesh.model import FloatArray, IntArray
+
+MU = 1.0 / (2.0 * (1.0 + POISSON))
+LAM = POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
+"""Lamé's constants for a modulus of 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """The forces of a body whose nodes are at ``points`` (n, d)."""
+
+    points: FloatArray
+    parts: list[Block]
+    volume: FloatArray
+
+    @classmethod
+    def at(cls, points: FloatArray, parts: list[Block]) -> Forces:
+        """Return those at some positions."""
+        return cls(points, parts, cell_volumes(points, parts))
+
+    def of(self, moved: FloatArray) -> FloatArray:
+        """Return the forces (n, d) of a displacement (n, d)."""
+        out = np.zeros_like(self.points)
+        for part in self.parts:
+            add_forces(self._elements(part), self._modulus(part), moved, out)
+        return out
+
+    def pushed(self, moved: FloatArray, by: FloatArray) -> FloatArray:
+        """Return how forces change as positions change by ``by`` (n, d)."""
+        out, swelling = np.zeros_like(self.points), np.zeros_like(self.volume)
+        for part in self.parts:
+            each = np.empty(len(part.nodes))
+            swell(self._elements(part), by, each)
+            np.add.at(swelling, part.cell, part.share * each)
+        rate = swelling / self.volume
+        for part in self.parts:
+            modulus = self._modulus(part)
+            push(self._elements(part), modulus, rate[part.cell], moved, by, out)
+        return out
+
+    def pulled(self, moved: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the gradient by positions (n, d) of the sum of ``weights`` (n, d) times forces."""
+        out, work = np.zeros_like(self.points), np.zeros_like(self.volume)
+        for part in self.parts:
+            each = np.empty(len(part.nodes))
+            pull(self._elements(part), self._modulus(part), moved, weights, out, each)
+            np.add.at(work, part.cell, each)
+        rate = work / self.volume
+        for part in self.parts:
+            press(self._elements(part), -part.share * rate[part.cell], out)
+        return out
+
+    def _elements(self, part: Block) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+        return self.points, part.nodes, part.shape.gradients, part.shape.weights
+
+    def _modulus(self, part: Block) -> FloatArray:
+        return np.asarray(part.share / self.volume[part.cell])
+
+
+@njit(**OPTIONS)
+def _at(elements, e, q, x, inverse, slopes):  # type: ignore[no-untyped-def]
+    """Write grad N_a (a, d) at an integration point of an element; return |det J| w."""
+    points, nodes, gradients, weights = elements
+    n, d = x.shape
+    for a in range(n):
+        x[a] = points[nodes[e, a]]
+    size = abs(_jacobian(x, gradients, q, inverse)) * weights[q]
+    for a in range(n):
+        for i in range(d):
+            total = 0.0
+            for j in range(d):
+                total += inverse[i, j] * gradients[q, a, j]
+            slopes[a, i] = total
+    return size
+
+
+@njit(**OPTIONS)
+def _gradient(nodes, e, field, slopes, out):  # type: ignore[no-untyped-def]
+    """Write the gradient (d, d) of a field (n, d), components first; return its trace."""
+    n, d = slopes.shape
+    out[:] = 0.0
+    for a in range(n):
+        for i in range(d):
+            for j in range(d):
+                out[i, j] += field[nodes[e, a], i] * slopes[a, j]
+    trace = 0.0
+    for i in range(d):
+        trace += out[i, i]
+    return trace
+
+
+@njit(**OPTIONS)
+def _stress(gradient, trace, out):  # type: ignore[no-untyped-def]
+    """Write the stress (d, d) per modulus."""
+    for i in range(len(out)):
+        for j in range(len(out)):
+            out[i, j] = MU * (gradient[i, j] + gradient[j, i])
+        out[i, i] += LAM * trace
+
+
+@njit(**OPTIONS)
+def _spread(nodes, e, slopes, size, what, out):  # type: ignore[no-untyped-def]
+    """Add ``size`` times a matrix (d, d) times grad N_a to each node of an element."""
+    n, d = slopes.shape
+    for a in range(n):
+        for i in range(d):
+            total = 0.0
+            for j in range(d):
+                total += what[i, j] * slopes[a, j]
+            out[nodes[e, a], i] += size * total
+
+
+@njit(**OPTIONS)
+def add_forces(elements, modulus, moved, out):  # type: ignore[no-untyped-def]
+    """Add the forces of elements to those of nodes."""
+    nodes, d = elements[1], elements[0].shape[1]
+    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
+    inverse, g, s = np.empty((3, 3)), np.empty((d, d)), np.empty((d, d))
+    for e in range(len(nodes)):
+        for q in range(len(elements[3])):
+            size = _at(elements, e, q, x, inverse, slopes) * modulus[e]
+            _stress(g, _gradient(nodes, e, moved, slopes, g), s)
+            _spread(nodes, e, slopes, size, s, out)
+
+
+@njit(**OPTIONS)
+def swell(elements, by, out):  # type: ignore[no-untyped-def]
+    """Write how the volumes of elements change as positions change by ``by`` (n, d)."""
+    nodes, d = elements[1], elements[0].shape[1]
+    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
+    inverse, t = np.empty((3, 3)), np.empty((d, d))
+    for e in range(len(nodes)):
+        out[e] = 0.0
+        for q in range(len(elements[3])):
+            size = _at(elements, e, q, x, inverse, slopes)
+            out[e] += size * _gradient(nodes, e, by, slopes, t)
+
+
+@njit(**OPTIONS)
+def press(elements, by, out):  # type: ignore[no-untyped-def]
+    """Add to nodes the gradient of the volumes of elements, each times ``by``."""
+    nodes, d = elements[1], elements[0].shape[1]
+    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
+    inverse, one = np.empty((3, 3)), np.eye(d)
+    for e in range(len(nodes)):
+        for q in range(len(elements[3])):
+            size = _at(elements, e, q, x, inverse, slopes) * by[e]
+            _spread(nodes, e, slopes, size, one, out)
+
+
+@njit(**OPTIONS)
+def push(elements, modulus, rate, moved, by, out):  # type: ignore[no-untyped-def]
+    """Add how the forces of elements change as positions change by ``by`` (n, d).
+
+    ``rate``: by what part their cells' volumes change.
+    """
+    nodes, d = elements[1], elements[0].shape[1]
+    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
+    inverse, g, t = np.empty((3, 3)), np.empty((d, d)), np.empty((d, d))
+    s, ds, dg = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    for e in range(len(nodes)):
+        for q in range(len(elements[3])):
+            size = _at(elements, e, q, x, inverse, slopes) * modulus[e]
+            _stress(g, _gradient(nodes, e, moved, slopes, g), s)
+            more = _gradient(nodes, e, by, slopes, t) - rate[e]
+            trace = 0.0
+            for i in range(d):
+                for j in range(d):
+                    dg[i, j] = 0.0
+                    for k in range(d):
+                        dg[i, j] -= g[i, k] * t[k, j]
+                trace += dg[i, i]
+            _stress(dg, trace, ds)
+            for i in range(d):
+                for j in range(d):
+                    ds[i, j] += more * s[i, j]
+                    for k in range(d):
+                        ds[i, j] -= s[i, k] * t[j, k]
+            _spread(nodes, e, slopes, size, ds, out)
+
+
+@njit(**OPTIONS)
+def pull(elements, modulus, moved, weights, out, work):  # type: ignore[no-untyped-def]
+    """Add the gradient of weights times forces, at constant modulus; write that sum to ``work``.
+
+    With L the gradient of the weights, of (S : L) tr T - S : (L T) - S_L : (G T), S_L their stress.
+    """
+    nodes, d = elements[1], elements[0].shape[1]
+    x, slopes = np.empty((nodes.shape[1], d)), np.empty((nodes.shape[1], d))
+    inverse, g, w = np.empty((3, 3)), np.empty((d, d)), np.empty((d, d))
+    s, r, m = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    for e in range(len(nodes)):
+        work[e] = 0.0
+        for q in range(len(elements[3])):
+            size = _at(elements, e, q, x, inverse, slopes) * modulus[e]
+            _stress(g, _gradient(nodes, e, moved, slopes, g), s)
+            _stress(w, _gradient(nodes, e, weights, slopes, w), r)
+            total = 0.0
+            for i in range(d):
+                for j in range(d):
+                    total += s[i, j] * w[i, j]
+                    m[i, j] = 0.0
+                    for k in range(d):
+                        m[i, j] -= w[k, i] * s[k, j] + g[k, i] * r[k, j]
+            for i in range(d):
+                m[i, i] += total
+            work[e] += size * total
+            _spread(nodes, e, slopes, size, m, out)
