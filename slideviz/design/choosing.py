@@ -13,9 +13,7 @@ from slideviz.deformation.setup import Setup, elastic_body, idw_weights
 from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen_step import FrozenStep
-from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem, Solution, Watch
 
 Tell = Callable[[Progress], None]
@@ -51,12 +49,6 @@ def choose_steps(
             new if new.refined >= old.refined else old
             for old, new in zip(solutions, further, strict=True)
         ]
-    for solution in solutions:
-        if len(solution.dropped) and KERNELS[setup.basis.kernel].polynomial:
-            raise DeformError(
-                f"the system is singular for RBF_KERNEL= {setup.basis.kernel}, so that its "
-                "solution has no derivative; use RBF_KERNEL= wendland-c2, or merge coinciding nodes"
-            )
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     body = elastic_body(mesh, kept.frame, kept.axis) if case.method == "elastic" else None
     return tuple(
@@ -69,7 +61,8 @@ def choose_steps(
             stages=solution.stages,
             dropped=solution.dropped,
             condition=solution.condition,
-            refined=solution.refined > 0.0,
+            refined=solution.refined,
+            doubt=solution.doubt,
             weights=weights,
             body=body,
         )

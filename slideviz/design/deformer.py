@@ -22,7 +22,14 @@ from slideviz.design.given import given_input
 from slideviz.design.loops import farthest, to_points
 from slideviz.design.operations import difference, flat
 from slideviz.design.tape import Array, Tape, Variable, put, take, transform, value
-from slideviz.errors import CaseError, ConditionWarning, DeformError, ToleranceWarning, UnsoundError
+from slideviz.errors import (
+    CaseError,
+    ConditionWarning,
+    DeformError,
+    Note,
+    ToleranceWarning,
+    UnsoundError,
+)
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
@@ -158,6 +165,7 @@ class Deformer:
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
         self._facets = self._nearest(value(states[-1].coords))
+        self.warnings += self._note_of_refinement()
         if not self._warn_of_doubt(np.max([state.doubt for state in states], axis=0)):
             self._warn_of_condition()
 
@@ -426,14 +434,36 @@ class Deformer:
         """Return the largest condition number of the systems at the reference."""
         return max((step.condition for step in self._steps), default=1.0)
 
+    def _note_of_refinement(self) -> tuple[str, ...]:
+        """Return the sentence about systems that are solved with twice the digits."""
+        refined = max((step.refined for step in self._steps), default=0.0)
+        if not refined:
+            return ()
+        return (
+            Note(
+                f"the system is nearly singular (condition number {self._condition():.0e}): "
+                f"between the boundary nodes designs would be wrong by up to {100 * refined:.2g} % "
+                "of the largest displacement, so all are solved with twice the digits; those for "
+                "which that does not suffice are told by a ConditionWarning"
+            ),
+        )
+
     def _warn_of_condition(self) -> None:
-        worst = self._condition()
-        if not worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
+        """Warn where designs that are less smooth than the reference may have few digits."""
+        steps = [step for step in self._steps if not step.refined]
+        worst = max((step.condition for step in steps), default=0.0)
+        doubt = max((step.doubt for step in self._steps), default=0.0)
+        if doubt > TRUSTED:
+            worst = self._condition()
+            amount = f"may be wrong by {100 * doubt:.2g} % of the largest displacement"
+        elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
+            amount = "may have few correct digits"
+        else:
             return
         warnings.warn(
             f"the condition number of the system is {worst:.0e}, so that derivatives by single "
             "nodes, and points between the boundary nodes where neighbours move very differently, "
-            f"may have few correct digits; {REMEDY}",
+            f"{amount}; {REMEDY}",
             ConditionWarning,
             stacklevel=3,
         )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from slideviz.design.frozen_solve import Measured, columnwise, solved, whole
+from slideviz.design.frozen_solve import LeastSquares, Measured, columnwise, solved, whole
 from slideviz.design.operations import columns, radial_sum, terms
 from slideviz.design.tape import (
     Array,
@@ -26,7 +26,6 @@ from slideviz.design.tape import (
     transpose,
     value,
 )
-from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.constraint_rows import ConstraintRows
 from slideviz.rbf.evaluate import Basis, matrix
@@ -35,11 +34,16 @@ from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
 from slideviz.rbf.refine import System
-from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend, saddle_system
+from slideviz.rbf.solve import (
+    NOTHING,
+    Factor,
+    enough_threads,
+    extend,
+    is_singular,
+    pseudo_inverse,
+    saddle_system,
+)
 from slideviz.rbf.twofold import usable
-
-SINGULAR = 1e15
-"""The condition number from which a system with a polynomial counts as singular."""
 
 Keep = Callable[[str, Callable[[], Any]], Any]
 """Returns what is kept under a name, and makes it where there is nothing yet."""
@@ -165,7 +169,12 @@ class FrozenFit:
         if isinstance(solve, Measured):
             self.doubt = np.maximum(self.doubt, solve.doubt)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
-            found = solution(self._residual(rows, value(found), extra), value(found), solve)
+            data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
+            met = partial(self._met, rows, extra=extra)
+            if isinstance(solve, LeastSquares):
+                found = solve.solution(met, data, value(found))
+            else:
+                found = solution(met(value(found)) - data, value(found), solve)
         own = take(found, np.arange(count))
         tail = None
         if extra:
@@ -176,13 +185,11 @@ class FrozenFit:
         nodes, place = _firsts(rows.nodes)
         return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
 
-    def _residual(self, rows: Rows, found: FloatArray, extra: int) -> Array:
-        """Return what the system lacks at its solution ``found``, as all else changes."""
+    def _met(self, rows: Rows, found: FloatArray, *, extra: int) -> Array:
+        """Return the product of the system with ``found``, which is constant, where it changes."""
         count, m = len(rows.nodes), found.shape[-1]
-        moving = isinstance(self._features, Variable) or isinstance(rows.normals, Variable)
-        if not moving:
-            nothing = -rows.right
-            return join(nothing, np.zeros((extra, m))) if extra else nothing
+        if not (isinstance(self._features, Variable) or isinstance(rows.normals, Variable)):
+            return np.zeros_like(found)
         weights: Array = found[:count]
         if rows.normals is not None:
             weights = multiply(rows.normals, weights)
@@ -197,7 +204,7 @@ class FrozenFit:
             below = [reshape(free, extra, m)]
         if rows.normals is not None:
             s = dot(s, rows.normals)
-        return join(s - rows.right, *below)
+        return join(s, *below)
 
     def _solver(
         self, rows: Rows, index: IntArray, level: int, stage: str
@@ -281,18 +288,15 @@ class FrozenFit:
             system[:count, :count] = matrix(self._basis, (place, normals))
             system[:count, count:] = along[:, use]
             system[count:, :count] = along[:, use].T
-            # Lengths in any unit: what the polynomial's terms are worth must not count.
-            scale = np.ones(len(system))
-            scale[count:] /= np.abs(along[:, use]).max(axis=0)
-            alike = scale[:, None] * system * scale
-            if not self._chosen(f"{name} solved", lambda: np.linalg.cond(alike, 1) < SINGULAR):
-                raise DeformError(
-                    f"the system is singular for RBF_KERNEL= {self._basis.kernel}, so that its "
-                    "solution has no derivative; use RBF_KERNEL= wendland-c2"
-                )
-            return lu_factor(system), np.concatenate([np.arange(count), count + use])
+            rows = np.concatenate([np.arange(count), count + use])
+            if self._chosen(f"{name} singular", lambda: is_singular(system)):
+                rank = self._chosen(f"{name} rank", lambda: len(pseudo_inverse(system)[0]))
+                return LeastSquares(*pseudo_inverse(system, rank), rows), rows
+            return lu_factor(system), rows
 
         factor, rows = self._fixed(name, make)
+        if isinstance(factor, LeastSquares):
+            return factor, total
 
         def solve(right: FloatArray) -> FloatArray:
             out = np.zeros_like(right)

@@ -210,7 +210,7 @@ class Method:
             setup.coords.shape[1],
             chosen=self._step.choices,
             fixed=self._keep,
-            refined=self._step.refined,
+            refined=self._step.refined > 0.0,
             checked=setup.reduction is None and self._step.condition > CHECKED,
         )
 

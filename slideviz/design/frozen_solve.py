@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from slideviz.design.tape import Array, apply, value
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.refine import System
@@ -45,6 +48,71 @@ class Measured:
         self.doubt = doubt.reshape(*right.shape[:-2], m).max(axis=-1)
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """Solves a singular symmetric system of constant rank by least squares, with least weights.
+
+    Attributes
+    ----------
+    values, vectors : (k,), (q, k) float64
+        Eigenvalues that are not zero, and their eigenvectors.
+    rows : (q,) int64
+        The rows that are in the system; the others of a solution are zero.
+    """
+
+    values: FloatArray
+    vectors: FloatArray
+    rows: IntArray
+
+    def __call__(self, right: FloatArray) -> FloatArray:
+        """Return the solutions (..., n, m) for right-hand sides, all at once."""
+        return self._along(right, 1.0 / self.values)
+
+    def solution(self, met: Callable[[FloatArray], Array], data: Array, found: FloatArray) -> Array:
+        """Return a solution (n, m) on a tape.
+
+        With P the pseudo-inverse of A, x = P b and r = b - A x,
+
+            dx = -P (dA x - db) + P P dA r + (I - P A) dA P x
+
+        (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973, for a symmetric A).
+
+        Parameters
+        ----------
+        met
+            How A v depends on all else, for a constant v (n, m).
+        data, found : (n, m)
+            b and x.
+        """
+        rest = value(data) - self._along(found, self.values)
+        again = self(found)
+        constant = partial(self._along, factor=np.ones(len(self.values)))
+
+        def outside(t: FloatArray) -> FloatArray:
+            own = np.zeros_like(t)
+            own[..., self.rows, :] = t[..., self.rows, :]
+            return own - constant(t)
+
+        def twice(t: FloatArray) -> FloatArray:
+            return self(self(t))
+
+        def minus(t: FloatArray) -> FloatArray:
+            return -self(t)
+
+        return apply(
+            found,
+            (met(found) - data, minus, minus),
+            (met(rest), twice, twice),
+            (met(again), outside, outside),
+        )
+
+    def _along(self, right: FloatArray, factor: FloatArray) -> FloatArray:
+        out = np.zeros_like(right)
+        inside = self.vectors.T @ right[..., self.rows, :]
+        out[..., self.rows, :] = self.vectors @ (factor[:, None] * inside)
+        return out
 
 
 def solved(blocks: list[IntArray], factors: list[Factor], right: FloatArray) -> FloatArray:

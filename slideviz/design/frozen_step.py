@@ -94,8 +94,11 @@ class FrozenStep:
         Nodes that the pivot guard left out of them.
     condition : float
         Estimated condition number of the last of them, at the reference.
-    refined : bool
-        Whether they are solved with twice the digits, as at the reference.
+    refined : float
+        By how much ordinary solutions would be wrong, as of a ``Solution``, where they are solved
+        with twice the digits, as at the reference; else 0.
+    doubt : float
+        As of a ``Solution``, at the reference.
     weights : Weights or None
         Of inverse distance weighting, where that is the method.
     body : Body or None
@@ -112,7 +115,8 @@ class FrozenStep:
     stages: tuple[Levels, ...]
     dropped: IntArray
     condition: float
-    refined: bool = False
+    refined: float = 0.0
+    doubt: float = 0.0
     weights: Weights | None = None
     body: Body | None = None
     choices: Kept = made_by(default_factory=Kept)

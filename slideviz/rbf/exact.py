@@ -125,9 +125,9 @@ class ExactFit:
             ]
             doubt = [float(each.doubt.max(initial=0.0)) for each in refined]
             if max(doubt) < BETTER * max(wrong):
-                self.refined, self.doubt = max(self.refined, *wrong), max(self.doubt, doubt[0])
+                self.refined, self.doubt = max(self.refined, *wrong), max(self.doubt, *doubt)
                 return refined[0].weights, True
-        self.doubt = max(self.doubt, wrong[0])
+        self.doubt = max(self.doubt, *wrong)
         return found, False
 
     def condition(self) -> float:

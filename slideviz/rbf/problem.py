@@ -185,7 +185,8 @@ class Solution:
         are set.
     doubt : float
         By how much the field of an exact system may be wrong between its control nodes, measured
-        at some points, as a part of the largest displacement.
+        at some points, as a part of the largest displacement. Where the system is to last, for a
+        wave over the whole mesh too.
     refined : float
         The same of the ordinary solution, where it was too much and a refined one was found; else
         0.

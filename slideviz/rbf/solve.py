@@ -259,19 +259,41 @@ def solve_saddle(matrix: FloatArray, terms: FloatArray, right: FloatArray) -> Sa
     system, use = saddle_system(matrix, terms)
     n = len(matrix)
     full = np.concatenate([right, np.zeros((len(use), right.shape[1]))])
-    deficient = False
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", LinAlgWarning)
-        try:
-            found = solve(system, full, assume_a="sym", check_finite=False)
-        except (LinAlgError, LinAlgWarning):
-            found = lstsq(
-                system, full, cond=PIVOT_GUARD, check_finite=False, lapack_driver="gelsy"
-            )[0]
-            deficient = True
+    found = _regular(system, full)
+    deficient = found is None
+    if found is None:
+        found = lstsq(system, full, cond=PIVOT_GUARD, check_finite=False, lapack_driver="gelsy")[0]
     tail = np.zeros((terms.shape[1], right.shape[1]))
     tail[use] = found[n:]
     return Saddle(found[:n], tail, deficient)
+
+
+def _regular(system: FloatArray, right: FloatArray) -> FloatArray | None:
+    """Return the solution of a symmetric system; None where it is singular."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            return np.asarray(solve(system, right, assume_a="sym", check_finite=False))
+        except (LinAlgError, LinAlgWarning):
+            return None
+
+
+def is_singular(system: FloatArray) -> bool:
+    """Tell whether a system with a polynomial (n, n) is solved by least squares."""
+    return _regular(system, np.zeros((len(system), 1))) is None
+
+
+def pseudo_inverse(system: FloatArray, rank: int | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return the eigenvalues (k,) and eigenvectors (n, k) of a singular symmetric system.
+
+    As many as its rank, by the same threshold as the least squares solution if not given.
+    """
+    values, vectors = np.linalg.eigh(system)
+    order = np.argsort(-np.abs(values), kind="stable")
+    size = np.abs(values[order])
+    if rank is None:
+        rank = int(np.count_nonzero(size > PIVOT_GUARD * size[0]))
+    return values[order[:rank]], vectors[:, order[:rank]]
 
 
 def saddle_condition(matrix: FloatArray, terms: FloatArray) -> float:

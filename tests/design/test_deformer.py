@@ -256,13 +256,6 @@ def test_derivatives_are_those_at_one_design():
         deformer.vjp(deformer.displacement, np.zeros((8, 2)))
 
 
-def test_what_has_no_derivative_is_refused():
-    mesh, case = made("flat")
-    for reduction in (None, REDUCED):
-        with pytest.raises(DeformError, match="RBF_KERNEL= quadric"):
-            sv.Deformer(mesh, case.change(kernel="quadric", reduction=reduction))
-
-
 def test_a_badly_conditioned_system_is_told():
     mesh, case = made("flat", reduction=None)
     with pytest.warns(ConditionWarning, match="condition number of the system is"):
