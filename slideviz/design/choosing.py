@@ -14,7 +14,7 @@ from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen_step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.problem import Problem, Solution, Watch
+from slideviz.rbf.problem import Levels, Problem, Solution, Watch
 
 Tell = Callable[[Progress], None]
 
@@ -70,6 +70,10 @@ def choose_steps(
     )
 
 
+def _begun(setup: Setup, stages: tuple[Levels, ...], problem: Problem, watch: Watch) -> Solution:
+    return setup.solve(replace(problem, stages=stages), watch)
+
+
 def _lasting(problem: Problem) -> Problem:
     return replace(problem, lasting=True)
 
@@ -108,8 +112,9 @@ def _further(
             control = np.concatenate([control, more[~np.isin(more, control)]])
         watch = Watch(partial(_told, tell, k + 1, total))
         goal = setup.coords[setup.known] + setup.target * part
+        begun = replace(setup, solve=partial(_begun, setup, solution.stages))
         made.append(
-            one_step(setup, coords, goal, watch, replace(solution, control=control, lag=lag))
+            one_step(begun, coords, goal, watch, replace(solution, control=control, lag=lag))
         )
         lag = made[-1].lag
         coords = moved_by(setup, coords, made[-1].displacement, goal)

@@ -142,11 +142,6 @@ class Deformer:
         given = asked.vectors if displacements is None else displacements
         given = self._checked(given, "displacements")
         references = given.reshape(-1, *asked.vectors.shape)
-        if len(references) > 1 and case.reduction is not None and case.reduction.multilevel:
-            raise CaseError(
-                "MULTILEVEL= YES chooses control nodes for one displacement, not for "
-                f"{len(references)} together; use MULTILEVEL= NO, or give one displacement"
-            )
         sizes = np.linalg.norm(references, axis=2).max(axis=1, initial=0.0)
         most = Displacements(asked.nodes, references[int(np.argmax(sizes))], asked.warnings)
         setup = make_setup(case, mesh, displaced(most, mesh))

@@ -64,7 +64,16 @@ class GreedyFit:
         The rows chosen after each call of ``add``.
     """
 
-    def __init__(self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> None:
+    def __init__(
+        self, problem: Problem, watch: Watch, history: tuple[Cycle, ...] = (), *, done: int = 0
+    ) -> None:
+        """Begin without rows.
+
+        Parameters
+        ----------
+        history, done
+            Cycles and calls of ``add`` of another fit of the same step, before this one.
+        """
         assert problem.reduction is not None
         self._problem, self._watch, self._settings = problem, watch, problem.reduction
         d = problem.values.shape[1]
@@ -83,6 +92,8 @@ class GreedyFit:
         self._rows = ConstraintRows(np.empty(0, np.int64), None, np.empty((0, d)))
         self._candidate = self._block = np.empty(0, np.int64)
         self._known = problem.beginning()
+        self._given, self._used = problem.stages[done:], list[int]()
+        self._one_level = self._settings.level == "none"
         self._new_level()
 
     def _new_level(self) -> None:
@@ -125,11 +136,16 @@ class GreedyFit:
         errors = self._errors(residual)
         goal = self._level_goal(errors)
         again = np.flatnonzero(np.isin(self._rows.nodes, self._known) & ~self._barred)
-        if len(again) and errors.max(initial=0.0) > settings.tolerance:
+        if len(again) and (errors.max(initial=0.0) > settings.tolerance or self._given):
             self._record(errors)
             self._take(again, target)
             residual = target - self._values(self._now)
             errors = self._errors(residual)
+        if self._take_given():
+            target = self._targets()
+            residual = target - self._values(self._now)
+            errors = self._errors(residual)
+            goal = self._level_goal(errors)
         rule, given_up = LevelLimit(errors.max(initial=0.0), len(self._rows.nodes)), False
         best = errors, self.found
         while True:
@@ -338,6 +354,30 @@ class GreedyFit:
             self._barred[rows] = True
             self._now = self._own(target)
         self.found = self._settled.plus(self._now)
+
+    def _take_given(self) -> bool:
+        """Take the levels that were chosen for other data; tell whether there were any."""
+        stage = len(self.stages)
+        if self._one_level or stage >= len(self._given):
+            return False
+        place = {tuple(name): k for k, name in enumerate(row_names(self._rows).tolist())}
+        taken = False
+        for level, names in enumerate(self._given[stage]):
+            used = self._used[level] if level < len(self._used) else 0
+            rows = np.array([place[tuple(name)] for name in names[used:].tolist()], np.int64)
+            if not len(rows):
+                continue
+            if level >= len(self._used):
+                if len(self._chosen):
+                    self._new_level()
+                    self._level += 1
+                self._used.append(0)
+            self._used[level] = len(names)
+            rows = rows[~self._barred[rows]]
+            if len(rows):
+                self._take(rows, self._targets())
+                taken = True
+        return taken
 
     def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""

@@ -105,7 +105,7 @@ def direct_sliding(problem: Problem, watch: Watch) -> Solution:
         slid = np.where(off, slid, free)
         return _finish(problem, watch, fit, nodes, np.concatenate([problem.values, slid]))
     values = np.concatenate([problem.values, slid])
-    second = _fit(problem, watch, fit.history)
+    second = _fit(problem, watch, fit)
     second.add(full_rows(problem, nodes, values))
     found = _finish(problem, watch, second, nodes, values)
     return replace(
@@ -136,10 +136,12 @@ SLIDING_METHODS: dict[str, Callable[[Problem, Watch], Solution]] = {
 """Method by the value of SLIDING_MODE."""
 
 
-def _fit(problem: Problem, watch: Watch, history: tuple[Cycle, ...] = ()) -> Fit:
+def _fit(problem: Problem, watch: Watch, first: Fit | None = None) -> Fit:
     if problem.reduction is None:
         return ExactFit(problem, watch)
-    return GreedyFit(problem, watch, history)
+    if first is None:
+        return GreedyFit(problem, watch)
+    return GreedyFit(problem, watch, first.history, done=len(first.stages))
 
 
 def _at(problem: Problem, watch: Watch, fit: Fit, nodes: IntArray | slice) -> FloatArray:

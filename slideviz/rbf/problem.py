@@ -108,6 +108,9 @@ class Problem:
         None: all candidates are control nodes.
     before : Solution or None
         That of the step before.
+    stages : tuple of Levels
+        Rows of each system that was chosen for other data, in levels: a selection in levels takes
+        them first.
     lasting : bool
         Whether the system is to be solved for other data too, so that these alone do not tell
         whether its solutions can be trusted.
@@ -129,6 +132,7 @@ class Problem:
     shift: FloatArray
     reduction: Reduction | None = None
     before: Solution | None = None
+    stages: tuple[Levels, ...] = ()
     lasting: bool = False
 
     def behind(self, nodes: IntArray) -> FloatArray:

@@ -156,10 +156,14 @@ def test_the_number_of_steps_is_that_of_the_reference():
     assert len(deformer._steps) == last.total
 
 
-def test_control_nodes_suffice_for_all_displacements_together():
+@pytest.mark.parametrize("sliding", ["ps", "ds"])
+@pytest.mark.parametrize("levels", ["none", "size", "tol"])
+def test_control_nodes_suffice_for_all_displacements_together(levels, sliding):
     mesh = builders.square(24)
     roles = dict.fromkeys(mesh.marker_names, "sliding") | {"BLOCK": "moving"}
-    case = Case(roles=roles, sliding="ps", reduction=Reduction(tolerance=2e-5), steps=2)
+    settings = {"multilevel": True, "criterion": levels, "level_size": 16}
+    reduction = Reduction(tolerance=2e-5, **(settings if levels != "none" else {}))
+    case = Case(roles=roles, sliding=sliding, reduction=reduction, steps=2)
     shape = (len(np.unique(mesh.marker("BLOCK").nodes)), 2)
     rng = np.random.default_rng(0)
     basis = np.stack([np.full(shape, [0.02, 0.0]), 0.01 * rng.standard_normal(shape)])
@@ -168,6 +172,9 @@ def test_control_nodes_suffice_for_all_displacements_together():
     both = sv.Deformer(mesh, case, basis)
     assert (both.max_error(basis) <= 2e-5).all()
     both.deform(basis)
+    # One that needs no control nodes leaves those of the others.
+    rest = sv.Deformer(mesh, case, np.stack([basis[0], 0.0 * basis[0]]))
+    assert rest.max_error(basis[0]) <= 2e-5
 
 
 def test_a_design_outside_the_tolerance_warns_until_refreshed():
@@ -266,9 +273,6 @@ def test_a_reduction_needs_a_displacement_to_choose_by():
     mesh, case = made("flat", reduction=REDUCED)
     with pytest.raises(DeformError, match="no displacement is given by which control nodes"):
         sv.Deformer(mesh, case, np.zeros((8, 2)))
-    levels = case.change(reduction=Reduction(tolerance=1e-4, multilevel=True))
-    with pytest.raises(CaseError, match="MULTILEVEL= YES"):
-        sv.Deformer(mesh, levels, np.ones((2, 8, 2)) * [[[0.01]], [[0.02]]])
 
 
 @QUIET
