@@ -259,7 +259,7 @@ def test_the_misfit_is_what_images_moved_apart(build, shift):
     names = ("per1", "per2") if mesh.dim == 3 else ("y_m", "y_p")
     offset = np.array([0.0, 0.0, shift])[-mesh.dim :]
     pair = sv.mesh.periodic.match(mesh, *names)
-    frame = make_frame(mesh.points, [pair], periodic_distance=True)
+    frame = make_frame(mesh.points, [pair], periodic_distance=True)[0]
     coords = frame.coords(mesh.points)
     turned = coords + 0.01 * frame.shift()
     assert misfits(frame, coords, frame.points(turned), pair.nodes).max() < 1e-15

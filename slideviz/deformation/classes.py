@@ -48,8 +48,9 @@ def find_period(
     pairs = _pairs(case, without_halo(mesh)[0])
     periodic = case.periodic != "none"
     inside = mesh.points if mesh.halo is None else np.delete(mesh.points, mesh.halo.outer, axis=0)
-    frame = make_frame(inside, pairs, periodic_distance=periodic)
-    coords = frame.coords(mesh.points)
+    frame, coords = make_frame(inside, pairs, periodic_distance=periodic)
+    if mesh.halo is not None:
+        coords = frame.coords(mesh.points)
     stands = find_images(pairs if periodic else (), frame, coords, boundary.nodes, mesh.extent)
     return pairs, frame, coords, stands
 

@@ -58,7 +58,7 @@ def intersection_message(
 
 def _movers(case: Case, mesh: Mesh, nodes: IntArray, vectors: FloatArray) -> list[str]:
     """Return the moving markers, last those of which most nodes stay where they are."""
-    still = np.ones(len(mesh.points))
+    still = np.ones(len(mesh.points), bool)
     still[nodes] = ~vectors.any(axis=1)
     stays = {n: still[mesh.marker(n).nodes].sum() for n in case.markers_with("moving")}
     return sorted(stays, key=lambda name: bool(2 * stays[name] > len(mesh.marker(name).nodes)))
@@ -134,9 +134,11 @@ def _outside(case: Case, mesh: Mesh, nodes: IntArray, after: FloatArray) -> str 
     for name in case.markers_with("moving"):
         mine = boundary.facets[boundary.marker == boundary.names.index(name)]
         mine = mine[np.isin(mine, nodes).all(axis=1)]
-        label = components(len(mesh.points), mine[:, :-1].ravel(), mine[:, 1:].ravel())
-        for body in np.unique(label[mine[:, 0]]):
-            if not _is_lost(case, mesh, after, mine[label[mine[:, 0]] == body]):
+        found, here = np.unique(mine, return_inverse=True)
+        here = here.reshape(mine.shape)
+        label = components(len(found), here[:, :-1].ravel(), here[:, 1:].ravel())[here[:, 0]]
+        for body in np.unique(label):
+            if not _is_lost(case, mesh, after, mine[label == body]):
                 continue
             others = _others(case, mesh, name)
             hit = swept_crossing(mesh.points, after, mesh.marker(name).cells, others)

@@ -19,7 +19,7 @@ from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import on_axis
 from slideviz.rbf.classify import Classes
 from slideviz.rbf.frames import Frame
-from slideviz.rbf.images import require_free, spread
+from slideviz.rbf.images import Spread, require_free
 
 APART = 100.0
 """How much more images may differ in their displacement than in their place, both relative."""
@@ -97,16 +97,16 @@ def prescribed(
         raise DeformError(
             f"{mesh.name}: no boundary node has a known displacement; make a marker moving"
         )
-    values = np.zeros(mesh.points.shape)
-    values[moved.nodes] = frame.difference(mesh.points[moved.nodes], moved.vectors)
-    largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
+    vectors = frame.difference(mesh.points[moved.nodes], moved.vectors)
+    largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
     allowed = tolerance * largest + ROUNDING * largest_coordinate(mesh.points)
-    values, source = spread(values, moved.nodes, classes.stands, allowed)
+    spread = Spread(moved.nodes, vectors, classes.stands)
+    spread.require_alike(allowed)
     follow = np.setdiff1d(classes.moving, moved.nodes)
     if len(follow):
-        alone = find_classes(case, mesh, boundary, fans, frame, np.arange(len(values)))
+        alone = find_classes(case, mesh, boundary, fans, frame, np.arange(len(mesh.points)))
         coords = frame.coords(mesh.points)
         corners = corners_of(coords, boundary.facets, on_axis(frame, coords))
         normals = fan_normals(boundary, fans, coords, corners)
-        require_free(values, source, follow, alone, normals, allowed)
-    return known, values[known], (*moved.warnings, *((remark,) if remark else ()))
+        require_free(spread, follow, alone, normals, allowed)
+    return known, spread.at(known), (*moved.warnings, *((remark,) if remark else ()))

@@ -15,7 +15,7 @@ from slideviz.deformation.steps import Progress, Step, Trial
 from slideviz.errors import DeformError, Note, UnsoundError
 from slideviz.mesh.check import within
 from slideviz.mesh.halo import Halo
-from slideviz.mesh.model import FloatArray, Mesh
+from slideviz.mesh.model import FloatArray, Mesh, sealed
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE
@@ -146,7 +146,7 @@ class Stepping:
         return Step(
             index=index,
             total=total,
-            mesh=moved_boxes(self.case, self.mesh, part).with_points(points),
+            mesh=moved_boxes(self.case, self.mesh, part).with_points(sealed(points)),
             control_nodes=solution.control_nodes,
             max_error=solution.max_error,
             condition=solution.condition,

@@ -32,7 +32,7 @@ from slideviz.errors import (
 )
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE
-from slideviz.rbf.images import FAR, largest_misfit, misfits, spread
+from slideviz.rbf.images import FAR, Spread, largest_misfit, misfits
 from slideviz.rbf.problem import Solution
 from slideviz.rbf.refine import TRUSTED
 
@@ -290,11 +290,10 @@ class Deformer:
         setup, mesh = self._setup, self.mesh
         for each in vectors.reshape(-1, *vectors.shape[-2:]):
             moved = displaced(Displacements(self.nodes, each), mesh)
-            values = np.zeros(mesh.points.shape)
-            values[moved.nodes] = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
-            largest = float(np.linalg.norm(values[moved.nodes], axis=1).max(initial=0.0))
+            there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
+            largest = float(np.linalg.norm(there, axis=1).max(initial=0.0))
             allowed = TOLERANCE * largest + ROUNDING * self._size
-            spread(values, moved.nodes, setup.classes.stands, allowed)
+            Spread(moved.nodes, there, setup.classes.stands).require_alike(allowed)
 
     def _run(self, target: Array) -> list[State]:
         """Return the states after all steps."""

@@ -11,7 +11,7 @@ from slideviz.deformation.prescribed import displaced
 from slideviz.deformation.setup import Setup
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
-from slideviz.rbf.images import spread
+from slideviz.rbf.images import Spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class Input:
 def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
     """Return how the displacement of known nodes follows from that of the moving nodes."""
     moved = displaced(asked, mesh)
-    _, source = spread(np.zeros(mesh.points.shape), moved.nodes, setup.classes.stands, 0.0)
-    of_known = source[setup.known]
+    spread = Spread(moved.nodes, moved.vectors, setup.classes.stands)
+    of_known = spread.source(setup.known)
     known = np.flatnonzero(of_known >= 0)
     nodes, place = np.unique(of_known[known], return_inverse=True)
     given, turn = nodes.copy(), None
@@ -61,7 +61,7 @@ def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
             f"{mesh.name}: node {nodes[~inside][0]} is a copy of node {given[~inside][0]}, which "
             "is on no moving marker; give both the same role"
         )
-    lead = source[moved.nodes]
+    lead = spread.source(moved.nodes)
     others = np.flatnonzero(lead != moved.nodes)
     return Input(
         frozen_array(mesh.points[nodes], np.float64),

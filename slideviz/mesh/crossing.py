@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slideviz.mesh.model import column_bounds
+from slideviz.mesh.model import column_bounds, sorted_nodes
 from slideviz.mesh.planes import Planes, Surface, line_normals, normals
 
 if TYPE_CHECKING:
@@ -115,12 +115,14 @@ def swept_crossing(
         An element has another dimension than a boundary.
     """
     before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
-    going = np.flatnonzero(reduce(np.logical_or, (before != after).T))
+    goes = reduce(np.logical_or, (before != after).T)
+    going = np.flatnonzero(goes)
     body = Surface.of(moved, after.shape[1])
     for name, cells in others:
         wall = Surface.of(cells, after.shape[1]).without(going)
         free = body.without(cells.nodes)
-        nodes = np.intersect1d(free.nodes, going)
+        nodes = sorted_nodes(free.nodes)
+        nodes = nodes[goes[nodes]]
         if not (len(nodes) and len(wall)):
             continue
         margin = max(_margin(before, free, wall), _margin(after, free, wall))

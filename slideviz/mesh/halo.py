@@ -167,11 +167,14 @@ def _touching(cells: Cells, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
-def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray]:
-    """Return the domain alone, all points kept in their places, and its cells' ids (k,)."""
+def without_halo(mesh: Mesh) -> tuple[Mesh, IntArray | None]:
+    """Return the domain alone, all points kept in their places, and its cells' ids (k,).
+
+    None for the ids where there is no halo: then they are those of the mesh.
+    """
     halo = mesh.halo
     if halo is None:
-        return mesh, np.arange(len(mesh.cells))
+        return mesh, None
     beyond = halo.of_nodes(len(mesh.points))
     markers = tuple(
         Marker(marker.name, marker.cells.take(~_touching(marker.cells, beyond)))

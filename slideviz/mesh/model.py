@@ -21,6 +21,13 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+def sealed(values: NDArray) -> NDArray:
+    """Return the same numbers read-only, without a copy: nobody else must write to them."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
+
+
 def frozen_array(values: ArrayLike, dtype: type) -> NDArray:
     """Return ``values`` as a C-contiguous, read-only array; copies what is writable."""
     array: NDArray = np.ascontiguousarray(values, dtype=dtype)
@@ -77,14 +84,17 @@ class Cells:
             An identifier is not in ``ELEMENTS``, or the connectivity has another length.
         """
         ids = frozen_array(types, np.uint8)
-        counts = SIZES[ids]
+        counts = SIZES[ids] if ids.min(initial=255) < ids.max(initial=0) else SIZES[ids[:1]]
         if np.any(counts == 0):
             raise MeshError(f"element type {ids[np.argmin(counts)]} is not supported")
-        offsets = np.concatenate(([0], np.cumsum(counts)))
+        if len(counts) == len(ids):
+            offsets = np.concatenate(([0], np.cumsum(counts)))
+        else:  # all of one type
+            offsets = np.arange(0, counts[0] * len(ids) + 1, counts[0])
         flat = frozen_array(connectivity, np.int64)
         if flat.shape != (offsets[-1],):
             raise MeshError(f"{offsets[-1]} node indices are needed, {flat.size} are given")
-        return cls(ids, frozen_array(offsets, np.int64), flat)
+        return cls(ids, sealed(offsets), flat)
 
     @classmethod
     def from_blocks(cls, blocks: Iterable[tuple[int, ArrayLike]]) -> Cells:
@@ -103,20 +113,23 @@ class Cells:
     def by_type(self) -> dict[int, tuple[IntArray, IntArray]]:
         """For each VTK identifier present: element ids (m_t,), nodes (m_t, n_t)."""
         found = {}
-        for vtk in np.flatnonzero(np.bincount(self.types)).tolist():
-            ids, width = np.flatnonzero(self.types == vtk), ELEMENTS[vtk].n_nodes
+        alike = len(self) > 0 and self.types.min() == self.types.max()
+        present = self.types[:1] if alike else np.flatnonzero(np.bincount(self.types))
+        for vtk in present.tolist():
+            ids = np.arange(len(self)) if alike else np.flatnonzero(self.types == vtk)
+            width = ELEMENTS[vtk].n_nodes
             if ids[-1] - ids[0] + 1 == len(ids):  # one block: nothing need be copied
                 block = self.connectivity[self.offsets[ids[0]] : self.offsets[ids[-1] + 1]]
                 nodes = block.reshape(-1, width)
             else:
                 nodes = self.connectivity[self.offsets[ids][:, None] + np.arange(width)]
-            found[vtk] = (frozen_array(ids, np.int64), frozen_array(nodes, np.int64))
+            found[vtk] = sealed(ids), sealed(nodes)
         return found
 
     @cached_property
     def nodes(self) -> IntArray:
         """Return the indices of all nodes used, sorted, each once: (u,)."""
-        return frozen_array(sorted_nodes(self.connectivity), np.int64)
+        return sealed(sorted_nodes(self.connectivity))
 
     def __repr__(self) -> str:
         found = ", ".join(

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.jacobians import CORNERS, write_corners
 from slideviz.mesh.metrics import total
-from slideviz.mesh.model import Mesh, frozen_array
+from slideviz.mesh.model import Mesh, sealed
 from slideviz.mesh.threads import in_parts
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def reference_of(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int8]]:
         sums = corner_sums(mesh)
         signs = orientation(mesh.cells, sums)
         sums *= signs
-        found = _REFERENCES[mesh] = frozen_array(sums, np.float64), frozen_array(signs, np.int8)
+        found = _REFERENCES[mesh] = sealed(sums), sealed(signs)
     return found
 
 

@@ -9,12 +9,14 @@ finds far too many; boxes adapt to each.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from slideviz.errors import MeshError
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.model import column_bounds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -77,17 +79,20 @@ class Surface:
 
     def without(self, nodes: IntArray) -> Surface:
         """Return the surface without the facets that have any of ``nodes``."""
-        held = self.facet[np.isin(self.nodes, nodes).any(axis=1)]
-        return self.keep(~np.isin(self.facet, held)) if len(held) else self
+        marked = np.zeros(max(self.nodes.max(initial=0), nodes.max(initial=0)) + 1, bool)
+        marked[nodes] = True
+        held = np.zeros(int(self.facet.max(initial=0)) + 1, bool)
+        held[self.facet[marked[self.nodes].any(axis=1)]] = True
+        return self.keep(~held[self.facet])
 
     def within(self, points: FloatArray, other: Surface, margin: float) -> Surface:
         """Return the simplices that the box around ``other`` touches; points are (n, d)."""
         if not len(other):
             return other
-        space, corners = points[other.nodes.ravel()], points[self.nodes]
-        low, high = space.min(axis=0) - margin, space.max(axis=0) + margin
-        meets = (corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)
-        return self.keep(meets.all(axis=1))
+        low, high = column_bounds(points[other.nodes.ravel()])
+        below, above = boxes(points[self.nodes])
+        meets = (below <= high + margin) & (above >= low - margin)
+        return self.keep(np.asarray(meets.all(axis=1)))
 
     @property
     def edges(self) -> IntArray:
@@ -123,7 +128,7 @@ class BoxTree:
             # Each block is cut in two at the median of its longest axis.
             block = order.reshape(1 << level, -1)
             at = centre[block]
-            axis = np.ptp(at, axis=1).argmax(axis=1)
+            axis = (at.max(axis=1) - at.min(axis=1)).argmax(axis=1)
             along = np.take_along_axis(at, axis[:, None, None], axis=2)[..., 0]
             order = np.take_along_axis(block, along.argsort(axis=1, kind="stable"), axis=1).ravel()
         filler = (order < 0)[:, None]
@@ -151,7 +156,8 @@ class BoxTree:
         margin : float
             What is as far off as this is near.
         """
-        low, high = corners.min(axis=1) - margin, corners.max(axis=1) + margin
+        low, high = boxes(corners)
+        low, high = low - margin, high + margin
         query, node = np.arange(len(low)), np.zeros(len(low), np.int64)
         for depth, (below, above) in enumerate(self.levels):
             if depth:
@@ -200,7 +206,7 @@ class Planes:
         sides = np.roll(corners, -1, axis=1) - corners
         upright = normals(corners)
         inwards = np.cross(upright[:, None], sides) if corners.shape[2] == 3 else sides
-        tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+        tree = BoxTree.of(*boxes(corners))
         return cls(corners, upright, _unit(inwards), tree, margin)
 
     def near(self, corners: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray]:
@@ -255,6 +261,12 @@ class Planes:
         crosses = (height[:, None] * turn < 0) & (inner | (at > 0)).all(axis=3)
         odd = crosses.sum(axis=2) % 2 == 1
         return bool((odd != odd[0]).all(axis=1).any())
+
+
+def boxes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and highest coordinates of some corners (s, k, d): (s, d), (s, d)."""
+    each = corners.swapaxes(0, 1)  # one corner after the other is four times as fast
+    return reduce(np.minimum, each), reduce(np.maximum, each)
 
 
 def normals(corners: FloatArray) -> FloatArray:

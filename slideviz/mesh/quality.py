@@ -26,7 +26,7 @@ from slideviz.mesh.jacobians import (
     write_corners,
 )
 from slideviz.mesh.metrics import METRICS, total
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, sealed
 from slideviz.mesh.orientation import reference_of
 from slideviz.mesh.quality_derivative import QualityDerivative, derivative_of
 from slideviz.mesh.threads import in_parts
@@ -219,10 +219,10 @@ def quality(
 
         in_parts(partial(of_part, vtk=vtk, ids=ids, nodes=nodes), len(ids), lambda _: going_on())
     found = Quality(
-        values=frozen_array(values, np.float64),
-        size=frozen_array(size, np.float64),
-        skew=frozen_array(skew, np.float64),
-        status=frozen_array(status, np.uint8),
+        values=sealed(values),
+        size=sealed(size),
+        skew=sealed(skew),
+        status=sealed(status),
         signs=signs,
         metric=metric,
         halo=None if mesh.halo is None else mesh.halo.cells,

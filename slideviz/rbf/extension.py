@@ -32,9 +32,10 @@ def surface_extension(
     reach : float
         How far the extension goes.
     """
-    inside = member[boundary.joints]
-    rim = (inside.sum(axis=1) == 1) & moving[boundary.joint_nodes].all(axis=1)
-    facet = np.where(inside[:, 0], boundary.joints[:, 0], boundary.joints[:, 1])[rim]
+    one, two = boundary.joints.T
+    rim = np.flatnonzero(member[one] != member[two])
+    rim = rim[moving[boundary.joint_nodes[rim]].all(axis=1)]
+    facet = np.where(member[one[rim]], one[rim], two[rim])
     ends = place(boundary.joint_nodes[rim])
     sides = place(boundary.facets[facet])
     if not len(facet):

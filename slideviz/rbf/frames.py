@@ -23,7 +23,7 @@ import numpy as np
 from slideviz.mesh.axis_frame import along, axis_basis, in_axis_frame
 from slideviz.mesh.model import FloatArray
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.threads import in_parts
+from slideviz.mesh.threads import PART, in_parts
 
 SECTORS = 1 << 12
 """Into how many the circle is divided to find the largest empty one."""
@@ -66,25 +66,20 @@ class Frame:
         """Return coordinates (n, d) of Cartesian points (n, d)."""
         if self.axis is None or self.origin is None:
             return np.array(points, float)
-        out = np.empty((len(points), self.dim))
+        return self.of_polar(polar(points, self.axis, self.origin))
 
-        def fill(part: slice) -> None:
-            out[part] = self._cylindrical(points[part])
+    def of_polar(self, polar: FloatArray) -> FloatArray:
+        """Return coordinates in a cylindrical frame of what `polar` returns, in its place."""
 
-        in_parts(fill, len(points))
-        return out
+        def turn(part: slice) -> None:
+            angle = polar[part, 1] - self.theta0
+            angle = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+            # Theta means nothing on the axis: take the middle.
+            angle[polar[part, 0] <= 1e-9 * self.radius] = 0.0
+            polar[part, 1] = self.radius * angle
 
-    def _cylindrical(self, points: FloatArray) -> FloatArray:
-        """Return (r, rho theta[, z]) of points (n, d)."""
-        assert self.axis is not None
-        assert self.origin is not None
-        local = in_axis_frame(points, self.axis, self.origin)
-        angle = np.arctan2(local[:, 1], local[:, 0]) - self.theta0
-        angle = np.mod(angle + np.pi, 2 * np.pi) - np.pi
-        r = np.hypot(local[:, 0], local[:, 1])
-        angle[r <= 1e-9 * self.radius] = 0.0  # theta means nothing on the axis: take the middle
-        columns = [r, self.radius * angle, local[:, 2]]
-        return np.stack(columns[: self.dim], axis=1)
+        in_parts(turn, len(polar))
+        return polar
 
     def points(self, coords: FloatArray) -> FloatArray:
         """Return Cartesian points (n, d) of coordinates (n, d)."""
@@ -178,13 +173,25 @@ def _across(direction: FloatArray) -> FloatArray:
     return axis_basis(direction)[:2]
 
 
+def polar(points: FloatArray, axis: FloatArray, origin: FloatArray) -> FloatArray:
+    """Return (r, theta[, z]) about an axis, (n, d), of Cartesian points (n, d)."""
+    out = np.empty(points.shape)
+
+    def fill(part: slice) -> None:
+        local = in_axis_frame(points[part], axis, origin)
+        out[part, 0] = np.hypot(local[:, 0], local[:, 1])
+        out[part, 1] = np.arctan2(local[:, 1], local[:, 0])
+        if points.shape[1] == 3:
+            out[part, 2] = local[:, 2]
+
+    in_parts(fill, len(points))
+    return out
+
+
 def make_frame(
-    points: FloatArray,
-    pairs: Sequence[Pair],
-    *,
-    periodic_distance: bool,
-) -> Frame:
-    """Return the frame that periodic pairs ask for.
+    points: FloatArray, pairs: Sequence[Pair], *, periodic_distance: bool
+) -> tuple[Frame, FloatArray]:
+    """Return the frame that periodic pairs ask for, and the coordinates (n, d) in it.
 
     Parameters
     ----------
@@ -197,44 +204,45 @@ def make_frame(
     """
     dim = points.shape[1]
     if pairs and pairs[0].kind == "translational":
-        if not periodic_distance:
-            return Frame(dim)
         length = pairs[0].period
-        return Frame(dim, direction=pairs[0].vector / length, period=length)
+        direction = pairs[0].vector / length
+        frame = Frame(dim, direction, length) if periodic_distance else Frame(dim)
+        return frame, frame.coords(points)
     if not pairs:
-        return Frame(dim)
+        return Frame(dim), Frame(dim).coords(points)
     axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else np.asarray(pairs[0].axis, float)
     origin = np.asarray(pairs[0].origin, float)
-    radii, angles = np.empty((2, len(points)))
-
-    def fill(part: slice) -> None:
-        local = in_axis_frame(points[part], axis, origin)
-        radii[part] = np.hypot(local[:, 0], local[:, 1])
-        angles[part] = np.arctan2(local[:, 1], local[:, 0])
-
-    in_parts(fill, len(points))
-    return Frame(
+    found = polar(points, axis, origin)
+    frame = Frame(
         dim,
         period=pairs[0].period if periodic_distance else 0.0,
         axis=axis,
         origin=origin,
-        theta0=_middle_angle(angles[radii > 1e-9 * radii.max()]),
+        theta0=_middle_angle(*found[:, :2].T),
         # The largest radius, so that no error of an angle is longer than its frame component.
-        radius=float(radii.max()),
+        radius=float(found[:, 0].max()),
     )
+    return frame, frame.of_polar(found)
 
 
-def _middle_angle(angles: FloatArray) -> float:
-    """Return the angle opposite the middle of the largest empty sector."""
+def _middle_angle(radii: FloatArray, angles: FloatArray) -> float:
+    """Return the angle opposite the middle of the largest empty sector; the axis is in none."""
     # Of each of many narrow sectors the ends: nothing else borders on an empty sector.
-    narrow = np.clip((angles + np.pi) * (SECTORS / (2 * np.pi)), 0, SECTORS - 1).astype(np.int32)
-    low, high = np.full(SECTORS, np.inf), np.full(SECTORS, -np.inf)
-    np.minimum.at(low, narrow, angles)
-    np.maximum.at(high, narrow, angles)
+    least, parts = 1e-9 * radii.max(), -(-len(radii) // PART)
+    lows, highs = np.full((parts, SECTORS), np.inf), np.full((parts, SECTORS), -np.inf)
+
+    def look(part: slice) -> None:
+        some, row = angles[part][radii[part] > least], part.start // PART
+        sector = np.clip((some + np.pi) * (SECTORS / (2 * np.pi)), 0, SECTORS - 1).astype(np.intp)
+        np.minimum.at(lows[row], sector, some)
+        np.maximum.at(highs[row], sector, some)
+
+    in_parts(look, len(radii))
+    low, high = lows.min(axis=0), highs.max(axis=0)
     ordered = np.stack([low, high], axis=1)[low <= high].ravel()
     gaps = _gaps(ordered)
     if gaps.max() <= 4 * np.pi / SECTORS:
-        ordered = np.sort(angles)
+        ordered = np.sort(angles[radii > least])
         gaps = _gaps(ordered)
     widest = int(np.argmax(gaps))
     return float(ordered[widest] + gaps[widest] / 2 + np.pi)

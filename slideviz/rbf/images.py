@@ -10,6 +10,8 @@ that it made whether they moved alike. Which markers are pairs is found in
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,6 +19,7 @@ from scipy.spatial import cKDTree
 from slideviz.errors import NodeError
 from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
 from slideviz.mesh.periodic import Pair
+from slideviz.mesh.threads import cores
 from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.constraint_rows import refuse
@@ -58,7 +61,10 @@ def find_images(
     near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
     # Nearly all have none one period away, and a search without bound takes long to find that out.
     tree, moved = cKDTree(coords[nodes]), coords[nodes] + frame.shift()
-    gap, at = (np.asarray(part) for part in tree.query(moved, distance_upper_bound=2.0 * near))
+    gap, at = (
+        np.asarray(part)
+        for part in tree.query(moved, distance_upper_bound=2.0 * near, workers=cores())
+    )
     found = np.flatnonzero(gap <= near)
     twins = np.stack([nodes[found], nodes[at[found]]], axis=1)
     links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])
@@ -70,42 +76,52 @@ def find_images(
     return stands
 
 
-def spread(
-    values: FloatArray, given: IntArray, stands: IntArray, allowed: float
-) -> tuple[FloatArray, IntArray]:
-    """Return the displacements (n, d) with those of given nodes at all their images.
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """The displacements of given nodes, at all their images.
 
-    Second, the given node (n,) that each has its displacement from; -1 for none.
-
-    Parameters
+    Attributes
     ----------
-    values : (n, d)
-        Displacements in the frame, of which those of ``given`` (k,) count; all others become 0.
-    allowed : float
-        By how much the given displacements of images may differ.
-
-    Raises
-    ------
-    DeformError
-        They differ by more.
+    given : (k,) int64
+        Sorted, each once.
+    vectors : (k, d) float64
+        Their displacements in the frame.
+    stands : (n,) int64
+        For each node the one of its periodic images that stands for all of them.
     """
-    source = np.full(len(values), -1, np.int64)
-    source[stands[given[::-1]]] = given[::-1]
-    images = np.flatnonzero(stands != np.arange(len(stands)))
-    source[images] = source[stands[images]]
-    gap = np.abs(values[given] - values[source[given]]).max(axis=1, initial=0.0)
-    if gap.max(initial=0.0) > allowed:
-        row = int(np.argmax(gap))
-        refuse(int(given[row]), int(source[given[row]]), float(gap[row]))
-    # Memory for zeros is taken when something is written, but not by `zeros_like`.
-    out, rows = np.zeros(values.shape), np.flatnonzero(source >= 0)
-    out[rows] = values[source[rows]]
-    return out, source
+
+    given: IntArray
+    vectors: FloatArray
+    stands: IntArray
+
+    @cached_property
+    def _row(self) -> IntArray:
+        """Where the first given image of a node stands in ``given``, from 1; 0 for none."""
+        # Memory for zeros is taken only where something is written.
+        row = np.zeros(len(self.stands), np.int64)
+        row[self.stands[self.given[::-1]]] = np.arange(len(self.given), 0, -1)
+        return row
+
+    def source(self, nodes: IntArray) -> IntArray:
+        """Return the given node that nodes (m,) have their displacements from; -1 for none."""
+        return np.r_[-1, self.given][self._row[self.stands[nodes]]]
+
+    def at(self, nodes: IntArray) -> FloatArray:
+        """Return the displacements (m, d) of nodes (m,), zero for those without a source."""
+        row = self._row[self.stands[nodes]]
+        return np.concatenate([np.zeros((1, self.vectors.shape[1])), self.vectors])[row]
+
+    def require_alike(self, allowed: float) -> None:
+        """Raise DeformError when given displacements of images differ by more than ``allowed``."""
+        gap = np.abs(self.vectors - self.at(self.given)).max(axis=1, initial=0.0)
+        if gap.max(initial=0.0) > allowed:
+            worst = int(np.argmax(gap))
+            node = self.given[worst]
+            refuse(int(node), int(self.source(node[None])[0]), float(gap[worst]))
 
 
 def require_free(
-    values: FloatArray,
-    source: IntArray,
+    spread: Spread,
     nodes: IntArray,
     classes: Classes,
     normals: FloatArray,
@@ -115,8 +131,6 @@ def require_free(
 
     Parameters
     ----------
-    values, source : (n, d), (n,)
-        As ``spread`` returns them.
     nodes : (m,)
         Those that move only because an image does.
     classes
@@ -124,14 +138,14 @@ def require_free(
     normals : (m, d)
         Of all fans, in the frame.
     """
-    off = np.zeros(len(values))
+    off = np.zeros(classes.total)
     held = classes.fixed[np.isin(classes.fixed, nodes)]
-    off[held] = np.abs(values[held]).max(axis=1, initial=0.0)
+    off[held] = np.abs(spread.at(held)).max(axis=1, initial=0.0)
     rows, across = directions(classes, normals)
-    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", values[rows], across)))
+    np.maximum.at(off, rows, np.abs(np.einsum("qd,qd->q", spread.at(rows), across)))
     worst = int(nodes[np.argmax(off[nodes])])
     if off[worst] > allowed:
-        refuse(worst, int(source[worst]), float(off[worst]))
+        refuse(worst, int(spread.source(np.array([worst]))[0]), float(off[worst]))
 
 
 def misfits(frame: Frame, coords: FloatArray, points: FloatArray, images: IntArray) -> FloatArray:

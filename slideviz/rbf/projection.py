@@ -10,11 +10,13 @@ they go on beyond the periodic boundaries: on what begins at the other one.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.threads import cores
 from slideviz.mesh.topology import Boundary, Fans, components, corner_vectors, find_joints, unit
 from slideviz.rbf.classify import MERGE_FRACTION, Classes
 from slideviz.rbf.closest import ClosestPoints
@@ -90,7 +92,7 @@ def find_tracks(
         How far tracks are continued where moving boundaries stand on them.
     """
     of_node = np.full(classes.total, -1, np.int64)
-    tracks: list[ClosestPoints] = []
+    simplices: list[FloatArray] = []
     curved = False
     moving = np.zeros(classes.total, bool)
     moving[classes.moving] = reach > 0
@@ -104,19 +106,20 @@ def find_tracks(
     row_node = classes.cluster_node[classes.row_cluster]
     for nodes, chosen in _by_surfaces(on_surface, row_node, row_label):
         member = np.isin(labels, chosen)
-        of_node[nodes] = len(tracks)
+        of_node[nodes] = len(simplices)
         curved |= _bends(vectors[member])
         beyond = surface_extension(boundary, member, moving, place, reach)
-        corners = np.concatenate([_simplices(place(boundary.facets[member])), beyond])
-        tracks.append(ClosestPoints(corners, shift))
+        simplices.append(np.concatenate([_simplices(place(boundary.facets[member])), beyond]))
     if boundary.dim == 3:
         for nodes, ends in _edge_chains(boundary, fans, classes):
-            of_node[nodes] = len(tracks)
+            of_node[nodes] = len(simplices)
             corners = place(ends)
             curved |= _bends(corners[:, 1] - corners[:, 0], either_way=True)
-            corners = np.concatenate([corners, edge_extension(ends, moving, place, reach)])
-            tracks.append(ClosestPoints(corners, shift))
-    return Tracks(tuple(tracks), of_node, bool(curved))
+            beyond = edge_extension(ends, moving, place, reach)
+            simplices.append(np.concatenate([corners, beyond]))
+    with ThreadPoolExecutor(cores()) as pool:
+        tracks = tuple(pool.map(lambda corners: ClosestPoints(corners, shift), simplices))
+    return Tracks(tracks, of_node, bool(curved))
 
 
 def _across(boundary: Boundary, stands: IntArray, roles: Mapping[str, str]) -> IntArray:

@@ -62,7 +62,7 @@ def test_periodic_distances_are_those_of_the_frame(dim, kind):
     where = {"vector": (0.0, 1.3, 0.0)} if kind == "translational" else {"angle": period}
     pair = builders.pair(kind, dim, **where)
     targets, sources = cloud(20, dim), cloud(15, dim, 1)
-    frame = make_frame(np.concatenate([targets, sources]), [pair], periodic_distance=True)
+    frame, _ = make_frame(np.concatenate([targets, sources]), [pair], periodic_distance=True)
     values, ones = np.random.default_rng(2).normal(size=(15, dim)), np.ones(15)
     features = [frame.features(frame.coords(p)) for p in (targets, sources)]
     basis = Basis(2.5, frame.period if frame.cylindrical else 0.0)

@@ -31,17 +31,17 @@ def frames(dim):
         "translational": (
             make_frame(
                 x, [builders.pair("translational", dim, (0, -1.1, 0))], periodic_distance=True
-            ),
+            )[0],
             radial.translational(1.1, 1),
             x,
         ),
         "cylindrical": (
-            make_frame(x, [rotation], periodic_distance=False),
+            make_frame(x, [rotation], periodic_distance=False)[0],
             radial.cylindrical,
             polar(x),
         ),
         "rotational": (
-            make_frame(x, [rotation], periodic_distance=True),
+            make_frame(x, [rotation], periodic_distance=True)[0],
             radial.rotational(pi / 6),
             polar(x),
         ),
