@@ -42,10 +42,7 @@ class Files(QObject):
         self.saving = False
         self._answered = False
         self.after_save: Callable[[], object] | None = None
-        window.running.ended.connect(self._job_ended)
-
-    def _job_ended(self) -> None:
-        self.saving = False
+        window.running.ended.connect(lambda: setattr(self, "saving", False))
 
     # Open ------------------------------------------------------------------------------
 
@@ -129,10 +126,9 @@ class Files(QObject):
             self.remember(path)
         self.window.show_opened(opened)
         mesh = session.mesh
-        log.info(
-            "opened %s: %dD, %d cells, %d points, %d boundaries",
-            session.path, mesh.dim, len(mesh.cells), len(mesh.points), len(mesh.markers),
-        )  # fmt: skip
+        counts = len(mesh.cells), len(mesh.points), len(mesh.markers)
+        words = "opened %s: %dD, %d cells, %d points, %d boundaries"
+        log.info(words, session.path, mesh.dim, *counts)
 
     def may_go_on(self, again: Callable[[], object], before: str = "opening another mesh") -> bool:
         """Ask about unsaved work; return whether it may be dropped or was saved.
@@ -145,16 +141,19 @@ class Files(QObject):
         before : str
             What the changes would be lost by, in words.
         """
-        designs = self.window.docks_.panel(DesignsPanel).unsaved
-        unsaved = Unsaved.of(self.window.store.session, self.window.runner.busy, designs)
+        window, designs = self.window, self.window.docks_.panel(DesignsPanel)
+        words = designs.unsaved, designs.unsaved_results
+        unsaved = Unsaved.of(window.store.session, window.runner.busy, *words)
         if self._answered or not unsaved.what:
             return True
         question = unsaved.question(before)
         answer = questions.ask_unsaved(self.window, question, unsaved.can_save)
         # What else there is was in the question, too: it is not asked about again.
-        if answer in ("case", "both") and not self.save_case():
+        wanted = unsaved.can_save if answer == "all" else [answer]
+        savers = {"case": self.save_case, "table": designs.save_table}
+        if not all(save() for name, save in savers.items() if name in wanted):
             return False
-        if answer in ("mesh", "both"):
+        if "mesh" in wanted:
             self.save_mesh(last=True, then=lambda: self._go_on(again))
             return False
         return answer != "cancel"

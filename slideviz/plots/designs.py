@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,9 @@ RESULTS = {
 _MOST_LINES = 12
 """Curves that are told apart by colours; of more, points are drawn."""
 _MOST_WORDS = 12
+_SIGN, _AXIS, _HIGHEST = 7, 0.6, 0.35
+"""Letters that have the room of a sign in the legend and of the gap beside it; inches of the words
+at the left of the axes; the part of the figure that a legend above the axes may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +73,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
     Values that are no numbers stand in the order in which they come in the table.
     """
     at = table.columns.index(column)
-    words = list(dict.fromkeys(row[at] for row in table.rows))
-    numeric = all(is_number(word) for word in words)
+    place_of, words = _places(table, column)
     groups: dict[tuple[str, ...], list[Row]] = {}
     for number, row in sorted(table.results.items()):
         if not row.problem:
@@ -79,8 +82,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
     others = [name for name in table.columns if name != column]
     found = []
     for rest, rows in groups.items():
-        texts = [table.rows[row.design - 1][at] for row in rows]
-        places = _numbers(float(text) if numeric else words.index(text) for text in texts)
+        places = _numbers(place_of[table.rows[row.design - 1][at]] for row in rows)
         order = np.argsort(places, kind="stable")
         name = "min" if what == "quality" else what
         found.append(
@@ -91,11 +93,27 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
                 _numbers(getattr(row, name) for row in rows)[order],
                 _numbers(row.mean for row in rows)[order],
                 np.array([row.inverted > 0 for row in rows])[order],
-                () if numeric else tuple(words),
+                words,
                 ",\n".join(others),
             )
         )
     return found
+
+
+def failed_designs(table: DesignTable, column: str) -> dict[int, float]:
+    """Return the place of each design that failed along a column, by its number."""
+    at, (place_of, _) = table.columns.index(column), _places(table, column)
+    failed = (number for number, row in sorted(table.results.items()) if row.problem)
+    return {number: place_of[table.rows[number - 1][at]] for number in failed}
+
+
+def _places(table: DesignTable, column: str) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the place of each text of a column, and the words there if they are no numbers."""
+    at = table.columns.index(column)
+    words = tuple(dict.fromkeys(row[at] for row in table.rows))
+    if all(is_number(word) for word in words):
+        return {word: float(word) for word in words}, ()
+    return {word: float(place) for place, word in enumerate(words)}, words
 
 
 def against_designs(
@@ -105,11 +123,14 @@ def against_designs(
     what: str = "quality",
     shown: int | None = None,
     style: Style = PRINT,
+    *,
+    failed: Mapping[int, float] = MappingProxyType({}),
 ) -> None:
     """Draw a result of designs against a column: points, joined where only the column varies.
 
     Of the quality both the minimum (filled) and the mean (hollow) are drawn. Designs with inverted
-    cells are crosses. The design ``shown`` has a ring.
+    cells are crosses, those that ``failed`` (see `failed_designs`) bold ones on the axis. The
+    design ``shown`` has a ring.
     """
     dress(axes, style, column, RESULTS[what])
     several = len(curves) <= _MOST_LINES
@@ -120,7 +141,18 @@ def against_designs(
             ring: dict[str, Any] = {"markersize": 11, "markeredgewidth": 2.2, "zorder": 5}
             ring |= {"markerfacecolor": "none", "markeredgecolor": SELECTED_COLOUR}
             axes.plot(curve.places[k], curve.values[k], "o", gid="shown", clip_on=False, **ring)
-    if what == "quality":
+    if failed:
+        bold: dict[str, Any] = {"color": style.alarm, "markersize": 8, "linestyle": ""}
+        bold |= {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 4}
+        places = list(failed.values())
+        axes.plot(
+            places, [0.0] * len(places), marker="X", gid="failed", label="failed", mew=0.4, **bold
+        )
+        if not curves:
+            axes.set_yticks([])
+    if any(curve.inverted.any() for curve in curves):
+        axes.plot([], [], "x", color=style.alarm, label="inverted")
+    if what == "quality" and curves:
         for word, face in (("minimum", style.scheme.text), ("mean", style.scheme.background)):
             dot: dict[str, Any] = {"markerfacecolor": face, "color": style.scheme.text}
             axes.plot([], [], "o", markersize=5, label=word, **dot)
@@ -129,14 +161,29 @@ def against_designs(
         every = -(-len(words) // _MOST_WORDS)
         axes.set_xticks(range(0, len(words), every), words[::every])
     else:
-        axes.locator_params(axis="x", nbins=4)  # there is a legend beside, and little room
+        axes.locator_params(axis="x", nbins=4)  # there is little room
     if several:
         title = curves[0].others if curves and len(curves) > 1 else ""
-        beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
-        add_legend(axes, style, title=title, title_fontsize=style.size, **beside)
+        where = _legend_place(axes, style)
+        add_legend(axes, style, title=title, title_fontsize=style.size, handlelength=2.0, **where)
         legend = axes.get_legend()
         if legend is not None:
             legend.get_title().set_color(style.scheme.text)
+
+
+def _legend_place(axes: Axes, style: Style) -> dict[str, Any]:
+    """Return where the legend is: above the axes, beside them where it would be too high there."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    words = axes.get_legend_handles_labels()[1]
+    letter = 0.62 * style.size / 72.0  # inches
+    wide = max((len(word) for word in words), default=0) + _SIGN
+    columns = max(min(int((figure.get_figwidth() - _AXIS) / letter / wide), len(words)), 1)
+    rows = -(-len(words) // columns)
+    if rows * 1.3 * style.size / 72.0 > _HIGHEST * figure.get_figheight():
+        return {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+    above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "columnspacing": 1.2}
+    return {**above, "ncols": columns}
 
 
 def _draw_curve(
@@ -164,7 +211,13 @@ def _draw_curve(
         axes.plot(places, values, marker="x", clip_on=False, gid="inverted", **cross)
 
 
-def nearest_design(axes: Axes, curves: Sequence[DesignCurve], x: float, y: float) -> int | None:
+def nearest_design(
+    axes: Axes,
+    curves: Sequence[DesignCurve],
+    x: float,
+    y: float,
+    failed: Mapping[int, float] = MappingProxyType({}),
+) -> int | None:
     """Return the design whose point is nearest to (x, y): pixels of the figure, y upwards."""
     best: tuple[float, int] | None = None
     for curve in curves:
@@ -175,6 +228,11 @@ def nearest_design(axes: Axes, curves: Sequence[DesignCurve], x: float, y: float
                 k = int(np.nanargmin(away))
                 if best is None or away[k] < best[0]:
                     best = float(away[k]), int(curve.design[k])
+    for design, place in failed.items():
+        spot = axes.get_xaxis_transform().transform((place, 0.0))
+        far = float(np.hypot(*(spot - (x, y))))
+        if best is None or far < best[0]:
+            best = far, design
     return None if best is None else best[1]
 
 

@@ -138,8 +138,7 @@ def add_legend(axes: Axes, style: Style, **options: Any) -> None:
         facecolor=style.scheme.background,
         edgecolor="none",
         framealpha=0.8,
-        handlelength=3.2,
         borderpad=0.3,
         labelspacing=0.25,
-        **options,
+        **({"handlelength": 3.2} | options),
     )

@@ -107,6 +107,29 @@ class DesignTable:
         """Return the table as it was before it ran."""
         return replace(self, results=MappingProxyType({}))
 
+    def left(self, case: Case | None, now: Case | None) -> DesignTable:
+        """Return the table with the results that running it on a case would not change.
+
+        ``case`` is that of the results. What failed is run again.
+        """
+        if case is None or now is None or _settings(case) != _settings(now):
+            return self.without_results()
+        kept = (row for row in self.results.values() if not row.problem)
+        return self.without_results().with_results(kept)
+
+    def unsaved(self, busy: bool, saved: DesignTable | None) -> str:
+        """Return what would be lost with the table, in a sentence, or nothing.
+
+        ``busy`` tells whether it is being run, ``saved`` is the one that was saved last.
+        """
+        done, count = len(self.results), len(self.rows)
+        if busy:
+            so_far = f"{done:,} of {count:,} designs are done"
+            return f"The sweep still runs ({so_far}) and will be stopped."
+        if not done or self is saved:
+            return ""
+        return f"The table of designs, {done:,} with results, is not saved."
+
     def designs(self) -> list[dict[str, str]]:
         """Return the designs, as `slideviz.sweep` takes them."""
         return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
@@ -124,6 +147,11 @@ class DesignTable:
         parts += [f"{len(self.results):,} designs done"]
         parts += [f"{bad:,} with inverted cells"] * bool(bad)
         return "; ".join(parts)
+
+
+def _settings(case: Case) -> Case:
+    """Return a case without what changes no result: its files, its view."""
+    return case.change(mesh_out=None, source=None, warnings=(), view={})
 
 
 def read_table(case: Case, path: Path) -> DesignTable:

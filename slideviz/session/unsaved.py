@@ -17,14 +17,14 @@ class Unsaved:
     session : Session
     what : mapping
         The words for what would be lost: of a case, of a mesh, of a run that goes on; of designs,
-        a sentence.
+        a sentence: as ``table`` where some have results.
     """
 
     session: Session
     what: Mapping[str, str]
 
     @classmethod
-    def of(cls, session: Session, busy: bool, designs: str = "") -> Unsaved:
+    def of(cls, session: Session, busy: bool, designs: str = "", results: int = 0) -> Unsaved:
         """Return the unsaved work of a session, while a job runs or none does, and of designs."""
         what = {}
         if session.unsaved_case:
@@ -33,17 +33,18 @@ class Unsaved:
                 f"the changes to {source.name}" if source else "roles, motions and method as a case"
             )
         run = session.run_shown
-        if session.unsaved_mesh and run is not None:
+        # The mesh of a design comes again at a click.
+        if session.unsaved_mesh and run is not None and run.panels is None:
             # While it goes on there is no last step to save.
             name = "mesh" if run.end and not busy else "run"
             what[name] = f"the deformed mesh of run {run.number}"
         if designs:
-            what["designs"] = designs
+            what["table" if results else "designs"] = designs
         return cls(session, what)
 
     @property
     def can_save(self) -> list[str]:
-        """Return what can be saved now, ``case`` and ``mesh``."""
+        """Return what can be saved now: ``case``, ``mesh`` and ``table``."""
         return [name for name in self.what if name not in ("run", "designs")]
 
     def question(self, before: str) -> str:
@@ -55,10 +56,13 @@ class Unsaved:
             What the work would be lost by, as ``closing``.
         """
         number = self.session.shown
+        for name in ("designs", "table"):
+            if name in self.what and len(self.what) > 1:
+                return f"{self._without(name).question(before)}\n{self.what[name]}"
         if "designs" in self.what:
-            if len(self.what) == 1:
-                return f"{self.what['designs']} Lose their results?"
-            return f"{self._without('designs').question(before)}\n{self.what['designs']}"
+            return f"{self.what['designs']} Lose their results?"
+        if "table" in self.what:
+            return f"Save the table of designs before {before}?\n{self.what['table']}"
         if "run" in self.what:
             if len(self.what) == 1:
                 return f"Run {number} goes on. Lose its steps?"
@@ -80,7 +84,9 @@ class Unsaved:
 
     def _others(self) -> str:
         """Return a sentence about the runs that are not shown and whose meshes are not saved."""
-        runs = [run for run in self.session.runs if run.frames and not run.saved]
+        runs = [
+            run for run in self.session.runs if run.frames and not run.saved and run.panels is None
+        ]
         others = [str(run.number) for run in runs if run is not self.session.run_shown]
         several = len(others) > 1
         return (
@@ -95,7 +101,7 @@ def title_of(session: Session) -> str:
     """Return the title of the window that shows a session, with a star if something is unsaved."""
     file = session.case.source or session.path
     # The mesh of a run that the case on disk repeats is not what is unsaved of it, nor is that of
-    # a design, which comes again at a click.
+    # a design.
     run = session.run_shown
     comes_again = session.repeatable or (run is not None and run.panels is not None)
     lost = session.unsaved_mesh and not comes_again

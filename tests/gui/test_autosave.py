@@ -318,7 +318,7 @@ def test_case_and_mesh_are_saved_with_one_answer_before_the_window_closes(
 
     def ask(_parent, what, can_save):
         asked.append((what, tuple(can_save)))
-        return "both"
+        return "all"
 
     monkeypatch.setattr(questions, "ask_unsaved", ask)
     monkeypatch.setattr(questions, "ask_save", lambda *_: next(names))
@@ -353,6 +353,11 @@ def test_nobody_is_asked_twice(make, qtbot, case_file, monkeypatch, tmp_path, an
     ("can_save", "words"),
     [
         (("case", "mesh"), ["Save &case…", "Save &mesh…", "Save &both…", "&Don’t save", "C&ancel"]),
+        (
+            ("case", "mesh", "table"),
+            ["Save &case…", "Save &mesh…", "Save &table…", "Save a&ll…", "&Don’t save", "C&ancel"],
+        ),
+        (("table",), ["Save &table…", "&Don’t save", "C&ancel"]),
         (("mesh",), ["&Save…", "&Don’t save", "C&ancel"]),
         ((), ["&Don’t save", "C&ancel"]),
     ],

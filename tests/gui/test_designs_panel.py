@@ -254,9 +254,33 @@ def test_results_are_not_lost_without_a_question(
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
     assert "table of designs, 1 with results, is not saved" in asked[0][0]
+    assert asked[0][1] == ["table"]
+    answers("ask_unsaved", "table")
+    answers("ask_save", None)
+    assert not window.close()
     answers("ask_save", tmp_path / "out.csv")
-    QTest.mouseClick(panel.save, LEFT)
+    assert window.close()
     assert not panel.unsaved
+    assert (tmp_path / "out.csv").read_text().count("\n") == 3
+
+
+def test_what_is_done_is_not_run_again(window, passage, qtbot, in_a_thread, tmp_path):
+    panel = passage
+    fill(panel, "SLIDING_MODE", "ps, none")
+    run(panel, qtbot)
+    assert panel.table.results[2].problem
+    assert panel.run.text() == "Run 1 design"
+    panel.rows.view.selectRow(1)
+    QTest.mouseClick(panel.remove, LEFT)
+    assert not panel.run.isEnabled()
+    assert "are done" in panel.run.toolTip()
+    # Where the case is saved to changes no result.
+    case = window.store.session.case.change(source=tmp_path / "other.cfg")
+    window.store.change(changes.saved_case, case)
+    assert not panel.run.isEnabled()
+    assert not panel.said.text().startswith("The settings")
+    window.store.change(changes.set_case, steps=3)
+    assert panel.run.text() == "Run 1 design"
 
 
 def test_closing_asks_about_designs_that_go_on(window, passage, qtbot, in_a_thread, answers):

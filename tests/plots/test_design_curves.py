@@ -6,7 +6,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from slideviz.design.sweep_row import Row
-from slideviz.plots.designs import against_designs, design_curves, nearest_design
+from slideviz.plots.designs import (
+    against_designs,
+    design_curves,
+    failed_designs,
+    nearest_design,
+)
 from slideviz.session.design_table import DesignTable
 
 
@@ -44,7 +49,8 @@ def drawn(table, what="quality", shown=None):
     figure = Figure((5, 3), layout="constrained")
     axes = figure.add_subplot()
     curves = design_curves(table, "m.angle", what)
-    against_designs(axes, curves, "m.angle", what, shown)
+    failed = failed_designs(table, "m.angle")
+    against_designs(axes, curves, "m.angle", what, shown, failed=failed)
     FigureCanvasAgg(figure).draw()
     return axes, curves
 
@@ -57,7 +63,10 @@ def test_what_is_drawn(table):
     assert by_gid["inverted"].get_ydata() == pytest.approx([0.4])
     assert by_gid["shown"].get_ydata() == pytest.approx([0.3])
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["0", "0.5", "minimum", "mean"]
+    assert labels == ["0", "0.5", "failed", "inverted", "minimum", "mean"]
+    # One that failed is a cross on the axis.
+    (place,), (height,) = by_gid["failed"].get_data()
+    assert (place, height) == (3.0, 0.0)
     axes, _ = drawn(table, "control_nodes")
     assert not any(str(line.get_gid()).startswith("mean") for line in axes.lines)
 
@@ -72,6 +81,22 @@ def test_the_nearest_point_is_found(table):
             if curve.mean[k] not in curve.values:
                 assert nearest_design(axes, curves, x, y) in {1, 2, 3, 4, 5}
     assert nearest_design(axes, [], 0.0, 0.0) is None
+    x, y = axes.get_xaxis_transform().transform((3.0, 0.0))
+    assert nearest_design(axes, curves, x, y, failed_designs(table, "m.angle")) == 6
+
+
+@pytest.mark.parametrize(("lines", "above"), [(3, True), (12, False)])
+def test_the_legend_is_above_unless_it_would_be_too_high(lines, above):
+    table = DesignTable().crossed("a", [str(k) for k in range(lines)]).crossed("m.angle", ["1"])
+    table = table.with_results(Row(n, min=0.5, mean=0.6) for n in range(1, lines + 1))
+    figure = Figure((2.8, 2.5), layout="constrained")
+    axes = figure.add_subplot()
+    against_designs(axes, design_curves(table, "m.angle", "quality"), "m.angle")
+    FigureCanvasAgg(figure).draw()
+    legend = axes.get_legend().get_window_extent()
+    assert (legend.y0 >= axes.bbox.y1) == above
+    assert (legend.x0 >= axes.bbox.x1) == (not above)
+    assert legend.x1 <= figure.bbox.x1
 
 
 def test_many_curves_are_points_of_one_look():

@@ -73,6 +73,29 @@ def test_a_design_that_is_looked_at_makes_no_star(session):
     assert title_of(replace(opened, runs=(looked_at,), shown=1)) == "a.cfg – slideviz"
 
 
+def test_the_mesh_of_a_design_that_is_looked_at_is_not_asked_about(session):
+    design = replace(session.runs[0], name="design 1", panels=session.case)
+    looked_at = replace(session, runs=(design,), shown=1)
+    assert not Unsaved.of(looked_at, busy=False).what
+    assert not Unsaved.of(looked_at, busy=True).what
+    # Nor is it among the others, beside the mesh of a run.
+    beside = replace(session, runs=(design, session.runs[1]))
+    assert "either" not in Unsaved.of(beside, busy=False).question("closing")
+
+
+def test_designs_with_results_can_be_saved(session):
+    words = "The table of designs, 2 with results, is not saved."
+    alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words, results=2)
+    assert alone.can_save == ["table"]
+    assert alone.question("closing") == f"Save the table of designs before closing?\n{words}"
+    both = Unsaved.of(saved(session, 1), busy=False, designs=words, results=2)
+    assert both.can_save == ["mesh", "table"]
+    assert both.question("closing").splitlines() == [
+        "Save the deformed mesh of run 2 before closing?",
+        words,
+    ]
+
+
 def test_designs_are_asked_about_in_the_same_question(session):
     words = "The sweep still runs (2 of 9 designs are done) and will be stopped."
     alone = Unsaved.of(saved(session, 1, 2), busy=False, designs=words)

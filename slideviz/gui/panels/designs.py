@@ -26,6 +26,7 @@ from slideviz.session.design_table import DesignTable, read_table, values_of, wr
 from slideviz.session.state import Session
 
 TABLES = "Table (*.csv)"
+RUN = "Run the designs that have no result yet, or failed."
 
 
 class DesignsPanel(Panel):
@@ -58,9 +59,10 @@ class DesignsPanel(Panel):
         self.plot = DesignPlot()
         split = QSplitter(Qt.Orientation.Horizontal)
         split.setObjectName("designs_split")
-        split.addWidget(self.rows)
-        split.addWidget(self.plot)
+        for part in (self.rows, self.plot):
+            split.addWidget(part)
         split.setChildrenCollapsible(False)
+        split.setSizes([1000, 1000])
         foot = self._make_foot()
         in_column(split, foot, self.said, wide=[split], spacing=4, on=self, margins=(6, 4, 6, 4))
         self._connect()
@@ -77,11 +79,9 @@ class DesignsPanel(Panel):
         )
         self.remove = push_button("Remove", "Remove the selected designs.", self._remove)
         self.save = push_button(
-            "Save…", "Save designs and results as a CSV table.", self._save, "save_designs"
+            "Save table…", "Save designs and results as CSV.", self.save_table, "save_designs"
         )
-        self.run = push_button(
-            "Run", "Run the designs that have no result yet.", self.start, "run_designs"
-        )
+        self.run = push_button("Run", RUN, self.start, "run_designs")
         self.stop = push_button(
             "Stop", "Stop; the results that are there stay.", self.runner.cancel
         )
@@ -92,7 +92,7 @@ class DesignsPanel(Panel):
         self.bar.setFixedWidth(110)
         self.said = wide_label(lines=3)
         self.said.hide()
-        files = (self.load, self.save, self.remove)
+        files = (self.load, self.remove, self.save, self.plot.save)
         return in_row(self.run, self.stop, self.bar, None, *files, spacing=4)
 
     def _connect(self) -> None:
@@ -117,9 +117,13 @@ class DesignsPanel(Panel):
             self._say("")
         self._drawn = now
         self.rows.show_columns(session.case, session.mesh)
-        if self.table.results and self.case != session.case and not self.runner.busy:
+        if self.table.results and not self.runner.busy and not self._left().results:
             self._say("The settings have changed since: Run does all designs again.")
         self._sync()
+
+    def _left(self) -> DesignTable:
+        """Return the table with the results that a run now would not change."""
+        return self.table.left(self.case, self.store.session.case)
 
     def _put(self, table: DesignTable) -> None:
         """Show another table; the design that is shown is none of it if it has other values."""
@@ -133,22 +137,25 @@ class DesignsPanel(Panel):
         busy, rows = self.runner.busy, bool(self.table.rows)
         in_file = self.store.session.in_file
         opened = self.store.session.mesh is not None and not in_file
+        count = len(self.table.rows) - len(self._left().results)
         self.rows.show_table(self.table, editable=not busy)
         self.plot.show_table(self.table, self.shown)
         for widget, able in (
             (self.rows.add, opened and not busy),
             (self.load, opened and not busy),
             (self.remove, rows and not busy),
-            (self.run, rows and opened and not busy),
-            (self.stop, busy),
+            (self.run, count > 0 and opened and not busy),
             (self.save, rows),
         ):
             widget.setEnabled(able)
         if in_file:
             self._say("This mesh stays in its file: sweep it with `slideviz sweep`.")
-        count = len(self.table.rows)
-        self.run.setText(f"Run {count} design{'' if count == 1 else 's'}" if rows else "Run")
+        self.run.setText(f"Run {count:,} design{'' if count == 1 else 's'}" if count else "Run")
+        done = rows and not count
+        self.run.setToolTip("All designs are done with these settings." if done else RUN)
         self.bar.setVisible(busy)
+        self.stop.setVisible(busy)
+        self.run.setVisible(not busy)
 
     def _say(self, text: str, wrong: bool = False) -> None:
         self.said.setText(text)
@@ -161,13 +168,12 @@ class DesignsPanel(Panel):
     @property
     def unsaved(self) -> str:
         """Return what would be lost with this panel, in a sentence, or nothing."""
-        done, count = len(self.table.results), len(self.table.rows)
-        if self.runner.busy:
-            so_far = f"{done:,} of {count:,} designs are done"
-            return f"The sweep still runs ({so_far}) and will be stopped."
-        if not done or self.table is self.written:
-            return ""
-        return f"The table of designs, {done:,} with results, is not saved."
+        return self.table.unsaved(self.runner.busy, self.written)
+
+    @property
+    def unsaved_results(self) -> int:
+        """Return how many results there are that were not saved."""
+        return 0 if self.table is self.written else len(self.table.results)
 
     def _try(self, change: Callable[[], DesignTable]) -> None:
         """Change the table, or say why that cannot be."""
@@ -222,27 +228,28 @@ class DesignsPanel(Panel):
     def _remove(self) -> None:
         self._try(lambda: self.table.without(self.rows.selected))
 
-    def _save(self) -> None:
+    def save_table(self) -> bool:
+        """Ask for a file and save the table there; return whether it was written."""
         default = self.services.files.folder() / f"{self.services.files.stem()}_designs.csv"
         path = questions.ask_save(self, "Save designs and results", default, TABLES)
         if path is None:
-            return
+            return False
+        table = self.table  # a question waits, and results come meanwhile
         try:
-            write_results(path, self.table)
+            write_results(path, table)
         except SlidevizError as error:
             self._say(str(error), wrong=True)
-        else:
-            self.written = self.table
-            self._say(f"Saved {path}")
+            return False
+        self.written = table
+        self._say(f"Saved {path}")
+        return True
 
     def show_design(self, number: int) -> None:
         """Show the mesh of a design in the window; it is deformed once more for that."""
-        session = self.store.session
-        row = self.table.results.get(number)
-        if session.mesh is None or session.mesh is not (self.mesh or session.mesh):
+        session, row = self.store.session, self.table.results.get(number)
+        other = session.mesh is not (self.mesh or session.mesh)
+        if session.mesh is None or session.in_file or other:
             return
-        if session.in_file:
-            return  # only its boundary is in memory
         case = session.case if row is None or self.case is None else self.case
         if row is not None and row.problem:
             self._say(f"Design {number}: {self.table.reason(number, self.mesh)}", wrong=True)
@@ -264,14 +271,11 @@ class DesignsPanel(Panel):
     # The job ---------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Run the designs that have no result yet, or all again."""
-        session = self.store.session
-        if self.runner.busy or session.mesh is None or session.in_file or not self.table.rows:
+        """Run the designs that have no result with the present settings."""
+        session, table = self.store.session, self._left()
+        done = len(table.results) == len(table.rows)
+        if self.runner.busy or session.mesh is None or session.in_file or done:
             return
-        done = {number: row for number, row in self.table.results.items() if not row.problem}
-        table = self.table.without_results()
-        if self.case == session.case and len(done) < len(table.rows):
-            table = table.with_results(done.values())
         self.case, self.mesh = session.case, session.mesh
         self._put(table)
         self._say("")

@@ -16,7 +16,13 @@ from slideviz.gui.widgets.build import in_column, in_row, push_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write_plot
 from slideviz.gui.widgets.plot_image import Draw
-from slideviz.plots.designs import RESULTS, against_designs, design_curves, nearest_design
+from slideviz.plots.designs import (
+    RESULTS,
+    against_designs,
+    design_curves,
+    failed_designs,
+    nearest_design,
+)
 from slideviz.plots.style import Style
 from slideviz.session.design_table import DesignTable
 
@@ -59,16 +65,17 @@ class DesignPlot(QWidget):
         words = {name: text.partition(" [")[0].capitalize() for name, text in RESULTS.items()}
         self.what = Choice(words, "The result that the plot shows.", "what")
         self.save = push_button(
-            "Save…", "Save the plot as PNG, SVG or PDF.", self._save, "save_design_plot"
+            "Save plot…", "Save the plot as PNG, SVG or PDF.", self._save, "save_design_plot"
         )
-        self.save.setMaximumWidth(72)
         self.canvas = DesignCanvas(self.drawing)
         self.canvas.picked = self._picked
         self.area = PlotArea(self.canvas)
-        head = in_row(self.what, self.across, self.save, wide=[self.across], spacing=4)
+        head = in_row(self.what, self.across, wide=[self.what, self.across], spacing=4)
         in_column(head, self.area, wide=[self.area], spacing=4, on=self)
         for choice in (self.across, self.what):
             choice.chosen.connect(lambda _: self._other_plot())
+
+    # The button that saves it is beside those of the table.
 
     def show_table(self, table: DesignTable, shown: int | None) -> None:
         """Draw the results of a table; the design ``shown`` has a ring."""
@@ -77,7 +84,7 @@ class DesignPlot(QWidget):
             for name in table.columns:
                 self.across.addItem(name, name)
         self._table, self._shown = table, shown
-        plotted = any(not row.problem for row in table.results.values())
+        plotted = bool(table.results)
         self.save.setEnabled(plotted)
         self.across.setVisible(len(table.columns) > 1)
         if plotted:
@@ -98,9 +105,11 @@ class DesignPlot(QWidget):
 
     def _picked(self, x: float, y: float) -> None:
         column, what = self.across.currentData(), self.what.currentData()
-        found = nearest_design(
-            self.canvas.figure.axes[0], design_curves(self._table, column, what), x, y
+        curves, failed = (
+            design_curves(self._table, column, what),
+            failed_designs(self._table, column),
         )
+        found = nearest_design(self.canvas.figure.axes[0], curves, x, y, failed)
         if found is not None:
             self.picked(found)
 
@@ -112,6 +121,5 @@ def _draw(
     table: DesignTable, column: str, what: str, shown: int | None, figure: Figure, style: Style
 ) -> None:
     """Draw the results of a table against a column."""
-    against_designs(
-        figure.add_subplot(), design_curves(table, column, what), column, what, shown, style
-    )
+    curves, failed = design_curves(table, column, what), failed_designs(table, column)
+    against_designs(figure.add_subplot(), curves, column, what, shown, style, failed=failed)

@@ -75,13 +75,13 @@ def _save_name(
 
 
 def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",)) -> str:
-    """Return ``case``, ``mesh`` or ``both`` to save, ``discard`` or ``cancel``.
+    """Return ``case``, ``mesh``, ``table`` or ``all`` to save, ``discard`` or ``cancel``.
 
     Parameters
     ----------
     what : str
         The question; what follows after a line break is said in smaller letters.
-    can_save : sequence of {"case", "mesh"}
+    can_save : sequence of {"case", "mesh", "table"}
         What can be saved now.
     """
     box = QMessageBox(parent)
@@ -92,11 +92,15 @@ def ask_unsaved(parent: QWidget, what: str, can_save: Sequence[str] = ("case",))
     box.setText(question)
     box.setInformativeText(more)
     several = len(can_save) > 1
-    words = {"case": "Save &case…", "mesh": "Save &mesh…", "both": "Save &both…"}
-    offered = [*can_save, "both"] if several else list(can_save)
+    words = {"case": "Save &case…", "mesh": "Save &mesh…", "table": "Save &table…"}
+    words["all"] = "Save &both…" if len(can_save) == 2 else "Save a&ll…"
+    offered = [*can_save, "all"] if several else list(can_save)
     role = QMessageBox.ButtonRole
     buttons = {
-        name: box.addButton(words[name] if several else "&Save…", role.AcceptRole)
+        # Of what a click has brought, the word is enough; a table is not in sight.
+        name: box.addButton(
+            words[name] if several or name == "table" else "&Save…", role.AcceptRole
+        )
         for name in offered
     }
     buttons["discard"] = box.addButton("&Don’t save", role.DestructiveRole)
