@@ -16,6 +16,7 @@ from slideviz.export.titles import (
     title_words,
 )
 from slideviz.scene.color_legend import STRIP
+from slideviz.session.colors import as_drawn
 from slideviz.session.state import Frame, Session
 from slideviz.terms import Shown
 
@@ -116,6 +117,7 @@ class PictureOptions:
 
     def showing(self, session: Session) -> Session:
         """Return the session of the picture: nothing selected, no clutter."""
+        session = as_drawn(session)
         view = session.view
         drawn: dict[Shown, bool] = {"legend": self.legend, "edges": self.edges, "triad": self.triad}
         if view.colour_by != "role":

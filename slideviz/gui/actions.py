@@ -15,6 +15,7 @@ from slideviz.gui.widgets.build import tool_button
 from slideviz.gui.widgets.choice import Choice
 from slideviz.gui.widgets.command import Menu, Now, valued
 from slideviz.session import changes
+from slideviz.session.colors import NO_DISPLACEMENT, unmoved
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import COLOUR_BY, SHOWN, labels
@@ -42,6 +43,7 @@ class Actions:
             self._make(window.menuBar(), menu)
         self.bar = ToolBar(window, self)
         window.addToolBar(self.bar)
+        window.store.listen(self._explain_colours)
 
     def _make(self, above: QMenu | QMenuBar, table: Menu) -> None:
         menu = self.menus[table.name] = above.addMenu(table.title)
@@ -63,6 +65,10 @@ class Actions:
                 menu.addAction(act)
                 if group is not None:
                     group.addAction(act)
+
+    def _explain_colours(self, old: Session, new: Session) -> None:
+        if unmoved(new) and not unmoved(old):
+            self.window.say(NO_DISPLACEMENT)
 
     def sync(self, now: Now) -> None:
         """Show which actions are checked and which can be done."""

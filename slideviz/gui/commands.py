@@ -18,9 +18,11 @@ from slideviz.gui.widgets.command import (
     Command,
     Menu,
     Now,
+    bounded,
     boxed,
     flat,
     idle,
+    meant,
     opened,
     solid,
     stepped,
@@ -259,6 +261,10 @@ _VIEW = Menu("view", "&View", entries=(
     _COLOURS,
     Command("fit", "&Fit all", "Make the whole mesh fill the view.",
             lambda window: window.viewing.fit(), ("F",), "fit", opened),
+    Command("fit_boundary", "Fit to &boundary",
+            "Make the selected boundaries fill the view, or else those that move.",
+            lambda w: w.viewing.fit(meant(w.store.session)), ("Shift+F",), enabled=bounded,
+            tip_now=why_not(bounded, "No boundary is selected, and none moves.")),
     _SIDES,
     COMPARE,
     Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
@@ -288,8 +294,7 @@ _HELP = Menu("help", "&Help", entries=(
     Command("copy_details", "&Copy details for a bug report",
             "Copy versions, graphics, mesh and the last messages, for a bug report.",
             lambda window: window.help.copy_details()),
-    Command("about", "&About slideviz", "Show version and licence.",
-            lambda window: window.help.about()),
+    Command("about", "&About slideviz", "Show version and licence.", lambda w: w.help.about()),
 ))
 # fmt: on
 

@@ -50,6 +50,7 @@ from slideviz.mesh.io.file_checks import protected
 from slideviz.mesh.model import Mesh
 from slideviz.scene.scene import Scene
 from slideviz.session import changes, jobs
+from slideviz.session.motions import boxes_hint
 from slideviz.session.run_messages import Requirement
 from slideviz.session.store import Store
 from slideviz.session.unsaved import title_of
@@ -251,8 +252,10 @@ class MainWindow(Services):
             log.warning("%s", remark)
         if session.in_file:
             self.banner.tell("\n".join(remarks))
-        note = "" if session.in_file else "".join(f". {text}" for text in remarks)
-        self.say(f"Opened {(session.case.source or session.path).name}{note}")
+        notes = [] if session.in_file else [*remarks]
+        notes += [boxes_hint(session)] if boxes_hint(session) else []
+        name = (session.case.source or session.path).name
+        self.say(f"Opened {name}{''.join(f'. {text}' for text in notes)}")
 
     # Jobs ------------------------------------------------------------------------------
 

@@ -10,17 +10,28 @@ import pyvista as pv
 from slideviz.case.boxes import boxes_for
 from slideviz.case.model import Case, Ffd
 from slideviz.errors import SlidevizError
+from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.mesh.surfaces import facet_connectivity, lifted
+from slideviz.scene.color_legend import set_letters
+from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.state import Session
 from slideviz.terms import ROLES
 
-NAMES = ("boxes:undeformed", "boxes:moved")
+BASE, MOVED, BEHIND, LABELS = "boxes:undeformed", "boxes:moved", "boxes:behind", "boxes:-labels"
+ENDS = (0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)
+"""The first control point of a box, and those at the ends of its edges from there."""
+FAINT = 0.3
+"""Opacity of what the mesh is in front of."""
 
 
 class BoxLayer(Layer):
-    """The control points of all boxes, and of those that motions move where they come to be."""
+    """The control points of all boxes, and those that motions move where they come to be.
+
+    What is inside the mesh, or behind it, is seen faintly. Beside the first corner of a box is its
+    name, and at the ends of its edges from there are i, j and k, as far as there is room.
+    """
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -37,61 +48,117 @@ class BoxLayer(Layer):
         shown = "ffd" in new.view.drawn
         case = new.case
         definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
-        key = (new.mesh, _ffd_motions(case), definition, self.stage.scheme) if shown else ()
+        style = self.stage.scheme, self.stage.font_scale
+        key = (new.mesh, _ffd_motions(case), definition, style) if shown else ()
         if key == self._key:
             return
         self._key = key
-        colours = self.stage.scheme.text, ROLES["moving"].colour
-        drawn = lattices(case, new.mesh) if shown else ([], [])
-        for name, colour, found in zip(NAMES, colours, drawn, strict=True):
+        for name in (BASE, MOVED, BEHIND, f"{MOVED}:behind", LABELS):
             self.stage.remove(name)
-            if found:
-                shape = lattice_shape(found, new.mesh.dim, 4.0 * self.stage.lift(new.mesh))
-                actor = self.stage.add(shape, name, lighting=False, pickable=False)
-                actor.prop.color, actor.prop.line_width = colour, 1.5
-                actor.prop.point_size = 7.0 * self.stage.font_scale
-                actor.prop.render_points_as_spheres = True
+        if shown:
+            self._draw(*lattices(case, new.mesh), new.mesh)
+
+    def _draw(self, boxes: dict[str, Box], moved: dict[str, Box], mesh: Mesh) -> None:
+        lift = 4.0 * self.stage.lift(mesh)
+        every = {
+            name: (box.points, np.ones(box.points.shape[:3], bool)) for name, box in boxes.items()
+        }
+        changed = {
+            name: (box.points, (box.points != boxes[name].points).any(axis=-1))
+            for name, box in moved.items()
+        }
+        colours = self.stage.scheme.text, ROLES["moving"].colour
+        for name, colour, found in zip((BASE, MOVED), colours, (every, changed), strict=True):
+            if not found:
+                continue
+            shape = lattice_shape(list(found.values()), mesh.dim, lift)
+            self._add(shape, name, colour)
+            if mesh.dim == 3:
+                behind = self._add(shape, BEHIND if name == BASE else f"{MOVED}:behind", colour)
+                behind.prop.opacity = FAINT
+                behind.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+                behind.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, IN_FRONT)
+                behind.mapper.SetRelativeCoincidentTopologyPointOffsetParameter(IN_FRONT)
+        if boxes:
+            self._label(boxes, mesh.dim, lift)
+
+    def _add(self, shape: Any, name: str, colour: str) -> Any:
+        """Return the actor of lines and points."""
+        actor = self.stage.add(shape, name, lighting=False, pickable=False)
+        scale = self.stage.font_scale
+        actor.prop.color = colour
+        actor.prop.line_width, actor.prop.point_size = 2.0 * scale, 8.0 * scale
+        actor.prop.render_points_as_spheres = True
+        return actor
+
+    def _label(self, boxes: dict[str, Box], dim: int, lift: float) -> None:
+        """Write the names of the boxes and of their directions."""
+        at, words = [], []
+        for name, box in boxes.items():
+            first, i, j, k = (box.points[end] for end in ENDS)
+            at += [first, i, j, k][: dim + 1]
+            words += [f"\u2002{word}" for word in (name, *"ijk")[: dim + 1]]
+        labels = self.stage.plotter.add_point_labels(
+            lifted(np.array(at)[:, :dim], lift),
+            words,
+            name=LABELS.removesuffix("-labels"),  # PyVista adds it
+            shape=None,
+            show_points=False,
+            always_visible=True,
+            reset_camera=False,
+            render=False,
+            pickable=False,
+        )
+        # The letters belong to what sorts them, before the mapper.
+        letters = labels.mapper.GetInputConnection(0, 0).GetProducer().GetTextProperty()
+        set_letters(letters, self.stage.scheme, 13 * self.stage.font_scale)
 
 
 def _ffd_motions(case: Case) -> tuple[Ffd, ...]:
     return tuple(motion for motion in case.motions if isinstance(motion, Ffd))
 
 
-def lattices(case: Case, mesh: Mesh) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the control points (I, J, K, 3) of the boxes, and of those that motions move.
+def lattices(case: Case, mesh: Mesh) -> tuple[dict[str, Box], dict[str, Box]]:
+    """Return the boxes, and as they come to be those that motions move, by name.
 
     Of a box with a mistake, which the panel of motions tells, there are none.
     """
     try:
         boxes = boxes_for(case, mesh)
     except SlidevizError:
-        return [], []
+        return {}, {}
     moved = dict(boxes)
     for motion in _ffd_motions(case):
         box = moved.get(motion.box)
         if box is not None and any(motion.vector) and not box.problem(motion.index):
             moved[motion.box] = box.moved(box.change(motion.index, motion.vector))
-    others = [box.points for name, box in moved.items() if box is not boxes[name]]
-    return [box.points for box in boxes.values()], others
+    return boxes, {name: box for name, box in moved.items() if box is not boxes[name]}
 
 
-def lattice_shape(boxes: list[FloatArray], dim: int, lift: float) -> Any:
-    """Return control points (I, J, K, 3) of boxes and the lines between neighbours as PolyData.
+def lattice_shape(boxes: list[tuple[FloatArray, np.ndarray]], dim: int, lift: float) -> Any:
+    """Return control points and the lines from them to their neighbours as PolyData.
 
     In 2D, where a box is one cell thick, they are in the plane, raised by ``lift``.
+
+    Parameters
+    ----------
+    boxes : list of (I, J, K, 3) float64 and (I, J, K) bool
+        The control points of each, and which of them are drawn.
     """
-    points, lines, start = [], [], 0
-    for box in boxes:
-        flat = box[:, :, :1] if dim == 2 else box
-        ids = start + np.arange(flat[..., 0].size).reshape(flat.shape[:3])
+    points, lines, wanted, start = [], [], [], 0
+    for box, drawn in boxes:
+        flat, on = (box[:, :, :1], drawn[:, :, :1]) if dim == 2 else (box, drawn)
+        ids = start + np.arange(on.size).reshape(on.shape)
         for axis in range(3):
-            along = np.moveaxis(ids, axis, 0)
-            lines.append(np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1))
+            along, seen = np.moveaxis(ids, axis, 0), np.moveaxis(on, axis, 0)
+            pairs = np.stack([along[:-1].ravel(), along[1:].ravel()], axis=1)
+            lines.append(pairs[(seen[:-1] | seen[1:]).ravel()])
         points.append(flat.reshape(-1, 3))
+        wanted.append(ids[on])
         start += ids.size
-    at = lifted(np.concatenate(points)[:, :dim], lift)
+    dots = np.concatenate(wanted)
     return pv.PolyData(
-        at,
+        lifted(np.concatenate(points)[:, :dim], lift),
         lines=facet_connectivity(np.concatenate(lines)),
-        verts=np.column_stack([np.ones(start, np.int64), np.arange(start)]).ravel(),
+        verts=np.column_stack([np.ones(len(dots), np.int64), dots]).ravel(),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from typing import Any
 
@@ -89,20 +89,35 @@ class Camera:
         self.aim(centre, half, depth)
         self._fitted = self.place
 
+    def fit_part(self, clouds: Sequence[FloatArray]) -> None:
+        """Make some points (n, 3) fill the view, from the present side."""
+        self.shift()
+        whole = self._whole()
+        if whole is None or not clouds:
+            return
+        centre, half, _ = self._around(clouds)
+        self.aim(centre, max(half, 1e-9 * whole[1]), 2.0 * whole[2])
+
     def _whole(self, clouds: Iterable[FloatArray] = ()) -> tuple[Any, float, float] | None:
         """Return the middle (3,) of all there is, half the height that shows it, and its extent."""
-        cameras = [self] if self.beside is None else [self, self.beside]
-        shapes = [shape for camera in cameras for shape in camera._shapes()]
+        shapes = [shape for camera in self._cameras() for shape in camera._shapes()]
         if not shapes:
             return None
+        return self._around(chain((np.asarray(shape.points) for shape in shapes), clouds))
+
+    def _cameras(self) -> list[Camera]:
+        """Return this camera and the one beside it."""
+        return [self] if self.beside is None else [self, self.beside]
+
+    def _around(self, clouds: Iterable[FloatArray]) -> tuple[Any, float, float]:
+        """Return the middle (3,) of points, half the height that shows them, and their extent."""
         axes = self._axes()
         # Not all points at once: of large meshes, a copy of them takes longer than all else.
-        clouds = chain((np.asarray(shape.points) for shape in shapes), clouds)
         along = (axes @ points.T for points in clouds)
         ends = np.array([(one.min(axis=1), one.max(axis=1)) for one in along])
         low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
         extent = high - low
-        half = max(camera._half(extent) for camera in cameras)
+        half = max(camera._half(extent) for camera in self._cameras())
         return axes.T @ ((low + high) / 2.0), half, float(np.linalg.norm(extent))
 
     def _half(self, extent: Any) -> float:

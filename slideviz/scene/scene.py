@@ -31,6 +31,7 @@ from slideviz.scene.points import PointLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.scene.threshold import ThresholdLayer
+from slideviz.session.colors import as_drawn
 from slideviz.session.inspect import cell_at, surroundings
 from slideviz.session.state import Session
 from slideviz.session.store import tell_all
@@ -115,6 +116,7 @@ class Scene:
         """
         self.clear()
         self._cells.part = part
+        session = as_drawn(session)
         if session.mesh is None:
             return
         self.session = session
@@ -134,6 +136,7 @@ class Scene:
 
     def update(self, session: Session) -> None:
         """Draw another state of the same mesh; only differences are touched."""
+        session = as_drawn(session)
         old, self.session = self.session, session
         if session.mesh is None or old.mesh is None:
             return
@@ -207,6 +210,14 @@ class Scene:
         half = view.detail.width / min(free, 1.3 * height) * height / 2.0
         self.camera.shift()
         self.camera.aim(padded(np.array([view.detail.centre]))[0], half, 2.0 * mesh.extent)
+
+    def fit(self, names: Sequence[str] = ()) -> None:
+        """Make all that is drawn fill the view, or some boundaries, from the present side."""
+        shapes = (self.drawn[name].shape for name in names if name in self.drawn)
+        if names:
+            self.camera.fit_part([np.asarray(shape.points) for shape in shapes])
+        else:
+            self.camera.fit()
 
     def _parallel(self) -> bool:
         mesh = self.session.mesh

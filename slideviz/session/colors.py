@@ -27,6 +27,19 @@ def fit_colours(session: Session, every: bool = True) -> Session:
     return session if limits is None else set_view(session, colour_range=limits)
 
 
+NO_DISPLACEMENT = "There is no displacement yet: run the case. Until then the roles are shown."
+
+
+def unmoved(session: Session) -> bool:
+    """Tell whether the colours are to say the displacement, and nothing has been moved yet."""
+    return session.view.colour_by == "displacement" and not any(run.frames for run in session.runs)
+
+
+def as_drawn(session: Session) -> Session:
+    """Return a session as it is drawn: in the colours of roles where nothing has been moved yet."""
+    return set_view(session, colour_by="role") if unmoved(session) else session
+
+
 def usual_range(session: Session) -> str:
     """Return in words the colour range that holds where nobody has chosen one."""
     far = session.view.colour_by == "displacement"

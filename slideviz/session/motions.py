@@ -86,6 +86,14 @@ def box_names(session: Session) -> tuple[str, ...]:
         return ()
 
 
+def boxes_hint(session: Session) -> str:
+    """Return how the boxes are shown that a mesh has, if they are not."""
+    count = 0 if "ffd" in session.view.drawn else len(box_names(session))
+    if not count:
+        return ""
+    return f"{count} FFD boxes: B shows them" if count > 1 else "An FFD box: B shows it"
+
+
 class Ghosts:
     """The moved boundaries of one mesh; displacement files are read once and when changed."""
 

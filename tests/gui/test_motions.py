@@ -286,6 +286,7 @@ def test_boxes_can_be_drawn_where_there_are_some(driver, passage_file, tmp_path)
     assert shown.isEnabled()
     assert action.isEnabled()
     assert shown.toolTip() == wrapped(SHOWN["ffd"].tip)
+    assert driver.window.statusBar().currentMessage().endswith(". 2 FFD boxes: B shows them")
     shown.click()
     assert "ffd" in driver.session.view.drawn
     assert action.isChecked()

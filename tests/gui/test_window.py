@@ -923,6 +923,25 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
     assert before.std() > 5, "the view still works"
 
 
+def test_what_moves_fills_the_view_or_what_is_selected(opened):
+    window, fit = opened.window, opened.window.actions_.by_name["fit_boundary"]
+    whole = window.view.camera.parallel_scale
+    QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ShiftModifier)
+    moving = window.view.camera.parallel_scale
+    assert moving < whole
+    opened.click_row("inflow")
+    fit.trigger()
+    assert window.view.camera.parallel_scale != moving
+    window.store.change(changes.select, ())
+    opened.role("airfoil", "fixed")
+    assert not fit.isEnabled()
+
+
+def test_the_displacement_is_said_to_be_none_before_a_run(opened):
+    opened.window.store.change(changes.set_view, colour_by="displacement")
+    assert "no displacement yet" in opened.window.statusBar().currentMessage()
+
+
 @pytest.mark.parametrize("answer", ["cancel", "discard", "case"])
 def test_unsaved_changes_are_asked_about_on_close(opened, answers, tmp_path, answer):
     opened.role("airfoil", "fixed")

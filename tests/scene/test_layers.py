@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from slideviz.case.model import Ffd
 from slideviz.color_scheme import DARK, LIGHT
+from slideviz.ffd.box import CORNERS, regular_box
+from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
@@ -307,3 +310,55 @@ def test_few_points_fill_the_room_of_all():
     assert len(few) < 200
     for way in rng.normal(size=(50, 3)):
         assert np.ptp(few @ way) == pytest.approx(np.ptp(points @ way), rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def boxed():
+    """A cube in a box of 3 x 3 x 2 control points, drawn; and the same with one of them moved."""
+    mesh = sample("hexahedron", size=4).mesh
+    low, high = mesh.bounds
+    corners = low + CORNERS * (high - low)
+    mesh = with_boxes(mesh, [regular_box("B", corners, (2, 2, 1), None)])
+    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    name = mesh.marker_names[0]
+    session = changes.set_role(changes.set_view(session, ffd=True), [name], "moving")
+    return session, changes.add_motion(session, Ffd(name, "B", (1, 1, 1), (0.0, 0.0, 0.5)))
+
+
+def test_of_a_box_only_what_moves_is_drawn_again(scene, boxed):
+    before, after = boxed
+    scene.open(before, find_surfaces(before.mesh))
+    assert "boxes:moved" not in scene.plotter.actors
+    base = scene.plotter.actors["boxes:undeformed"].mapper.dataset
+    # 2 layers of 3 x 3 points: 12 lines in each, and 9 between them.
+    assert (base.n_verts, base.n_lines) == (18, 33)
+    assert scene.plotter.actors["boxes:behind"].prop.opacity < 0.5
+    scene.update(after)
+    moved = scene.plotter.actors["boxes:moved"].mapper.dataset
+    assert (moved.n_verts, moved.n_lines) == (1, 5)
+    assert "boxes:-labels" in scene.plotter.actors
+    scene.update(changes.set_view(after, ffd=False))
+    assert not any(name.startswith("boxes:") for name in scene.plotter.actors)
+
+
+def test_the_displacement_has_no_colours_before_a_run(scene, passage):
+    frame = Frame(passage.mesh, quality(passage.mesh))
+    session = changes.open_mesh(frame, None, (), passage.case)
+    scene.open(session, find_surfaces(passage.mesh))
+    session = changes.set_view(session, colour_by="displacement")
+    scene.update(session)
+    assert not scene._cells.actor.mapper.scalar_visibility
+    moved = Frame(passage.mesh.with_points(passage.mesh.points + 0.1), frame.quality)
+    scene.update(changes.add_frames(changes.start_run(session), [moved]))
+    assert scene._cells.actor.mapper.scalar_visibility
+
+
+def test_some_boundaries_fill_the_view(scene, passage):
+    session = changes.open_mesh(Frame(passage.mesh, quality(passage.mesh)), None, (), passage.case)
+    scene.open(session, find_surfaces(passage.mesh))
+    whole = scene.plotter.camera.parallel_scale
+    scene.fit(("inflow",))
+    at = to_display(scene.plotter, np.asarray(scene.drawn["inflow"].shape.points))
+    assert np.ptp(at[:, 1]) == pytest.approx(0.92 * scene.plotter.window_size[1], rel=0.01)
+    scene.fit()
+    assert scene.plotter.camera.parallel_scale == pytest.approx(whole)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from qtpy.QtCore import QPoint, Signal
 from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QGridLayout, QSizePolicy, QWidget
@@ -273,10 +275,10 @@ class Viewing(QWidget):
         if self.second is not None:
             self.second.render()
 
-    def fit(self) -> None:
-        """Make the whole mesh fill the view."""
+    def fit(self, names: Sequence[str] = ()) -> None:
+        """Make the whole mesh fill the view, or some boundaries."""
         self._before = None
-        self._leader.camera.fit()
+        self._leader.fit(names)
         self.render()
 
     def refit(self) -> None:

@@ -177,6 +177,16 @@ def solid(now: Now) -> bool:
     return opened(now) and not flat(now)
 
 
+def bounded(now: Now) -> bool:
+    """Tell whether there are boundaries that are selected, or move."""
+    return opened(now) and bool(meant(now.session))
+
+
+def meant(session: Session) -> tuple[str, ...]:
+    """Return the selected boundaries, or else those that move."""
+    return session.view.selected or session.case.markers_with("moving")
+
+
 def boxed(now: Now) -> bool:
     """Tell whether there are boxes for free-form deformation, or they are to be drawn."""
     return opened(now) and ("ffd" in now.session.view.drawn or bool(box_names(now.session)))
