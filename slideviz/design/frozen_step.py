@@ -18,6 +18,8 @@ import numpy as np
 from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
+from slideviz.design.frozen_baselines import Elasticity, Weighting
+from slideviz.design.frozen_interpolation import Interpolation
 from slideviz.design.frozen_method import Method
 from slideviz.design.loops import keep_rest, shift
 from slideviz.design.operations import coords as coords_of
@@ -33,6 +35,7 @@ from slideviz.design.tape import (
 )
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.rbf.problem import Levels
+from slideviz.terms import Sliding
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,7 @@ class FrozenStep:
     ----------
     setup : Setup
     mesh : Mesh
-    sliding : str
-        SLIDING_MODE.
+    sliding : Sliding
     part : float
         Of the whole displacement, after this step.
     first : bool
@@ -109,7 +111,7 @@ class FrozenStep:
 
     setup: Setup
     mesh: Mesh
-    sliding: str
+    sliding: Sliding
     part: float
     first: bool
     stages: tuple[Levels, ...]
@@ -144,7 +146,7 @@ class FrozenStep:
         """
         setup = self.setup
         goal = _shifted(setup.coords[setup.known], multiply(target, np.array([[self.part]])))
-        solved = Method(self, before, goal, room).run()
+        solved = self._method(self, before, goal, room).run()
         displacement = solved.displacement
         if len(setup.images):
             first, second = setup.images.T
@@ -160,6 +162,12 @@ class FrozenStep:
         return State(
             moved, solved.lag, solved.of, solved.max_error, solved.lost, doubt=solved.doubt
         )
+
+    @property
+    def _method(self) -> type[Method]:
+        if self.weights is not None:
+            return Weighting
+        return Interpolation if self.body is None else Elasticity
 
     def _with_points(self, moved: Array) -> tuple[Array, Array]:
         """Return coordinates and points, with copies in place."""

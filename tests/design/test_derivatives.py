@@ -12,8 +12,11 @@ import pytest
 import slideviz as sv
 from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Reduction, Rotate, Translate
+from slideviz.design.frozen_interpolation import WAYS
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
+from slideviz.rbf.methods import SLIDING_METHODS
+from slideviz.terms import SLIDING
 from tests import builders
 from tests.test_halo import MESHES, both, case_of
 from tests.test_laws import METHODS, box, box_case, sector, sector_case
@@ -160,6 +163,10 @@ def test_curved_boundaries_nodes_on_the_axis_and_coinciding_ones(shape, sliding,
 def test_curved_boundaries_in_several_steps(shape):
     mesh, roles, motion = SHAPES[shape]()
     check(Case(roles=roles, motions=motion, sliding="ds", steps=3), mesh)
+
+
+def test_every_way_of_sliding_has_derivatives():
+    assert set(WAYS) == set(SLIDING) == set(SLIDING_METHODS)
 
 
 @pytest.mark.parametrize("sliding", ["ps", pytest.param("ds", marks=pytest.mark.slow)])

@@ -1,0 +1,216 @@
+"""Interpolation by radial basis functions on a frozen step, with each way of sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from slideviz.design.frozen_fit import FrozenFit, Rows
+from slideviz.design.frozen_method import Method, Solved
+from slideviz.design.frozen_spread import Spread, chosen_spread, shares
+from slideviz.design.loops import take_over
+from slideviz.design.tape import (
+    Array,
+    Variable,
+    dot,
+    inverse,
+    join,
+    length,
+    mixed,
+    multiply,
+    put,
+    reshape,
+    take,
+    value,
+)
+from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
+from slideviz.rbf.constraint_rows import AGREE, INDEPENDENT, refuse
+from slideviz.rbf.methods import LOST
+from slideviz.rbf.methods import ROUNDING as FLAT
+from slideviz.terms import Sliding
+
+CHECKED = 1e11
+"""From this condition number on, solutions of further designs are checked as those of a run. Data
+reduction makes more of a difference than rounding."""
+
+
+class Interpolation(Method):
+    """Radial basis functions (`slideviz.rbf.methods`)."""
+
+    def run(self) -> Solved:
+        """Return what the way of sliding finds."""
+        return WAYS[self._step.sliding](self)
+
+    def _regular(self) -> Solved:
+        """Sliding nodes follow as inner nodes do (`slideviz.rbf.methods.regular`)."""
+        fit = self._fit()
+        self._meet(fit, self._known, self._values)
+        return self._finished(fit, self._known, self._values)
+
+    def _pseudo(self) -> Solved:
+        """Edges slide first, then surfaces (`slideviz.rbf.methods.pseudo_sliding`)."""
+        setup, fit = self._setup, self._fit()
+        self._meet(fit, self._known, self._values)
+        nodes, values = self._known, self._values
+        for name, level in (("edge", self._edge), ("surface", self._surface)):
+            if not len(level):
+                continue
+            free = self._less_behind(fit.at(level), level)
+            if setup.tracks.curved:
+                free = self._within(level, free)
+            slid = self._project(level, free, name)
+            new = np.flatnonzero(~np.isin(setup.same_as[level], setup.same_as[nodes]))
+            nodes, values = np.concatenate([nodes, level]), join(values, slid)
+            self._merged(nodes, values)
+            self._meet(fit, level[new], take(slid, new))
+        return self._finished(fit, nodes, values)
+
+    def _direct(self) -> Solved:
+        """Sliding by the system itself (`slideviz.rbf.methods.direct_sliding`)."""
+        if not len(self._normal_nodes):
+            return self._regular()
+        setup, fit = self._setup, self._fit()
+        fit.add(self._sliding_rows(), self._stages.pop(0), "first")
+        doubt = fit.doubt
+        sliding = np.concatenate([self._edge, self._surface])
+        nodes = np.concatenate([self._known, sliding])
+        free = self._less_behind(fit.at(sliding), sliding)
+        if not setup.tracks.curved:
+            free = self._within(sliding, free)
+        slid = self._project(sliding, free, "slid")
+        if not self._stages:
+            off = self._step.choices("off", lambda: self._off(value(slid), value(free)))
+            slid = put(free, off, take(slid, off)) if len(off) else free
+            return self._finished(fit, nodes, join(self._values, slid))
+        values = join(self._values, slid)
+        second = self._fit()
+        second.doubt = doubt
+        self._meet(second, nodes, values)
+        return self._finished(second, nodes, values)
+
+    def _off(self, slid: FloatArray, free: FloatArray) -> IntArray:
+        """Return which slid nodes leave a straight edge of a curved surface."""
+        gap = np.abs(slid - free).max(axis=1, initial=0.0)
+        return np.flatnonzero(gap > FLAT * largest_coordinate(value(self._coords)))
+
+    def _fit(self) -> FrozenFit:
+        setup = self._setup
+        return FrozenFit(
+            setup.basis,
+            self._features,
+            setup.coords.shape[1],
+            chosen=self._step.choices,
+            fixed=self._keep,
+            refined=self._step.refined > 0.0,
+            checked=setup.reduction is None and self._step.condition > CHECKED,
+        )
+
+    def _meet(self, fit: FrozenFit, nodes: IntArray, values: Array) -> None:
+        """Give a fit the rows of nodes with known displacement."""
+        merged, data = self._merged(nodes, self._plus_behind(values, nodes))
+        stage = f"stage {len(self._stages)}"
+        fit.add(Rows(merged, None, data), self._stages.pop(0), stage)
+
+    def _sliding_rows(self) -> Rows:
+        """Return the rows of direct sliding (`slideviz.rbf.constraint_rows.sliding_rows`)."""
+        known, same = self._known, self._setup.same_as
+        d = self._setup.coords.shape[1]
+        nodes = np.concatenate([np.repeat(known, d), self._normal_nodes])
+        normals = join(np.tile(np.eye(d), (len(known), 1)), self._normals)
+        values = reshape(self._plus_behind(self._values, known), len(known) * d, 1)
+        behind = self._behind(self._normal_nodes)
+        across: Array = np.zeros((len(self._normal_nodes), 1))
+        if behind is not None:
+            across = dot(behind, self._normals)
+        right = join(values, across)
+        order = np.argsort(same[nodes], kind="stable")
+        nodes, normals, right = nodes[order], take(normals, order), take(right, order)
+        stands = same[nodes]
+        starts = np.flatnonzero(np.r_[True, stands[1:] != stands[:-1]])
+        count = np.diff(np.r_[starts, len(nodes)])
+        mixed = np.maximum.reduceat(nodes, starts) != np.minimum.reduceat(nodes, starts)
+        keep = np.ones(len(nodes), bool)
+        for size in np.unique(count[mixed]).tolist():
+            rows = starts[mixed & (count == size), None] + np.arange(size)
+            normals, right = self._orthonormal(nodes, normals, right, rows, keep)
+        kept = np.flatnonzero(keep)
+        return Rows(stands[kept], take(normals, kept), take(right, kept))
+
+    def _orthonormal(
+        self, nodes: IntArray, normals: Array, right: Array, rows: IntArray, keep: np.ndarray
+    ) -> tuple[Array, Array]:
+        """Orthonormalise the constraints of coinciding nodes, and mark those to leave out."""
+        for k, row in enumerate(rows.T):
+            n, b = take(normals, row), take(right, row)
+            for other in rows.T[:k]:
+                along = multiply(dot(n, take(normals, other)), keep[other, None].astype(float))
+                n = n - multiply(take(normals, other), along)
+                b = b - multiply(along, take(right, other))
+            size = length(n)
+            new = self._step.choices(
+                f"independent {rows.shape[1]} {k}",
+                partial(_above, value(size), INDEPENDENT),
+            )
+            wrong = ~new & (np.abs(value(b)[..., 0]) > AGREE * self._setup.basis.radius)
+            if wrong.any():
+                at = rows[int(np.argwhere(wrong)[0][-1])]
+                refuse(int(nodes[at[k]]), int(nodes[at[0]]), float(np.abs(value(b)).max()))
+            mask = new[:, None].astype(float)
+            scale = inverse(multiply(size, mask) + (1.0 - mask))
+            keep[row] = new
+            normals = put(normals, row, multiply(n, scale))
+            right = put(right, row, multiply(b, scale))
+        return normals, right
+
+    def _finished(self, fit: FrozenFit, nodes: IntArray, values: Array) -> Solved:
+        """Evaluate at all nodes; boundary nodes are set, and what they lack is spread."""
+        setup = self._setup
+        displacement = self._in_room(fit.at(slice(None), room=self._room))
+        errors = values - take(displacement, nodes)
+        total = self._plus_behind(errors, nodes)
+        lag = total if setup.reduction is not None else None
+        size = np.linalg.norm(value(total), axis=-1)
+        lost = np.zeros(size.shape[:-1])
+        if setup.reduction is None:
+            inside = ~np.isin(setup.same_as[nodes], self._step.dropped)
+            gap = np.linalg.norm(value(errors), axis=-1)
+            lost = np.where(inside, gap, 0.0).max(axis=-1, initial=0.0)
+
+        def choose() -> Spread | None:
+            most = float(np.linalg.norm(value(values), axis=-1).max(initial=0.0))
+            needed = float(np.max(lost)) > LOST * most or len(self._step.dropped) > 0
+            return chosen_spread(setup, value(self._coords), nodes, value(errors), needed=needed)
+
+        spread = self._step.choices("correction", choose)
+        if spread is not None:
+            displacement = self._spread(displacement, spread, errors)
+        displacement = put(displacement, nodes, values, own=True)
+        most = size.max(axis=-1, initial=0.0)
+        return Solved(displacement, lag, nodes, most, lost, doubt=fit.doubt)
+
+    def _spread(self, displacement: Array, spread: Spread, errors: Array) -> Array:
+        """Add what targets take over."""
+        setup = self._setup
+        means = spread.mixing(value(errors).shape[-2])
+        part = self._keep("shares", lambda: shares(setup, self._coords, spread))
+        if displacement is self._room and not isinstance(part, Variable):
+            take_over(self._room, spread.targets, means, part[:, 0], value(errors))
+            return displacement
+        taken = mixed(means, errors)
+        taken = multiply(taken, part)
+        more = take(displacement, spread.targets) + taken
+        return put(displacement, spread.targets, more, own=True)
+
+
+def _above(size: FloatArray, least: float) -> np.ndarray:
+    return np.asarray(size[:, 0] > least)
+
+
+WAYS: Mapping[Sliding, Callable[[Interpolation], Solved]] = {
+    "none": Interpolation._regular,
+    "ps": Interpolation._pseudo,
+    "ds": Interpolation._direct,
+}
+"""The ways of sliding, as `slideviz.rbf.methods.SLIDING_METHODS` has them."""
