@@ -71,6 +71,7 @@ class Bar:
         self.enabled = enabled and sys.stderr.isatty()
         self._head, self._expected = head, expected
         self._next, self._phase = 0.0, ""
+        self._first = self._filled = 0.0
         self._start = time.monotonic()
 
     def __enter__(self) -> Bar:
@@ -103,17 +104,22 @@ class Bar:
         self._draw(done, f"{self._head}{steps}")
 
     def phase(self, progress: Progress) -> None:
-        """Draw the bar for the phase in work alone, with the time that is left of it."""
+        """Draw the bar for the phase in work, with the time that is left of all, or else of it."""
         now = time.monotonic()
+        self._first = self._first or now
         if progress.phase != self._phase or not progress.fraction:
             self._phase, self._start = progress.phase, now
         if not self.enabled or now < self._next:
             return
         self._next = now + _EVERY
-        done = progress.fraction
+        done = filled = progress.fraction
         left = f", about {(now - self._start) / done * (1 - done):.0f} s left" if done else ""
+        if progress.left is not None:
+            spent = now - self._first
+            self._filled = max(self._filled, spent / (spent + progress.left or 1.0))
+            filled, left = self._filled, f", about {progress.left:.0f} s left in all"
         word = _PHASES.get(progress.phase, progress.phase)
-        self._draw(done, f"{self._head}{word}: {100 * done:.0f} %{left}")
+        self._draw(filled, f"{self._head}{word}: {100 * done:.0f} %{left}")
 
     def count(self, done: int, total: int, what: str, rest: float | None = None) -> None:
         """Draw the bar for ``done`` of ``total`` things, with the seconds that the rest takes."""

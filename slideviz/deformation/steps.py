@@ -25,12 +25,15 @@ class Progress:
         ``classify``, ``select``, ``solve``, ``evaluate``, ``project`` or ``correct``.
     fraction : float
         Of the phase, 0 to 1.
+    left : float or None
+        Seconds that all the work may still take, where that is known.
     """
 
     step: int
     total: int
     phase: str
     fraction: float
+    left: float | None = None
 
 
 @dataclass(frozen=True)

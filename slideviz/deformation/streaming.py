@@ -17,6 +17,7 @@ import numpy as np
 
 from slideviz import __version__
 from slideviz.case.model import Case
+from slideviz.deformation.course import Course
 from slideviz.deformation.given_mesh import given_for, require_su2
 from slideviz.deformation.measuring import folded_steps
 from slideviz.deformation.output import Output
@@ -123,8 +124,10 @@ def stream(
     path = case.mesh_file
     require_stream(case)
     total = max(1, case.steps)
-    watch = Watch(lambda phase, part: tell(Progress(total, total, phase, part)))
     is_text = (file_format or output.suffix.lower().removeprefix(".")) == "su2"
+    first = "text" if require_su2(path, case.mesh_format) == "su2" else "read"
+    course = Course(tell, first, "solve", "evaluate", "quality", *("write",) * is_text)
+    watch = Watch(lambda phase, part: course(Progress(total, total, phase, part)))
     with ExitStack() as stack:
         with watch.phase("read") as tick:
             given = stack.enter_context(
@@ -159,14 +162,20 @@ def stream(
 
         def read() -> Mesh:
             with watch.phase("read") as tick:
-                return given.skin(tick, ranks)
+                skin = given.skin(tick, ranks)
+            course.next()
+            return skin
 
-        rest = _solved(case, read, out, tell)
+        rest = _solved(case, read, out, course)
         give_back()
+        course.next()
         out.displace(rest, final=True)
+        course.next()
         rating = out.rating(listed)
         folded = folded_steps(rest, out.files, rating.inverted)
         moved = rest.steps[-1].mesh.origin.ffd
+        if is_text:
+            course.next()
         out.finish(None if moved is rest.skin.origin.ffd else moved)
     return Streamed(
         rest.skin,

@@ -16,7 +16,8 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import given_mesh, output, rest, streaming
+from slideviz.deformation import course, given_mesh, output, rest, streaming
+from slideviz.deformation.course import SECONDS
 from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
 from slideviz.deformation.streaming import stream
@@ -574,6 +575,61 @@ def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):
 
 def progress_of(phase, fraction):
     return Progress(1, 1, phase, fraction)
+
+
+@pytest.mark.parametrize("stages", [("read", "solve", "evaluate", "quality"), tuple(SECONDS)])
+def test_what_is_left_is_of_all_stages(monkeypatch, stages):
+    """On a machine of half the speed, all is known from the first stage on."""
+    now, told = 0.0, []
+    monkeypatch.setattr(course, "monotonic", lambda: now)
+    one = course.Course(told.append, *stages)
+    total = 2.0 * sum(SECONDS[stage] for stage in stages)
+    for k, stage in enumerate(stages):
+        if k:
+            one.next()
+        begin = now
+        for fraction in (0.0, 0.05, 0.5, 1.0):
+            now = begin + 2.0 * SECONDS[stage] * fraction
+            phase = {"text": "read", "solve": "select"}.get(stage, stage)
+            one(progress_of(phase, fraction))
+            # That another phase ends does not matter, such as that the copy of the mesh is there.
+            one(progress_of("elsewhere", 1.0))
+            if now >= 0.2:
+                assert told[-2].left == pytest.approx(total - now)
+                assert told[-1].left == pytest.approx(total - now)
+    assert told[0].left is None
+
+
+def test_steps_tell_how_long_the_boundary_takes(monkeypatch):
+    now, told = 0.0, []
+    monkeypatch.setattr(course, "monotonic", lambda: now)
+    one = course.Course(told.append, "read", "solve", "quality")
+    now = SECONDS["read"]
+    one.next()
+    now += 7.0
+    one(Progress(1, 4, "classify", 0.0))
+    now += 10.0
+    one(Progress(2, 4, "select", 0.0))
+    assert told[-1].left == pytest.approx(30.0 + SECONDS["quality"])
+
+
+def test_the_bar_tells_what_is_left_of_all(monkeypatch):
+    from slideviz.cli import progress as module
+
+    drawn, clock = [], iter(range(0, 1000, 10))
+    monkeypatch.setattr(module, "control", drawn.append)
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr(module.sys.stderr, "isatty", lambda: True, raising=False)
+    bar = module.Bar()
+    for phase, fraction, left in (("read", 0.5, 30.0), ("read", 1.0, 10.0), ("quality", 0.1, 40.0)):
+        bar.phase(replace(progress_of(phase, fraction), left=left))
+    assert [text.rpartition("] ")[2] for text in drawn] == [
+        "reading: 50 %, about 30 s left in all",
+        "reading: 100 %, about 10 s left in all",
+        "measuring cells: 10 %, about 40 s left in all",
+    ]
+    filled = [text.count("#") for text in drawn]
+    assert filled == [0, 12, 12]
 
 
 @pytest.mark.slow
