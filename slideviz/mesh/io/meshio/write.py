@@ -46,7 +46,8 @@ _EXACT = 1e-12
 _TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "u1": "UInt8"}
 _BLOCK_BYTES = 3 << 18
 """A multiple of 3, so that the encoded blocks join."""
-# VTK counts the nodes of a prism so that its first triangle faces outward.
+# Until VTK 9.7 (vtk!12988) the first triangle of a prism faced outward. Files do not tell, and what
+# else reads VTU files (older ParaView, meshio) has it so still; VTKHDF files have the new order.
 _PRISM = np.array([0, 2, 1, 3, 5, 4])
 
 
