@@ -316,9 +316,10 @@ def test_the_report_has_the_misfit(tmp_path, periodic, capsys):
 def test_nodes_left_out_are_harmless_only_where_the_interpolation_meets_them():
     mesh = builders.square(6)
     zeros = np.zeros((len(mesh.points), 2))
+    setup = make_setup(Case(roles={"BLOCK": "moving"}, motions=(Rotate("BLOCK", 1.0),)), mesh)
     for error, note in ((1e-12, True), (1e-3, False)):
         solution = Solution(zeros, 1, 0.0, np.array([3]), 1.0, dropped_error=error)
-        (warning,) = stepping._dropped_warning(solution, 1, mesh)
+        (warning,) = stepping._dropped_warning(setup, solution, 1, mesh)
         assert isinstance(warning, Note) == note
         assert f"off by {error:.2g} at most" in warning
         assert "no harm" not in warning

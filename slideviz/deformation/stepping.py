@@ -21,6 +21,7 @@ from slideviz.mesh.threads import in_parts
 from slideviz.rbf.constraint_rows import AGREE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import largest_misfit
+from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Problem, Solution, Watch
 from slideviz.rbf.refine import TRUSTED
 
@@ -109,7 +110,7 @@ class Stepping:
             if solution.short and solution.max_error > worst:
                 remarks, worst = [_short_warning(setup, solution, index)], solution.max_error
             elif not remarks:
-                remarks = _dropped_warning(solution, index, mesh)
+                remarks = _dropped_warning(setup, solution, index, mesh)
             warnings += [f"step {index}: {text}" for text in solution.warnings]
             least = max(least, (solution.doubt, solution.refined, index, solution.condition))
             yield replace(
@@ -301,10 +302,18 @@ def _doubt_warning(doubt: float, refined: float, index: int, condition: float) -
     return []
 
 
-def _dropped_warning(solution: Solution, index: int, mesh: Mesh) -> list[str]:
-    """Return the sentence about nodes that the pivot guard left out."""
+def _dropped_warning(setup: Setup, solution: Solution, index: int, mesh: Mesh) -> list[str]:
+    """Return the sentence about nodes that the pivot guard left out, or of a singular system."""
     if not len(solution.dropped):
         return []
+    if KERNELS[setup.basis.kernel].polynomial:
+        sentence = (
+            f"from step {index} on, the system is singular for RBF_KERNEL= {setup.basis.kernel}, "
+            f"and its {solution.control_nodes} control nodes are met by least squares, to "
+            f"{solution.dropped_error:.2g}; they still get exactly their displacement, and the "
+            "cells beside them take that up; use RBF_KERNEL= wendland-c2"
+        )
+        return [sentence]
     node = int(solution.dropped[0])
     where = ", ".join(f"{v:.6g}" for v in mesh.points[node])
     sentence = (

@@ -185,14 +185,15 @@ def _finish(
         with watch.phase("correct") as tick:
             correct(problem, displacement, nodes, correction, tick)
     displacement[nodes] = values
+    control = _in_system(fit)
     return Solution(
         displacement,
-        len(fit.found.nodes),
+        len(control),
         float(np.linalg.norm(total, axis=1).max(initial=0.0)),
         fit.dropped,
         fit.condition(),
         fit.history,
-        control=fit.found.nodes,
+        control=control,
         lag=lag,
         dropped_error=float(np.linalg.norm(errors[left_out], axis=1).max(initial=0.0)),
         short=fit.short,
@@ -202,6 +203,12 @@ def _finish(
         field=replace(fit.found.field(problem), correction=correction),
         stages=fit.stages,
     )
+
+
+def _in_system(fit: Fit) -> IntArray:
+    """Return the nodes of the interpolant (c,) that the pivot guard did not leave out."""
+    rows = [np.empty(0, np.int64), *(level[:, 0] for level in fit.stages[-1])]
+    return fit.found.nodes[np.isin(fit.found.nodes, np.concatenate(rows))]
 
 
 def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Correction | None:

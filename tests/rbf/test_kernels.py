@@ -1,15 +1,18 @@
 """The fourteen radial functions: definitions, compiled loops, polynomials, whole runs."""
 
+import re
+
 import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.case.model import Reduction
+from slideviz.case.model import Case, Reduction, Rotate
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.solve import condition, saddle_condition, solve_saddle
 from slideviz.samples.table import sample, write_sample
+from tests import builders
 
 COMPACT = [name for name, kernel in KERNELS.items() if kernel.compact]
 TAILED = [name for name, kernel in KERNELS.items() if kernel.polynomial]
@@ -106,6 +109,20 @@ def test_the_quadric_is_told_to_be_singular():
         matrix(basis, (x, None)), linear_terms(basis, x), rng.standard_normal((30, 2))
     )
     assert found.rank_deficient
+
+
+def test_a_run_counts_the_nodes_that_carry_a_weight():
+    mesh = builders.square(6)
+    roles = dict.fromkeys(mesh.marker_names, "fixed") | {"BLOCK": "moving"}
+    case = Case(roles=roles, motions=(Rotate("BLOCK", 3.0),))
+    (step,) = sv.deform(case.change(kernel="gaussian", influence_factor=20.0), mesh)
+    assert len(step.control) == step.control_nodes < step.candidates
+    left_out = step.candidates - step.control_nodes
+    assert any(f"{left_out} boundary nodes that nearly" in text for text in step.warnings)
+    (step,) = sv.deform(case.change(kernel="quadric"), mesh)
+    assert step.control_nodes == step.candidates
+    said = "singular for RBF_KERNEL= quadric, and its .* control nodes are met by least squares"
+    assert any(re.search(said, text) for text in step.warnings)
 
 
 def test_condition_is_that_of_numpy():
