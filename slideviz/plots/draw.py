@@ -56,7 +56,8 @@ def quality_by_step(axes: Axes, runs: Sequence[StepRun], style: Style = PRINT) -
         look = _line(style, place(run.series, index))
         # Of many steps some markers do, those of each run at other steps.
         every = max(1, len(run.steps) // 6)
-        look["markevery"] = (index % every, every)
+        last = len(run.steps) - 1
+        look["markevery"] = sorted({*range(index % every, last, every), last})
         hollow = {**look, "markerfacecolor": style.scheme.background}
         axes.plot(run.steps, run.minimum, label=run.label, gid=f"minimum:{run.label}", **look)
         axes.plot(run.steps, run.mean, gid=f"mean:{run.label}", **hollow)

@@ -15,6 +15,8 @@ from slideviz.session.state import Place, Run, Session
 
 LARGE = 1e9
 """Bytes from which on a message says beforehand what a run takes."""
+MOST_NAMES = 2
+"""Boundaries that a hint names; of more it tells the number."""
 RATE = 2e10
 """Operations a second of a machine with few cores, when it factors a large matrix."""
 
@@ -172,6 +174,20 @@ def _problems(session: Session) -> list[str]:
 _LABELLED = sorted((name for name, key in KEYS.items() if key.label), key=len, reverse=True)
 # A key, and its value where one follows; of a file, "DATA_REDUCTION= YES" is one thing.
 _KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:\s?([\w.+-]*\w))?)?")
+
+
+def idle_words(case: Case) -> tuple[str, ...]:
+    """Return sentences about roles that the settings do not use, which is seldom meant."""
+    found: list[str] = []
+    for role, mode, title, verb in (
+        ("periodic", case.periodic, "Periodicity", "repeat"),
+        ("sliding", case.sliding, "Sliding", "slide"),
+    ):
+        names = case.markers_with(role)
+        who = " and ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} boundaries"
+        if names and mode == "none":
+            found.append(f"{title} is “none”: {who} will not {verb}.")
+    return tuple(found)
 
 
 def in_window_words(text: str) -> str:

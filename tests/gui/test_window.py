@@ -16,6 +16,7 @@ from slideviz.case.model import AUTO, FromFile, Reduction, Rotate, Scale, Transl
 from slideviz.errors import Note
 from slideviz.gui.viewport import player as player_module
 from slideviz.gui.viewport.player import plain, result_parts, step_ms
+from slideviz.gui.widgets.fields import NumberField
 from slideviz.mesh.quality import INVERTED
 from slideviz.session import changes, jobs
 from slideviz.session.run_messages import ended
@@ -921,6 +922,26 @@ def test_a_picture_is_saved_at_the_size_asked_for(opened, answers, tmp_path, mon
     assert orange > 500
     before = opened.window.view.snapshot()
     assert before.std() > 5, "the view still works"
+
+
+def test_roles_that_the_method_does_not_use_are_said(opened):
+    said = opened.window.boundaries.idle_text
+    assert not said.isVisible()
+    opened.window.store.change(changes.set_case, sliding="none", periodic="none")
+    assert said.text().splitlines() == [
+        "Periodicity is “none”: periodic_1 and periodic_2 will not repeat.",
+        "Sliding is “none”: inflow and outflow will not slide.",
+    ]
+
+
+def test_a_number_that_is_not_taken_is_said(opened):
+    opened.add_motion(Translate)
+    field = next(f for f in opened.window.motions.findChildren(NumberField) if f.isVisible())
+    before = field.text()
+    opened.type(field, "1..5")
+    assert field.text() == before
+    said = opened.window.statusBar().currentMessage()
+    assert said == f"Not taken: “1..5” is not a number; {before} is there again."
 
 
 def test_what_moves_fills_the_view_or_what_is_selected(opened):

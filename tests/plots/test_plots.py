@@ -82,6 +82,16 @@ def test_steps_show_minimum_and_mean_of_each_run(axes):
     assert axes.get_ylim()[0] == 0
 
 
+@pytest.mark.parametrize("count", [2, 7, 14, 40])
+def test_the_last_step_has_a_marker(axes, count):
+    values = np.linspace(1.0, 0.5, count)
+    runs = [StepRun(name, np.arange(count), values, values) for name in "ab"]
+    quality_by_step(axes, runs)
+    for line in axes.lines[:4]:
+        assert line.get_markevery()[-1] == count - 1
+        assert len(line.get_markevery()) <= 8
+
+
 def test_convergence_marks_levels_and_tolerance(axes):
     run = GreedyRun(
         "a",

@@ -24,6 +24,7 @@ from slideviz.gui.widgets.icons import role_icon
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.panel import Panel
 from slideviz.session import changes
+from slideviz.session.run_messages import idle_words
 from slideviz.session.state import Session
 from slideviz.session.store import Store
 from slideviz.terms import ROLES, labels
@@ -88,7 +89,10 @@ class BoundariesPanel(Panel):
             "keep",
         )
         guesses = in_row(self.guess_text, self.keep, wide=[self.guess_text])
-        in_column(self.table, guesses, wide=[self.table], spacing=4, on=self, margins=(6, 6, 6, 4))
+        self.idle_text = hint_label()
+        self.idle_text.setToolTip("The panel Method has what they do.")
+        parts = (self.table, self.idle_text, guesses)
+        in_column(*parts, wide=[self.table], spacing=4, on=self, margins=(6, 6, 6, 4))
         self.setFocusProxy(self.table)
         self.follow()
 
@@ -131,6 +135,8 @@ class BoundariesPanel(Panel):
             for row, name in enumerate(names):
                 self._sync_row(session, row, name)
             self._sync_selection(session)
+        self.idle_text.setText("\n".join(idle_words(session.case)))
+        self.idle_text.setVisible(bool(self.idle_text.text()))
         count = len(session.guesses)
         self.keep.setVisible(count > 0)
         self.guess_text.setVisible(count > 0 or (session.mesh is not None and not names))

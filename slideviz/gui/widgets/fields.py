@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 from slideviz.gui.widgets.arithmetic import typed_number
 from slideviz.gui.widgets.build import set_style
 from slideviz.gui.widgets.labels import wrapped
+from slideviz.gui.widgets.services import main_window
 
 
 def number_text(value: float) -> str:
@@ -59,7 +60,8 @@ class NumberField(QLineEdit):
 
     ``allowed`` returns an empty text, or why a value may not be. Six digits are shown, every one
     while it is edited; the value keeps them all. What is not valid when the field is left goes
-    back to the number before it was edited, not to a valid beginning of what was typed. ``fault``
+    back to the number before it was edited, not to a valid beginning of what was typed, and the
+    status bar says so. ``fault``
     is the reason for which it is marked, ``together`` one that it has from others beside it;
     ``marked`` tells that the reason has changed.
     """
@@ -191,6 +193,10 @@ class NumberField(QLineEdit):
         if not self.problem:
             self._before = self._value
             return
+        window = main_window(self)
+        if window is not None:
+            back = short_text(self._before, self._scale)
+            window.say(f"Not taken: {self.problem}; {back} is there again.")
         typed, self._value = self._value, self._before
         self._write()
         if typed != self._value:

@@ -64,6 +64,7 @@ QStatusBar::item {{ border: none; }}
 QMainWindow::separator {{ width: 5px; height: 5px; background: {Window}; }}
 QToolTip {{ padding: 4px; border: 1px solid {frame}; background: {ToolTipBase};
     color: {ToolTipText}; }}
+QMenu {{ border: 1px solid {frame}; }}
 QListWidget#motions::item {{ padding: 3px 2px; }}
 QLabel[hint="true"] {{ color: {soft}; }}
 QLabel[bad="true"] {{ color: {bad}; }}
