@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from slideviz.sections.model import Section
 
 UNDO_WORDS: dict[str, str] = {
-    "colour_by": "colour by",
     "colour_range": "colour range",
     "colour_map": "colours",
     "threshold": "range of cells",
@@ -29,7 +28,9 @@ UNDO_WORDS: dict[str, str] = {
 """What the menu calls a change of one thing in the view; it says "view" of several at once."""
 
 
-def _undo_words(values: Mapping[str, Any]) -> str:
+def _undo_words(values: Mapping[str, Any]) -> str | None:
+    if "colour_by" in values:
+        return None  # who looks at something else does not change it
     return UNDO_WORDS.get(next(iter(values)), "view") if len(values) == 1 else "view"
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from slideviz.case.model import Case
 from slideviz.session.changes_runs import bring_back, remove_run, show_run
+from slideviz.session.changes_view import set_view
 from slideviz.session.state import Guess, Session, ViewState
 from slideviz.session.undoable import undo_words
 
@@ -74,14 +75,16 @@ class Memento:
     def put_into(self, session: Session) -> Session:
         """Return the session with the memento's values; the step that is shown stays."""
         session = self._put_runs(session)
-        view = session.view.in_style(self.style)
+        coloured_by, view = session.view.colour_by, session.view.in_style(self.style)
         # Where the case was saved to does not come back: it is on disk, undone or not.
         case = self.case.change(
             source=session.case.source,
             mesh_out=session.case.mesh_out,
             warnings=session.case.warnings,
         )
-        return replace(session, case=case, guesses=self.guesses, view=view)
+        session = replace(session, case=case, guesses=self.guesses, view=view)
+        # What the view is coloured by is not undone.
+        return set_view(session, colour_by=coloured_by)
 
     def _put_runs(self, session: Session) -> Session:
         """Return the session with the runs back that were there, and without removed ones."""

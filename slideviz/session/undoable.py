@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 Change = TypeVar("Change", bound=Callable[..., Any])
-Words = str | Callable[[Mapping[str, Any]], str]
+Words = str | Callable[[Mapping[str, Any]], str | None]
 
 _WORDS: dict[Callable[..., Any], Words] = {}
 
@@ -17,7 +17,8 @@ def undoable(words: Words) -> Callable[[Change], Change]:
     Parameters
     ----------
     words : str or callable
-        What stands after "Undo" in the menu, or what returns it for the named values.
+        What stands after "Undo" in the menu, or what returns it for the named values; None where
+        these are not undone.
     """
 
     def mark(change: Change) -> Change:

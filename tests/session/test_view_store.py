@@ -137,7 +137,7 @@ def test_each_change_that_can_be_undone_has_words():
 
 
 def test_each_field_of_the_view_that_can_be_undone_has_a_word():
-    passing = {"selected", "frame", "marked_cell", "beside", "swapped", "ranges"}
+    passing = {"selected", "frame", "marked_cell", "beside", "swapped", "ranges", "colour_by"}
     other_changes = {"section_index", "handle"}
     those = {field.name for field in fields(ViewState)} - passing - other_changes
     assert set(UNDO_WORDS) == those - {"drawn"} | set(SHOWN)
@@ -151,7 +151,28 @@ def test_undo_says_what_of_the_view_it_brings_back(store, clock):
     while store.can_undo:
         said.append(store.can_undo)
         store.undo()
-    assert said == ["neighbours", "colour range", "colour by"]
+    assert said == ["neighbours", "colour range"]
+
+
+def test_what_the_view_is_coloured_by_is_not_undone(store, clock):
+    def change(**values):
+        store.change(changes.set_view, **values)
+        clock.now += 10
+
+    change(colour_by="size-skew")
+    assert not store.can_undo
+    change(colour_range=(0.5, 1.0))
+    change(colour_by="skew")
+    change(passages=1)
+    store.undo()
+    assert (store.session.view.passages, store.session.view.colour_by) == (0, "skew")
+    # Nor does undoing change it; the range that goes is that of the other quality.
+    store.undo()
+    assert (store.session.view.colour_by, store.session.view.colour_range) == ("skew", None)
+    change(colour_by="size-skew")
+    assert store.session.view.colour_range is None
+    store.redo()
+    assert store.session.view.colour_range == (0.5, 1.0)
 
 
 def test_what_the_mouse_holds_is_undone_as_one_however_long_it_takes(store, clock):
@@ -306,7 +327,9 @@ def test_any_intents_keep_the_session_valid_and_undoing_all_gives_the_first_back
     while store.can_undo:
         store.undo()
         require_valid(store.session)
-    assert Memento.of(store.session) == Memento.of(session)
+    # But for what the view is coloured by.
+    back = changes.set_view(store.session, colour_by=session.view.colour_by)
+    assert Memento.of(back) == Memento.of(session)
     while store.can_redo:
         store.redo()
         require_valid(store.session)
