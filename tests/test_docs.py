@@ -17,7 +17,9 @@ from pathlib import Path
 import pytest
 
 import slideviz as sv
+from slideviz import cli
 from slideviz.cli import exit_codes
+from slideviz.samples.table import write_sample
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -99,9 +101,10 @@ def test_examples_in_docstrings(name, tmp_path, monkeypatch):
         assert runner.run(test).failed == 0
 
 
-def test_the_page_of_the_report_has_its_keys(tmp_path):
-    run(["slideviz", "sample", "passage", "--size", "12", "-o", "."], tmp_path)
-    run(["slideviz", "run", "passage.cfg", "-q", "--json", "report.json"], tmp_path)
+def test_the_page_of_the_report_has_its_keys(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_sample("passage", tmp_path, 12)
+    assert cli.run(["run", "passage.cfg", "-q", "--json", "report.json"]) == 0
     report = json.loads((tmp_path / "report.json").read_text())
     keys = set(report) | {
         f"{name}.{key}"

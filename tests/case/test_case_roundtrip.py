@@ -118,7 +118,7 @@ def cases(draw: st.DrawFn, folder: Path) -> Case:
     )
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=70, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_read_gives_back_what_was_written(data, tmp_path):
     case = data.draw(cases(tmp_path / "deep" / "down"))

@@ -112,7 +112,7 @@ def alone(tmp_path_factory):
 
 
 @needs_mpi
-@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("count", [1, 3])
 def test_bits_are_those_of_one_process(square, alone, count):
     assert done(started(square, count, *WORDS)) == (0, "", "")
     assert results(square) == alone
@@ -126,7 +126,7 @@ def test_a_text_is_that_of_a_run_in_memory(tmp_path):
     *_, last = sv.deform(case, sv.read(case.mesh_file))
     sv.write(tmp_path / "memory.su2", last.mesh)
     words = ("--stream", "-o", "out.su2")
-    assert done(started(tmp_path, 3, *words)) == (0, "", "")
+    assert done(started(tmp_path, 2, *words)) == (0, "", "")
     assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "memory.su2").read_bytes()
     assert [path.name for path in tmp_path.glob(".*")] == [".out.su2.finished"]
 

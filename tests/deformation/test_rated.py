@@ -15,6 +15,7 @@ from slideviz.mesh.io.cleanup import PREFIX
 from slideviz.samples.table import write_sample
 from tests.builders import grid
 from tests.mesh.test_su2b import WHOLE, change
+from tests.slow import one_of_each_fast
 
 
 @pytest.fixture
@@ -55,34 +56,27 @@ def meshes(folder, kind):
         (folder / "two.su2").replace(folder / f"{name}.su2")
 
 
-@pytest.mark.parametrize(
-    ("ending", "kind"),
-    [
-        ("su2b", "mixed"),
-        ("su2b", "tetrahedron"),
-        ("su2", "mixed"),
-        pytest.param("su2", "tetrahedron", marks=pytest.mark.slow),
-    ],
-)
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("info", "base.su2b"),
-        ("info", "base.su2b", "--json", "-", "--zone", "2"),
-        ("quality", "base.su2b", "--zone", "2", "--metric", "rbf-slide"),
-        ("quality", "moved.su2b", "--reference", "base.su2b"),
-        ("quality", "moved.su2b", "--reference", "base.su2b", "--json", "-"),
-        ("section", "moved.su2b", "--reference", "base.su2b", "--plane", "z=0.5", "-o", "a.png"),
-        ("section", "base.su2b", "--plane", "1,1,1,0.5,0.5,0.5", "--whole", "-o", "a.png"),
-        (
-            *("section", "moved.su2b", "--reference", "base.su2b", "--color", "displacement"),
-            *("--plane", "x=0.41", "-o", "a.png", "--json", "-"),
-        ),
-        ("section", "base.su2b", "--plane", "z=99", "-o", "a.png"),
-    ],
-)
-def test_what_is_told_is_the_same(small, capsys, ending, kind, words):
-    meshes(small, kind)
+WORDS = [
+    ("info", "base.su2b"),
+    ("info", "base.su2b", "--json", "-", "--zone", "2"),
+    ("quality", "base.su2b", "--zone", "2", "--metric", "rbf-slide"),
+    ("quality", "moved.su2b", "--reference", "base.su2b"),
+    ("quality", "moved.su2b", "--reference", "base.su2b", "--json", "-"),
+    ("section", "moved.su2b", "--reference", "base.su2b", "--plane", "z=0.5", "-o", "a.png"),
+    ("section", "base.su2b", "--plane", "1,1,1,0.5,0.5,0.5", "--whole", "-o", "a.png"),
+    (
+        *("section", "moved.su2b", "--reference", "base.su2b", "--color", "displacement"),
+        *("--plane", "x=0.41", "-o", "a.png", "--json", "-"),
+    ),
+    ("section", "base.su2b", "--plane", "z=99", "-o", "a.png"),
+]
+KINDS = [("su2b", "mixed"), ("su2", "mixed"), ("su2b", "tetrahedron"), ("su2", "tetrahedron")]
+
+
+@pytest.mark.parametrize(("words", "kind"), one_of_each_fast(WORDS, KINDS))
+def test_what_is_told_is_the_same(small, capsys, words, kind):
+    ending, cells = kind
+    meshes(small, cells)
     words = [word.replace(".su2b", f".{ending}") for word in words]
     one, other = both(capsys, *words)
     assert one == other

@@ -65,7 +65,7 @@ def test_bits_are_those_of_a_run_in_memory(tmp_path, monkeypatch, name, size, se
     steps = list(sv.deform(case, mesh))
     found, before = sv.quality(steps[-1].mesh, mesh), sv.quality(mesh)
     ids = found.inverted_cells(100)
-    for chunk in (37, 1000, 1 << 20):
+    for chunk in (37, 1 << 20):
         monkeypatch.setattr(output, "CHUNK", chunk)
         done = stream(case, tmp_path / "out.su2b")
         moved = sv.read(tmp_path / "out.su2b")
@@ -282,7 +282,7 @@ def test_killing_it_leaves_no_half_mesh(tmp_path):
     out, reference = tmp_path / "out.su2b", tmp_path / "reference.su2b"
     stream(sv.Case.read(tmp_path / "square.cfg"), reference)
     note = names_of(out)[1]
-    for goal in (2, 9, 17):
+    for goal in (2, 15):
         call = [sys.executable, "-c", SCRIPT, str(tmp_path / "square.cfg"), str(out), "resume"]
         process = subprocess.Popen(call, cwd=Path(sv.__file__).parents[1])
         until = time.monotonic() + 100

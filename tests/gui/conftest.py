@@ -31,14 +31,6 @@ DIALOGS = (
 )
 
 
-@pytest.fixture(autouse=True, scope="module")
-def modules_are_no_garbage():
-    """Leave what was imported since out of the looks for garbage, of which each test has one."""
-    gc.unfreeze()
-    gc.collect()
-    gc.freeze()
-
-
 @pytest.fixture(autouse=True)
 def nothing_of_closed_windows():
     """Collect what closed windows left, as PySide would give their wrappers to new objects.
@@ -48,9 +40,11 @@ def nothing_of_closed_windows():
     of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
 
     Qt deletes closed windows in the next event loop only: the next window would polish them, too.
+    What is there before the test, as modules are, no later look finds: each would take longer.
     """
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.collect()
+    gc.freeze()
     gc.disable()
     yield
     gc.enable()

@@ -422,7 +422,7 @@ edits = st.lists(
 )
 
 
-@settings(max_examples=400, deadline=2000)
+@settings(max_examples=200, deadline=2000)
 @given(name=st.sampled_from(sorted(SAMPLES)), changes=edits, zone=st.sampled_from([None, 1, 2]))
 @example(name="square", changes=[(0.0, 3, b"\xef\xbb\xbf")], zone=None)
 def test_changed_bytes_load_or_are_refused(name, changes, zone):
@@ -455,7 +455,7 @@ def test_any_bytes_load_or_are_refused(raw):
     "filler",
     [
         *(b" " * 3_000_000, b"%" * 3_000_000, b"= " * 1_000_000, b"\n" * 3_000_000),
-        *(b"a=1\n" * 300_000, b"%\n" * 1_000_000, b"1 " * 1_000_000),
+        *(b"a=1\n" * 100_000, b"%\n" * 1_000_000, b"1 " * 1_000_000),
     ],
     ids=["blanks", "comment", "equals", "lines", "sections", "comments", "numbers"],
 )

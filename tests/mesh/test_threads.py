@@ -44,8 +44,8 @@ def test_what_is_raised_ends_the_work(monkeypatch, cores):
 
     done.clear()
     with pytest.raises(KeyboardInterrupt):
-        in_parts(lambda part: done.append(part.start), 10**6, stop)
-    assert len(done) < 10**6
+        in_parts(lambda part: done.append(part.start), 300_000, stop)
+    assert len(done) < 299_999  # the part of the thread that stops is not done anyway
 
 
 @pytest.mark.parametrize("vtk", [5, 9, 10, 12, 13, 14])

@@ -99,12 +99,12 @@ def test_pyramid_volume_is_the_mean_of_its_corner_jacobians_over_three():
 
 @pytest.mark.parametrize(("vtk", "amount"), [(9, 0.6), (12, 0.5), (13, 0.6), (14, 0.6)])
 def test_status_agrees_with_a_dense_sample(vtk, amount):
-    cells = shaken(vtk, 60, amount, seed=5)
+    cells = shaken(vtk, 30, amount, seed=5)
     found = judged(vtk, cells)
     least = np.array([oracle.least_determinant(vtk, points, 7) for points in cells])
     assert (found.status[least <= 0] == INVERTED).all()
     assert (least[found.status == VALID] > 0).all()
-    assert 5 < found.valid < 55
+    assert 3 < found.valid < 28
     assert (found.values > 0).tolist() == (found.status != INVERTED).tolist()
 
 

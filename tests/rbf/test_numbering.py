@@ -56,7 +56,7 @@ def case_on(mesh, way, motion, **others):
     return Case(roles=roles, motions=(made,), sliding=way[0], periodic=way[1], **others)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     name=st.sampled_from(list(MESHES)),
     method=st.sampled_from(list(METHODS)),
