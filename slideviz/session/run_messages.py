@@ -179,11 +179,10 @@ _KEY = re.compile(rf"\b({'|'.join(_LABELLED)})\b(?:=(?:\s?([\w.+-]*\w))?)?")
 def idle_words(case: Case) -> tuple[str, ...]:
     """Return sentences about roles that the settings do not use, which is seldom meant."""
     found: list[str] = []
-    for role, mode, title, verb in (
-        ("periodic", case.periodic, "Periodicity", "repeat"),
-        ("sliding", case.sliding, "Sliding", "slide"),
+    for names, mode, title, verb in (
+        (case.markers_with("periodic"), case.periodic, "Periodicity", "repeat"),
+        (case.markers_with("sliding"), case.sliding, "Sliding", "slide"),
     ):
-        names = case.markers_with(role)
         who = " and ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} boundaries"
         if names and mode == "none":
             found.append(f"{title} is “none”: {who} will not {verb}.")
