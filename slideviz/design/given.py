@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.case.displacement import Displacements
+from slideviz.case.motion import ROUNDING
 from slideviz.deformation.prescribed import displaced
 from slideviz.deformation.setup import Setup
+from slideviz.design.operations import difference
+from slideviz.design.tape import Array, put, take, transform, value
 from slideviz.errors import CaseError
-from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
+from slideviz.mesh.periodic import TOLERANCE
 from slideviz.rbf.images import Spread
 
 
@@ -20,6 +24,10 @@ class Input:
 
     Attributes
     ----------
+    mesh : Mesh
+    setup : Setup
+    nodes : (m,) int64
+        The moving nodes, ascending.
     points : (s, d) float64
         The nodes that give theirs to all their images, undeformed.
     rows, turn : (s,) int64, (s, d, d) float64 or None
@@ -30,6 +38,9 @@ class Input:
         Moving nodes, by their place, that must move as one of ``points``, and that one.
     """
 
+    mesh: Mesh
+    setup: Setup
+    nodes: IntArray
     points: FloatArray
     rows: IntArray
     turn: FloatArray | None
@@ -37,6 +48,47 @@ class Input:
     source: IntArray
     others: IntArray
     followed: IntArray
+
+    def target(self, vectors: Array) -> Array:
+        """Return the displacement (..., a, d) of the known nodes, in the frame."""
+        setup = self.setup
+        own = take(vectors, self.rows)
+        if self.turn is not None:
+            own = transform(self.turn, own)
+        moved = difference(setup.frame, self.points, own)
+        self._require_alike(value(vectors), value(moved))
+        shape = (len(setup.known), self.mesh.dim)
+        return put(np.zeros(shape), self.known, take(moved, self.source))
+
+    def _require_alike(self, vectors: FloatArray, moved: FloatArray) -> None:
+        """Raise where images, or copies and their originals, are displaced differently.
+
+        Parameters
+        ----------
+        vectors, moved : (..., m, d), (..., s, d)
+            As given, and of those that count in the frame.
+        """
+        setup, mesh = self.setup, self.mesh
+        if len(self.others):
+            own = vectors[..., self.others, :]
+            follow = difference(setup.frame, mesh.points[self.nodes[self.others]], own)
+            gap = np.abs(value(follow) - moved[..., self.followed, :])
+            largest = np.linalg.norm(moved, axis=-1).max(axis=-1, initial=0.0)
+            allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
+            if (gap.max(axis=(-1, -2)) > allowed).any():
+                self._refuse(vectors)
+        if mesh.halo is not None:
+            self._refuse(vectors)
+
+    def _refuse(self, vectors: FloatArray) -> None:
+        """Raise what the solver raises where nodes that should be alike are not."""
+        setup, mesh = self.setup, self.mesh
+        for each in vectors.reshape(-1, *vectors.shape[-2:]):
+            moved = displaced(Displacements(self.nodes, each), mesh)
+            there = setup.frame.difference(mesh.points[moved.nodes], moved.vectors)
+            largest = float(np.linalg.norm(there, axis=1).max(initial=0.0))
+            allowed = TOLERANCE * largest + ROUNDING * largest_coordinate(self.mesh.points)
+            Spread(moved.nodes, there, setup.classes.stands).require_alike(allowed)
 
 
 def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
@@ -64,6 +116,9 @@ def given_input(mesh: Mesh, setup: Setup, asked: Displacements) -> Input:
     lead = spread.source(moved.nodes)
     others = np.flatnonzero(lead != moved.nodes)
     return Input(
+        mesh,
+        setup,
+        asked.nodes,
         frozen_array(mesh.points[nodes], np.float64),
         rows,
         turn,

@@ -1,0 +1,93 @@
+"""What a deformer says of its accuracy: notes and warnings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from slideviz.design.frozen_step import FrozenStep
+from slideviz.errors import ConditionWarning, Note, ToleranceWarning
+from slideviz.mesh.model import FloatArray
+from slideviz.rbf.refine import TRUSTED
+
+BADLY_CONDITIONED = 1e14
+"""From this condition number on, what a single node moves alone has few correct digits."""
+
+REMEDY = (
+    "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "
+    "wendland-c0, or a smaller INFLUENCE_FACTOR"
+)
+
+
+def largest_condition(steps: Sequence[FrozenStep]) -> float:
+    """Return the largest condition number of the systems at the reference."""
+    return max((step.condition for step in steps), default=1.0)
+
+
+def note_of_refinement(steps: Sequence[FrozenStep]) -> tuple[str, ...]:
+    """Return the sentence about systems that are solved with twice the digits."""
+    refined = max((step.refined for step in steps), default=0.0)
+    if not refined:
+        return ()
+    return (
+        Note(
+            f"the system is nearly singular (condition number {largest_condition(steps):.0e}): "
+            f"between the boundary nodes designs would be wrong by up to {100 * refined:.2g} % "
+            "of the largest displacement, so all are solved with twice the digits; those for "
+            "which that does not suffice are told by a ConditionWarning"
+        ),
+    )
+
+
+def warn_of_condition(steps: Sequence[FrozenStep]) -> None:
+    """Warn where designs that are less smooth than the reference may have few digits."""
+    worst = max((step.condition for step in steps if not step.refined), default=0.0)
+    doubt = max((step.doubt for step in steps), default=0.0)
+    if doubt > TRUSTED:
+        worst = largest_condition(steps)
+        amount = f"may be wrong by {100 * doubt:.2g} % of the largest displacement"
+    elif worst > BADLY_CONDITIONED:  # that of a method without a system is NaN
+        amount = "may have few correct digits"
+    else:
+        return
+    warnings.warn(
+        f"the condition number of the system is {worst:.0e}, so that derivatives by single "
+        "nodes, and points between the boundary nodes where neighbours move very differently, "
+        f"{amount}; {REMEDY}",
+        ConditionWarning,
+        stacklevel=3,
+    )
+
+
+def warn_of_doubt(steps: Sequence[FrozenStep], doubt: FloatArray) -> bool:
+    """Warn where the points of designs cannot be trusted, and tell whether that is so."""
+    worst = float(doubt.max(initial=0.0))
+    if worst <= TRUSTED:
+        return False
+    of = "" if doubt.ndim == 0 else f" of {np.count_nonzero(doubt > TRUSTED)} designs"
+    warnings.warn(
+        f"the condition number of the system is {largest_condition(steps):.0e}: derivatives, and "
+        f"points{of} between the boundary nodes, may be wrong by {100 * worst:.2g} % of the "
+        f"largest displacement; {REMEDY}",
+        ConditionWarning,
+        stacklevel=3,
+    )
+    return True
+
+
+def warn_of_errors(errors: FloatArray, allowed: FloatArray) -> None:
+    """Warn where designs miss what they must do by more than is allowed."""
+    above = errors > allowed
+    if not above.any():
+        return
+    worst = np.unravel_index(int(np.argmax(errors - allowed)), errors.shape)
+    of = "" if errors.ndim == 0 else f" of {np.count_nonzero(above)} designs"
+    warnings.warn(
+        f"the largest error{of} at the boundary is {errors[worst]:.3g}, above the tolerance of "
+        f"{allowed[worst]:.3g}: control nodes and facets are those of another displacement; "
+        "choose them anew with `deformer = deformer.refresh(displacement)`",
+        ToleranceWarning,
+        stacklevel=3,
+    )
