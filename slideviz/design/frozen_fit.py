@@ -34,15 +34,8 @@ from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Levels
 from slideviz.rbf.refine import System
-from slideviz.rbf.solve import (
-    NOTHING,
-    Factor,
-    enough_threads,
-    extend,
-    is_singular,
-    pseudo_inverse,
-    saddle_system,
-)
+from slideviz.rbf.saddle import is_singular, pseudo_inverse, saddle_system
+from slideviz.rbf.solve import NOTHING, Factor, enough_threads, extend
 from slideviz.rbf.twofold import usable
 
 Keep = Callable[[str, Callable[[], Any]], Any]

@@ -11,15 +11,8 @@ from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
 from slideviz.rbf.refine import TRUSTED, System, between
-from slideviz.rbf.solve import (
-    NOTHING,
-    Factor,
-    condition,
-    enough_threads,
-    extend,
-    saddle_condition,
-    solve_saddle,
-)
+from slideviz.rbf.saddle import saddle_condition, solve_saddle
+from slideviz.rbf.solve import NOTHING, Factor, condition, enough_threads, extend
 from slideviz.rbf.twofold import usable
 
 BETTER = 0.1

@@ -10,7 +10,8 @@ from slideviz.case.model import Case, Reduction, Rotate
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
-from slideviz.rbf.solve import condition, saddle_condition, solve_saddle
+from slideviz.rbf.saddle import saddle_condition, solve_saddle
+from slideviz.rbf.solve import condition
 from slideviz.samples.table import sample, write_sample
 from tests import builders
 
