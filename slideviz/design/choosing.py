@@ -21,11 +21,11 @@ Tell = Callable[[Progress], None]
 
 def choose_steps(
     case: Case, mesh: Mesh, setup: Setup, targets: Sequence[FloatArray], tell: Tell
-) -> tuple[FrozenStep, ...]:
+) -> tuple[tuple[FrozenStep, ...], FloatArray]:
     """Return the steps of a deformation with their control nodes, enough for all displacements.
 
-    The number of steps is that of the first displacement. The control nodes of each further one
-    begin with those of all before.
+    And the points (n, d) of the run that chose them. The number of steps is that of the first
+    displacement. The control nodes of each further one begin with those of all before.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def choose_steps(
     require_memory(setup, case)
     kept = setup
     setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
-    parts, solutions = _reference(case, mesh, replace(setup, target=targets[0]), tell)
+    parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), tell)
     # The other methods choose nothing but the number of steps.
     for target in targets[1:] if case.method == "rbf" else ():
         further = _further(mesh, replace(setup, target=target), parts, solutions, tell)
@@ -51,7 +51,7 @@ def choose_steps(
         ]
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None
     body = elastic_body(mesh, kept.frame, kept.axis) if case.method == "elastic" else None
-    return tuple(
+    steps = tuple(
         FrozenStep(
             setup=kept,
             mesh=mesh,
@@ -68,6 +68,7 @@ def choose_steps(
         )
         for k, (part, solution) in enumerate(zip(parts, solutions, strict=True))
     )
+    return steps, points
 
 
 def _begun(setup: Setup, stages: tuple[Levels, ...], problem: Problem, watch: Watch) -> Solution:
@@ -80,8 +81,8 @@ def _lasting(problem: Problem) -> Problem:
 
 def _reference(
     case: Case, mesh: Mesh, setup: Setup, tell: Tell
-) -> tuple[list[float], list[Solution]]:
-    """Return which part of the displacement the steps of a run reach, and their solutions."""
+) -> tuple[list[float], list[Solution], FloatArray]:
+    """Return which part of the displacement a run's steps reach, their solutions, its points."""
     made: list[Solution] = []
 
     def solve(problem: Problem, watch: Watch) -> Solution:
@@ -91,7 +92,7 @@ def _reference(
     steps = list(all_steps(Stepping(case, mesh, replace(setup, solve=solve), tell, {})))
     # Of steps that were tried, those that are in the run: each has the control nodes it found.
     found = [next(s for s in made if s.control is step.control) for step in steps]
-    return [step.part for step in steps], found
+    return [step.part for step in steps], found, steps[-1].mesh.points
 
 
 def _told(tell: Tell, step: int, total: int, phase: str, fraction: float) -> None:

@@ -141,7 +141,10 @@ class Deformer:
         self.warnings = (*case.warnings, *setup.warnings)
         targets = [value(self._input.target(reference)) for reference in references]
         tell = progress or (lambda _: None)
-        self._steps: tuple[FrozenStep, ...] = choose_steps(case, mesh, setup, targets, tell)
+        self._steps: tuple[FrozenStep, ...]
+        self._steps, points = choose_steps(case, mesh, setup, targets, tell)
+        refined = any(step.refined for step in self._steps)
+        self._as_run = None if refined else points
         # What is discrete is chosen at the first design, and kept.
         states = self._run(targets[0])
         facets = facets_of(setup, value(states[-1].coords))
@@ -215,6 +218,13 @@ class Deformer:
         _, start, end = self._taped(displacement)
         adjoint = self._shaped(weights, self.mesh.points.shape, "weights")
         return np.array(start.tape.pull(end, adjoint, start))
+
+    def as_run(self) -> FloatArray | None:
+        """Return the points (n, d) that ``sv.deform`` gives at the reference, to the bit.
+
+        None for systems that are nearly singular, which are solved with more digits than in a run.
+        """
+        return self._as_run
 
     def refresh(self, displacement: FloatArray) -> Deformer:
         """Return a deformer whose choices are those at another design (or at several)."""

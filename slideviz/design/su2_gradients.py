@@ -73,19 +73,25 @@ def find_gradients(
     found = read_sensitivities(config, mesh)
     displacement = surface.displacement
     moves = bool(displacement.any())
+    prepared: list[Deformer] = []
     written: list[FloatArray] = []
 
     def design() -> FloatArray:  # as `slideviz def` writes it
-        *_, last = deform(surface.case(), mesh, progress)
-        written.append(last.mesh.points)
-        return last.mesh.points
+        prepared.append(_deformer(surface, displacement, progress))
+        points = prepared[0].as_run()
+        if points is None:
+            *_, last = deform(surface.case(), mesh, progress)
+            points = last.mesh.points
+        written.append(points)
+        return points
 
     said: list[str] = []
     with _heard(said):
         matched = match(found, mesh, design if moves else None)
         if moves and not matched.at_design:
             displacement = np.zeros_like(displacement)
-        deformer = _deformer(surface, displacement, progress)
+            prepared.clear()
+        deformer = (prepared or [_deformer(surface, displacement, progress)])[0]
         if written and matched.at_design:
             said += _difference(deformer.deform(displacement), written[0])
         pulled = deformer.vjp(displacement, matched.values)
