@@ -211,7 +211,6 @@ class _Loop:
 
     def rows(self) -> Generator[Row, None, None]:
         """Yield the rows as they come; when it is closed, what is in work is given up."""
-        ended = False
         try:
             while self._waiting or self._flying:
                 self._submit()
@@ -221,17 +220,20 @@ class _Loop:
                     row = self._row(future, self._flying.pop(future)[0])
                     if row is not None:
                         yield row
-            ended = True
         finally:
             for future in self._flying:
                 future.cancel()
             if isinstance(self._executor, Processes):
-                self._executor.shutdown(cancel_futures=not ended)
+                # Stopped also where all is done: to end by itself takes a process a second.
+                self._executor.shutdown(cancel_futures=True)
 
     def _submit(self) -> None:
-        """Give the executor as many designs as keep its workers busy."""
+        """Give the executor as many designs as keep its workers busy.
+
+        Each has one in work and the next with it, and one more waits, for who is done first.
+        """
         unknown = max(_slots(self._executor) - len(self.holding) - len(self.lacking), 1)
-        window = 2 * len(self.holding) + len(self.lacking) + unknown
+        window = 3 * len(self.holding) + len(self.lacking) + unknown
         sent = sum(with_mesh for _, with_mesh in self._flying.values())
         while self._waiting and len(self._flying) < window:
             with_mesh = sent < len(self.lacking)

@@ -15,7 +15,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from slideviz.design.sweep_worker import Packed, hold
 from slideviz.mesh.io.cleanup import clean_up
@@ -35,8 +35,20 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
+class _Call(NamedTuple):
+    """A call that is asked for."""
+
+    future: Future
+    fn: Callable
+    args: tuple
+    kwargs: dict
+
+
 class Processes(Executor):
     """An executor with so many processes of this machine, each with one thread.
+
+    A process that works has its next call with it, so that it need not wait for this one, while
+    there are calls enough for those that are free. When it is lost, that call goes to another.
 
     Parameters
     ----------
@@ -49,10 +61,10 @@ class Processes(Executor):
         self._max_workers = count
         self._mesh = mesh
         self._lock = threading.RLock()
-        self._asked: deque[tuple[Future, Callable, tuple, dict]] = deque()
-        self._idle: list[_Process] = [_Process(self) for _ in range(count)]
-        self._all = tuple(self._idle)
+        self._asked: deque[_Call] = deque()
+        self._all = tuple(_Process(self) for _ in range(count))
         self._failed_starts = 0
+        self._given_up = False
         self.lost = 0
         """Processes that ended while they worked."""
 
@@ -70,57 +82,83 @@ class Processes(Executor):
         """Return the future of a call in the first process that is free."""
         future: Future = Future()
         with self._lock:
-            self._asked.append((future, fn, args, kwargs))
+            self._asked.append(_Call(future, fn, args, kwargs))
         self._give()
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes; those in work are stopped where ``cancel_futures`` says so."""
         with self._lock:
-            asked, idle = list(self._asked), self._idle
+            asked = list(self._asked) if cancel_futures else []
             if cancel_futures:
                 self._asked.clear()
-            self._idle = [] if cancel_futures else idle
-        for future, *_ in asked if cancel_futures else ():
-            future.cancel()
+                self._given_up = True
+        for call in asked:
+            call.future.cancel()
         for one in self._all:
             one.end(wait, kill=cancel_futures)
 
     def _give(self) -> None:
-        """Give free processes what is asked for."""
+        """Give processes what is asked for."""
         while True:
             with self._lock:
-                if not (self._asked and self._idle):
+                one = self._next()
+                if one is None:
                     return
-                future, fn, args, kwargs = self._asked.popleft()
-                if not future.set_running_or_notify_cancel():
+                call = self._asked.popleft()
+                future = call.future
+                if not (future.running() or future.set_running_or_notify_cancel()):
                     continue
-                one = self._idle.pop()
-            one.run(future, fn, args, kwargs)
+                one.load += 1
+            one.run(call)
 
-    def _done(self, one: _Process, future: Future, inner: Future, began: bool) -> None:
-        """Pass a result on, and give the process the next."""
-        problem = inner.exception()
+    def _next(self) -> _Process | None:
+        """Return the process that is to have the next call: a free one, or one that works."""
+        if self._given_up or not self._asked:
+            return None
+        free = (one for one in self._all if not one.load)
+        more = len(self._asked) > self._max_workers
+        return next(free, next((one for one in self._all if more and one.takes_more), None))
+
+    def _done(self, one: _Process, call: _Call, inner: Future, *, lost: bool, began: bool) -> None:
+        """Pass a result on, and give the process the next.
+
+        Parameters
+        ----------
+        lost
+            Whether the process ended while it did this call, and not one before it.
+        """
+        problem = BrokenProcessPool() if inner.cancelled() else inner.exception()
+        broken = isinstance(problem, BrokenProcessPool)
+        again = broken and not lost
         with self._lock:
-            if isinstance(problem, BrokenProcessPool):
-                one.forget()
+            one.load -= 1
+            if lost:
                 self.lost += began
                 self._failed_starts = 0 if began else self._failed_starts + 1
-            elif began:
+            elif began and not broken:
                 self._failed_starts = 0
-            self._idle.append(one)
+            if again:
+                self._asked.appendleft(call)
         if problem is None:
-            future.set_result(inner.result())
-        else:
-            future.set_exception(problem)
+            call.future.set_result(inner.result())
+        elif not again:
+            call.future.set_exception(problem)
         self._give()
 
 
 class _Process:
-    """A process that is started when it is needed, and again when it was lost."""
+    """A process that is started when it is needed, and again when it was lost.
+
+    Attributes
+    ----------
+    load : int
+        Calls that it has: the one that it does, and perhaps the next.
+    """
 
     def __init__(self, owner: Processes) -> None:
         self._owner = owner
+        self.load = 0
         self._pool: ProcessPoolExecutor | None = None
         self._begun: Future | None = None
         # What is told of a loss by a pool must not be the end of that pool: it holds its own lock.
@@ -132,22 +170,31 @@ class _Process:
         found = getattr(self._pool, "_processes", None) or {}
         return list(found)
 
-    def run(self, future: Future, fn: Callable, args: tuple, kwargs: dict) -> None:
+    @property
+    def takes_more(self) -> bool:
+        """Tell whether it has begun, and can take its next call."""
+        return self.load == 1 and self._begun is not None and _succeeded(self._begun)
+
+    def run(self, call: _Call) -> None:
         """Let the process do a call."""
         try:
             if self._pool is None:
                 self._start()
             assert self._pool is not None
-            inner = self._pool.submit(fn, *args, **kwargs)
+            inner = self._pool.submit(call.fn, *call.args, **call.kwargs)
         except Exception as problem:  # it was lost while it was idle, or cannot be started
             inner = Future()
             inner.set_exception(BrokenProcessPool(str(problem)))
-        begun = self._begun
-        inner.add_done_callback(
-            lambda done: self._owner._done(
-                self, future, done, begun is not None and _succeeded(begun)
-            )
-        )
+        pool, begun = self._pool, self._begun
+
+        def done(inner: Future) -> None:
+            broken = inner.cancelled() or isinstance(inner.exception(), BrokenProcessPool)
+            # It does its calls in their order, and they are told so.
+            lost = broken and self._forget(pool)
+            began = begun is not None and _succeeded(begun)
+            self._owner._done(self, call, inner, lost=lost, began=began)
+
+        inner.add_done_callback(done)
 
     def _start(self) -> None:
         """Start the process and send it the mesh."""
@@ -155,11 +202,16 @@ class _Process:
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_begin)
             self._begun = self._pool.submit(hold, self._owner._mesh)
 
-    def forget(self) -> None:
-        """Do without the process: the next call starts another."""
-        if self._pool is not None:
-            self._broken.append(self._pool)
-        self._pool, self._begun = None, None
+    def _forget(self, pool: ProcessPoolExecutor | None) -> bool:
+        """Do without a pool, so that the next call starts another; tell whether that is new."""
+        with self._owner._lock:
+            if pool is None:
+                return True
+            if pool in self._broken:
+                return False
+            self._broken.append(pool)
+            self._pool, self._begun = None, None
+            return True
 
     def end(self, wait: bool, kill: bool) -> None:
         """End the process."""

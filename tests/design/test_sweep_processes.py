@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,6 +68,19 @@ def test_killed_workers_lose_one_design_each_and_none_is_left(passage, monkeypat
     case = passage.case.change(motions=(replace(rotation, angle_deg=angles[-1]), shift))
     *_, last = sv.deform(case, passage.mesh)
     assert by_design[-1].min == sv.quality(last.mesh, reference=passage.mesh).min
+
+
+def test_the_call_that_a_killed_worker_had_not_begun_is_done_by_another(passage):
+    with Processes(1, packed(passage.mesh)) as workers:
+        workers.submit(divmod, 1, 1).result()
+        long = workers.submit(time.sleep, 60)
+        others = [workers.submit(divmod, 7, k) for k in (1, 2, 3)]
+        assert [call.running() for call in (long, *others)] == [True, True, False, False]
+        os.kill(workers.pids[0], signal.SIGKILL)
+        assert [call.result(timeout=60) for call in others] == [(7, 0), (3, 1), (2, 1)]
+        with pytest.raises(BrokenProcessPool):
+            long.result(timeout=60)
+        assert workers.lost == 1
 
 
 def test_workers_end_with_their_parent_however_it_ends(tmp_path):
