@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 from slideviz.errors import MeshError
+from slideviz.mesh.io.atomic import reason_of
 from slideviz.mesh.io.binary_copy import Plan
 from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import names_of
@@ -21,10 +22,13 @@ def require_room(place: Path, path: Path, size: int) -> None:
     Raises
     ------
     MeshError
-        It has not; it is said of ``path``.
+        It has not, or there is no such folder; it is said of ``path``.
     """
     folder = Path(os.path.realpath(place)).parent
-    free = shutil.disk_usage(folder).free
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError as problem:
+        raise MeshError(f"{path}: cannot be written: {reason_of(problem)}") from problem
     if size > free:
         raise MeshError(
             f"{path}: {size / 1e6:,.0f} MB of disk are needed in {folder} while this lasts, but "
