@@ -71,7 +71,7 @@ class Scene:
             BoxLayer(self.stage),
             PassageLayer(self.stage, self._cells, self._boundaries, self._threshold),
             PointLayer(self.stage),
-            InvertedLayer(self.stage),
+            InvertedLayer(self.stage, self.sections),
             LegendLayer(self.stage),
             TriadLayer(self.stage),
             self._coarse,

@@ -1,5 +1,6 @@
 """The panel of designs: filled, run beside the window, drawn, and shown at a click."""
 
+import csv
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -283,15 +284,24 @@ def test_what_is_done_is_not_run_again(window, passage, qtbot, in_a_thread, tmp_
     assert panel.run.text() == "Run 1 design"
 
 
-def test_closing_asks_about_designs_that_go_on(window, passage, qtbot, in_a_thread, answers):
+def test_closing_asks_about_designs_that_go_on(
+    window, passage, qtbot, in_a_thread, answers, tmp_path
+):
     fill(passage, "airfoil.rotate.angle_deg", "-6 to 0 in 500")
     QTest.mouseClick(passage.run, LEFT)
     asked = answers("ask_unsaved", "cancel")
     assert not window.close()
     assert "The sweep still runs (0 of 500 designs are done) and will be stopped." in asked[0][0]
     assert passage.runner.busy
-    passage.stop.click()
-    qtbot.waitUntil(lambda: not passage.runner.busy, timeout=60_000)
+    # What is done can be saved before it is stopped.
+    qtbot.waitUntil(lambda: len(passage.table.results) > 1, timeout=60_000)
+    asked = answers("ask_unsaved", "table")
+    answers("ask_save", tmp_path / "out.csv")
+    assert window.close()
+    assert asked[0][1] == ["table"]
+    with (tmp_path / "out.csv").open() as file:
+        done = [row for row in csv.DictReader(file) if row["min"]]
+    assert 1 < len(done) < 500
 
 
 def test_all_mistakes_of_a_file_are_told_with_their_rows(window, passage, answers, tmp_path):

@@ -8,13 +8,14 @@ import pyvista as pv
 
 from slideviz.color_scheme import INVERTED_COLOUR, SELECTED_COLOUR
 from slideviz.mesh.elements import ELEMENTS
-from slideviz.mesh.quality import quality
+from slideviz.mesh.quality import INVERTED, quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.scene.actors import VALUES, part_shape
 from slideviz.scene.marked_cell import DOT, FACES, OUTLINE
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
+from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.inspect import nodes_of
@@ -156,6 +157,25 @@ def test_inverted_cells_alone_can_be_chosen(scene, cube):
     session = opened(scene, changes.set_view(session, threshold=ONLY_INVERTED))
     assert len(scene._threshold.cells) == session.frame.quality.inverted
     assert count(image(scene), INVERTED_COLOUR, 60) > 50
+
+
+def test_rings_are_at_all_inverted_cells_or_at_those_that_sections_cut(scene, cube):
+    def rings():
+        actor = scene.plotter.actors.get("points:inverted")
+        return 0 if actor is None else actor.mapper.dataset.n_points
+
+    session = stepped(changes.open_mesh(Frame(cube, quality(cube)), None), 0.12)
+    session = opened(scene, session)
+    inverted = session.frame.quality.inverted
+    assert rings() == inverted
+    middle = Section("plane", tuple(np.mean(cube.bounds, axis=0)), (0.0, 0.0, 1.0))
+    scene.update(changes.add_section(session, middle))
+    cut = np.unique(scene.sections.drawn["section:0"].polygons.cells)
+    assert 0 < rings() < inverted
+    assert rings() == (session.frame.quality.status[cut] == INVERTED).sum()
+    assert scene.stage.ring_words[0][0] == f"{rings()} inv."
+    scene.update(session)
+    assert rings() == inverted
 
 
 def test_a_range_that_holds_nothing_draws_nothing(scene, bent):

@@ -137,7 +137,7 @@ class DesignsPanel(Panel):
         busy, rows = self.runner.busy, bool(self.table.rows)
         in_file = self.store.session.in_file
         opened = self.store.session.mesh is not None and not in_file
-        count = len(self.table.rows) - len(self._left().results)
+        count = 0 if busy else len(self.table.rows) - len(self._left().results)
         self.rows.show_table(self.table, editable=not busy)
         self.plot.show_table(self.table, self.shown)
         for widget, able in (
