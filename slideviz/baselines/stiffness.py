@@ -22,7 +22,7 @@ from scipy.sparse import bsr_array, csr_array
 from slideviz.baselines.shapes import Block
 from slideviz.errors import DeformError
 from slideviz.mesh.caching import njit
-from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array
 from slideviz.rbf.evaluate import Tick, no_tick
 
 CHUNK = 20_000
@@ -80,6 +80,7 @@ def assemble(
     data = np.zeros((len(indices), d, d))
     right = np.zeros((count, d))
     entry = conditions.place, conditions.turn, conditions.plain, conditions.known
+    points = frozen_array(points, np.float64)  # as those of a mesh are: the loops compile once
     total = sum(len(part.nodes) for part in parts)
     done, volume = 0, cell_volumes(points, parts)
     for part in parts:

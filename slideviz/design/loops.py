@@ -179,6 +179,8 @@ def keep_rest(
     moved, start : (..., n, d), (n, d)
         Coordinates now, and those of the undeformed points ``before`` (n, d).
     """
+    before = before.view()
+    before.flags.writeable = False  # as those of a mesh are: the loop is compiled once
     with one_at_a_time(at.size):
         _rest(at.reshape(-1, *start.shape), moved.reshape(-1, *start.shape), start, before)
     return at
