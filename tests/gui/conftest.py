@@ -9,6 +9,7 @@ if not (os.environ.get("DISPLAY") or shutil.which("Xvfb")):
 else:
     from qtpy.QtCore import QCoreApplication, QEvent, QSettings, Qt
     from qtpy.QtTest import QTest
+    from qtpy.QtWidgets import QApplication
 
     from slideviz.gui.widgets import plot_canvas, questions
     from slideviz.gui.window import MainWindow
@@ -39,9 +40,13 @@ def nothing_of_closed_windows():
     surface for it. Meanwhile, as in the program (`slideviz.gui.responsiveness.threads`), no thread
     of a job or a plot looks for garbage: what belongs to Qt and VTK would end there.
 
-    Qt deletes closed windows in the next event loop only: the next window would polish them, too.
+    Qt deletes closed windows in the next event loop only, and those that nobody gave to `qtbot`
+    never: the next window would polish them, too, which takes longer than to make it.
     What is there before the test, as modules are, no later look finds: each would take longer.
     """
+    for top in QApplication.topLevelWidgets():
+        if isinstance(top, MainWindow):
+            top.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     gc.collect()
     gc.freeze()
