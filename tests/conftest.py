@@ -17,6 +17,7 @@ pytest_plugins = ["tests.scenes"]
 
 
 def pytest_collection_finish():
-    """Leave modules and collected tests out of every later look for garbage; it took seconds."""
+    """Look for garbage less often, and not at modules and collected tests: it took long."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(5_000, 10, 10)
