@@ -127,7 +127,7 @@ def path_options(name: str) -> set[str]:
     """Return what the arguments of a command are called that are paths."""
     calls = next(
         action
-        for action in parser._parser()._actions
+        for action in parser._parser([name])._actions
         if isinstance(action, argparse._SubParsersAction)
     )
     return {action.dest for action in calls.choices[name]._actions if action.type is Path}

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 ELSEWHERE = """
 import importlib, pkgutil, signal, sys
@@ -33,3 +34,21 @@ def test_modules_import_without_what_only_linux_has():
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert int(done.stdout.split()[-1]) > 100
+
+
+SMALL = """
+import sys
+from slideviz.cli import run
+
+run(["run", *sys.argv[1:], "--steps", "1", "--quiet"])
+slow = ("scipy.spatial", "scipy.sparse", "h5py", "matplotlib", "slideviz.deformation.streaming")
+print(*(name for name in slow if name in sys.modules))
+"""
+
+
+def test_a_small_run_loads_nothing_that_takes_long_and_is_not_needed(tmp_path):
+    case = Path(__file__).parents[1] / "sample_meshes" / "square" / "square.cfg"
+    call = [sys.executable, "-c", SMALL, case, "-o", tmp_path / "out.su2"]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=120, check=True)
+    assert (tmp_path / "out.su2").exists()
+    assert not done.stdout.strip()

@@ -66,7 +66,7 @@ def _is_to_be_streamed(arguments: argparse.Namespace) -> bool:
         It is asked for and cannot be, or the mesh cannot be read.
     """
     from slideviz.deformation.converting import streamed_kind
-    from slideviz.deformation.streaming import missing_memory_of
+    from slideviz.deformation.memory import missing_memory_of
     from slideviz.errors import CaseError
 
     kind = streamed_kind(arguments.mesh, arguments.output)

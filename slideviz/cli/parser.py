@@ -3,42 +3,29 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
 from slideviz import __version__
-from slideviz.cli.compare_command import add_compare
-from slideviz.cli.convert_command import add_convert
-from slideviz.cli.def_command import add_def
-from slideviz.cli.dot_command import add_dot
-from slideviz.cli.film_command import add_film
-from slideviz.cli.info_command import add_info
-from slideviz.cli.keys_command import add_keys
-from slideviz.cli.quality_command import add_quality
-from slideviz.cli.run_command import add_run
-from slideviz.cli.sample_command import add_sample
-from slideviz.cli.section_command import add_section
-from slideviz.cli.section_options import glued
-from slideviz.cli.sweep_command import add_sweep
-from slideviz.cli.window_command import add_shots, window
 
-COMMANDS: dict[str, Callable[[argparse._SubParsersAction], None]] = {
-    "run": add_run,
-    "info": add_info,
-    "quality": add_quality,
-    "film": add_film,
-    "section": add_section,
-    "compare": add_compare,
-    "sweep": add_sweep,
-    "convert": add_convert,
-    "def": add_def,
-    "dot": add_dot,
-    "sample": add_sample,
-    "keys": add_keys,
-    "shots": add_shots,
+COMMANDS = {
+    "run": "run_command",
+    "info": "info_command",
+    "quality": "quality_command",
+    "film": "film_command",
+    "section": "section_command",
+    "compare": "compare_command",
+    "sweep": "sweep_command",
+    "convert": "convert_command",
+    "def": "def_command",
+    "dot": "dot_command",
+    "sample": "sample_command",
+    "keys": "keys_command",
+    "shots": "window_command",
 }
-"""What adds the arguments of each command, in the order of the help."""
+"""The module of each command, whose ``add_NAME`` adds its arguments, in the order of the help."""
 
 _DESCRIPTION = """\
 Deform CFD meshes with radial basis functions.
@@ -66,7 +53,11 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     """
     if not any(word in COMMANDS for word in argv[:1]) and not _asks_help(argv):
         return _window_parser().parse_args(argv)
-    return _parser().parse_args(glued(argv))
+    from slideviz.cli.section_options import glued
+
+    # Only the command that is called, where it is the first word: it is loaded faster alone.
+    called = argv[:1] if argv[0] in COMMANDS else COMMANDS
+    return _parser(called).parse_args(glued(argv))
 
 
 def _asks_help(argv: Sequence[str]) -> bool:
@@ -95,6 +86,8 @@ def _base(**options: object) -> _Parser:
 
 
 def _window_parser() -> argparse.ArgumentParser:
+    from slideviz.cli.window_command import window
+
     parser = _base(usage="slideviz [FILE] | slideviz {%s} ..." % ",".join(COMMANDS))  # noqa: UP031
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     parser.add_argument("file", nargs="?", type=Path, help="mesh or case (.cfg) to open")
@@ -104,12 +97,12 @@ def _window_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(names: Iterable[str]) -> argparse.ArgumentParser:
     parser = _base()
     parser.add_argument("--version", action="version", version=f"slideviz {__version__}")
     calls = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, parser_class=_Parser
     )
-    for add in COMMANDS.values():
-        add(calls)
+    for name in names:
+        getattr(import_module(f"slideviz.cli.{COMMANDS[name]}"), f"add_{name}")(calls)
     return parser

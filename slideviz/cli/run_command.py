@@ -225,13 +225,13 @@ def _series(path: Path | None, mesh: Mesh, metric: Metric) -> Iterator[Callable[
     MeshError
         The file cannot be written; none is left.
     """
+    if path is None:
+        yield lambda _: None
+        return
     from slideviz import quality
     from slideviz.cli.report import cell_data
     from slideviz.mesh.io.vtkhdf import vtkhdf_series
 
-    if path is None:
-        yield lambda _: None
-        return
     with vtkhdf_series(path, mesh) as series:
 
         def add(now: Mesh) -> None:

@@ -33,11 +33,11 @@ def require_streamable(
     CaseError, MeshError
         It needs the mesh in memory, or mesh or result are no SU2 meshes.
     """
+    if not (arguments.stream or arguments.resume):
+        return
     from slideviz.deformation.streaming import require_stream
     from slideviz.errors import CaseError
 
-    if not (arguments.stream or arguments.resume):
-        return
     for name in _needing_memory(arguments):
         option = f"--{name.replace('_', '-')}"
         raise CaseError(f"{option} needs the mesh in memory; leave it out, or --stream")
@@ -55,7 +55,7 @@ def is_to_be_streamed(
     arguments: argparse.Namespace, case: Case, output: Path, kind: FileFormat | None
 ) -> bool:
     """Tell whether a run is streamed: as asked for, or as the mesh is too large for the memory."""
-    from slideviz.deformation.streaming import missing_memory
+    from slideviz.deformation.memory import missing_memory
 
     if arguments.stream or arguments.resume:
         return True

@@ -7,7 +7,6 @@ behind it: a wall that moves along itself beside a wall that stays, with cells o
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.deformation.setup import Setup
 from slideviz.mesh.model import FloatArray, Mesh
@@ -135,6 +134,8 @@ def _cause(setup: Setup, mesh: Mesh, moved: FloatArray) -> str:
     """Return why the interpolation fails, and what helps."""
     nodes = np.concatenate([setup.known, setup.classes.sliding])
     at, shift = setup.coords[nodes], (moved - setup.coords)[nodes]
+    from scipy.spatial import cKDTree  # takes long to load
+
     near = cKDTree(at).query(at, k=min(2, len(nodes)))
     gaps, others = (np.asarray(found).reshape(len(nodes), -1)[:, -1] for found in near)
     apart = np.linalg.norm(shift - shift[others], axis=1)

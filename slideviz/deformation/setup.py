@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.case.check import idle_settings
 from slideviz.case.displacement import Displacements
@@ -22,6 +21,7 @@ from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
+from slideviz.mesh.nearest import crowded
 from slideviz.mesh.periodic import TOLERANCE, Pair
 from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
 from slideviz.rbf.axis import corners as corners_of
@@ -271,9 +271,12 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     must not depend on the numbers of nodes.
     """
     apart = COINCIDENT * mesh.extent
-    some = boundary_nodes[_crowded(mesh.points[boundary_nodes], apart)]
-    twins = some[cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")]
-    links = np.concatenate([twins.reshape(-1, 2), images])
+    some, links = boundary_nodes[crowded(mesh.points[boundary_nodes], apart)], images
+    if len(some):
+        from scipy.spatial import cKDTree  # takes long to load
+
+        twins = some[cKDTree(mesh.points[some]).query_pairs(apart, output_type="ndarray")]
+        links = np.concatenate([twins.reshape(-1, 2), images])
     out = np.arange(len(mesh.points))
     nodes, ends = np.unique(links, return_inverse=True)
     label = components(len(nodes), *ends.reshape(links.shape).T)
@@ -281,18 +284,6 @@ def _coinciding(mesh: Mesh, boundary_nodes: IntArray, images: IntArray) -> IntAr
     _, first, group = np.unique(label[order], return_index=True, return_inverse=True)
     out[nodes[order]] = nodes[order][first[group]]
     return out
-
-
-def _crowded(points: FloatArray, apart: float) -> IntArray:
-    """Return the points, by numbers (k,), that may have another nearer than ``apart``; few others.
-
-    Seen along a direction of no symmetry: of most meshes none is left for a slower search.
-    """
-    seen = points @ np.array([1.0, 0.6180339887, 0.4142135624])[: points.shape[1]]
-    order = np.argsort(seen)
-    rounding = 1e-14 * np.abs(seen).max(initial=0.0)
-    near = np.diff(seen[order]) <= 2.0 * apart + rounding
-    return np.unique(np.concatenate([order[:-1][near], order[1:][near]]))
 
 
 def _candidates(classes: Classes, known: IntArray) -> int:

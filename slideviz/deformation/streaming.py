@@ -27,13 +27,10 @@ from slideviz.deformation.solver import (
     Progress,
     Step,
     all_steps,
-    free_memory,
     require_memory,
 )
 from slideviz.deformation.stepping import Stepping
 from slideviz.errors import CaseError, NodeError
-from slideviz.mesh.io.files import format_of
-from slideviz.mesh.io.su2.text import find_text
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
 from slideviz.mesh.quality import Quality
 from slideviz.mesh.ranks import ALONE, Alone
@@ -42,8 +39,6 @@ from slideviz.rbf.problem import Watch
 from slideviz.rbf.projection import Tracks
 from slideviz.terms import FileFormat
 
-NEEDED: dict[FileFormat, float] = {"su2b": 5.0, "su2": 4.0}
-"""Memory of a run that is not streamed over the size of its file: 4.2 and 3.1 on hexahedra."""
 Tell = Callable[[Progress], None]
 
 
@@ -240,32 +235,6 @@ def require_stream(case: Case) -> None:
             "or idw, or run it without --stream"
         )
     require_su2(path, case.mesh_format)
-
-
-def missing_memory(case: Case) -> str:
-    """Return in words that a mesh that can be streamed needs more memory than is free, or nothing.
-
-    Raises
-    ------
-    MeshError
-        The mesh cannot be read.
-    """
-    path = case.mesh_file
-    if path is None or case.method == "elastic":
-        return ""
-    kind = format_of(path, case.mesh_format)
-    if kind is None:
-        return ""
-    said = missing_memory_of(path, kind)
-    return "" if said and kind == "su2" and find_text(path, case.zone).zone.sends else said
-
-
-def missing_memory_of(path: Path, kind: FileFormat) -> str:
-    """Return in words that an SU2 mesh needs more memory than is free, or nothing."""
-    needed, free = NEEDED[kind] * path.stat().st_size, free_memory()
-    if needed <= free:
-        return ""
-    return f"{path.name} needs about {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free"
 
 
 def about_run(case: Case) -> str:

@@ -11,13 +11,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from slideviz.errors import CaseError
 from slideviz.ffd.blending import blending
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Index = tuple[int, int, int]
 """A control point (i, j, k); -1 stands for all of that direction."""
@@ -59,6 +62,8 @@ class Embedding:
 
     def matrix(self) -> csr_array:
         """Return the derivative of the points for control points, (m, I J K): each axis alike."""
+        from scipy.sparse import csr_array  # takes long to load
+
         u, v, w = self.factors
         return csr_array(np.einsum("mi,mj,mk->mijk", u, v, w).reshape(len(u), -1))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray
@@ -61,6 +60,8 @@ def parametric(box: Box, points: FloatArray) -> tuple[FloatArray, np.ndarray]:
 
 def _solved(box: Box, points: FloatArray, size: FloatArray) -> FloatArray:
     """Return the parametric coordinates (m, 3) of points, NaN where none are found."""
+    from scipy.spatial import cKDTree  # takes long to load
+
     steps = [np.linspace(0.0, 1.0, SAMPLES * (degree + 1)) for degree in box.degrees]
     seeds = np.array(list(product(*steps)))
     _, nearest = cKDTree(box.at(seeds)).query(points, k=min(STARTS, len(seeds)))

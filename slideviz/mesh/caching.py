@@ -8,15 +8,44 @@ and a cache that can be neither read nor written costs the time to compile, and 
 from __future__ import annotations
 
 import hashlib
+import io
 import pickle
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import environment
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.environment import Environment
 from numba.core.runtime import rtsys
+
+
+def _environment(module: str, constants: list, name: str) -> Environment:
+    """Return what a compiled function has of its module, as Numba does, without loading Numba's.
+
+    Machine code that is loaded needs nothing of them, and they take long.
+    """
+    if module.partition(".")[0] != "numba" or module in sys.modules:
+        return environment._rebuild_env(module, constants, name)
+    found = environment.lookup_environment(name)
+    if found is None:
+        found = Environment({"__name__": module})
+        found.consts[:] = constants
+        found.env_name = name
+        Environment._memo[name] = found
+    return found
+
+
+class _Reader(pickle.Unpickler):
+    """Reads machine code from the cache."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) == (environment.__name__, "_rebuild_env"):
+            return _environment
+        return super().find_class(module, name)
 
 
 class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
@@ -37,7 +66,8 @@ class _SealedFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def _load_data(self, name: str) -> Any:
         try:
-            return pickle.loads(_opened(Path(self._data_path(name)).read_bytes()))
+            content = _opened(Path(self._data_path(name)).read_bytes())
+            return _Reader(io.BytesIO(content)).load()
         except ValueError as problem:
             raise OSError(str(problem)) from problem  # Numba compiles it and writes it again
 

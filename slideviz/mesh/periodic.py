@@ -11,12 +11,12 @@ from itertools import combinations
 from operator import itemgetter
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.errors import MeshError
 from slideviz.mesh.axis_frame import Z_AXIS, axis_text, in_axis_frame, ordered_sum
 from slideviz.mesh.check import check_size
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array
+from slideviz.mesh.nearest import nearest
 from slideviz.terms import PeriodicKind, PeriodicType
 
 TOLERANCE = 1e-5
@@ -145,9 +145,7 @@ def _match_kind(
         angle = float(np.angle(ordered_sum(zb) * np.conj(ordered_sum(za))))
         turned = za * np.exp(1j * angle)
         image, target = np.stack([turned.real, turned.imag, ya[:, 2]], axis=1), yb
-    distance, partner = (
-        np.asarray(found) for found in cKDTree(target).query(image, distance_upper_bound=bound)
-    )
+    distance, partner = nearest(target, image, bound, TOLERANCE * mesh.extent)
     if not np.isfinite(distance).all():
         return None, np.inf
     one_to_one = len(np.unique(partner)) == len(partner)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import NodeError
 from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.mesh.topology import components
 from slideviz.rbf.problem import Problem
 
 AGREE = 1e-7
@@ -93,7 +93,7 @@ def blocks(rows: ConstraintRows) -> IntArray:
         return np.zeros(len(rows.nodes), np.int64)
     along = np.abs(rows.normals) > ALIGNED
     met = along.T.astype(float) @ along
-    of_axis = connected_components(met, directed=False)[1].astype(np.int64)
+    of_axis = components(len(met), *np.nonzero(met))
     return of_axis[np.argmax(along, axis=1)]
 
 

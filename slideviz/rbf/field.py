@@ -7,14 +7,16 @@ some at a time, and in whatever order.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, Tick, evaluate, no_tick
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 TIE = 1e-4
 """Boundary nodes farther than the nearest one by less than this part of its distance count too:

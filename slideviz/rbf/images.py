@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.errors import NodeError
 from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
+from slideviz.mesh.nearest import nearest
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.threads import cores
 from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.constraint_rows import refuse
@@ -60,11 +59,7 @@ def find_images(
     paired[links] = True
     near = COINCIDENT * extent + 2.0 * max(pair.mismatch for pair in pairs)
     # Nearly all have none one period away, and a search without bound takes long to find that out.
-    tree, moved = cKDTree(coords[nodes]), coords[nodes] + frame.shift()
-    gap, at = (
-        np.asarray(part)
-        for part in tree.query(moved, distance_upper_bound=2.0 * near, workers=cores())
-    )
+    gap, at = nearest(coords[nodes], coords[nodes] + frame.shift(), 2.0 * near, 2.0 * near)
     found = np.flatnonzero(gap <= near)
     twins = np.stack([nodes[found], nodes[at[found]]], axis=1)
     links = np.concatenate([links, twins[~paired[twins].all(axis=1)]])

@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from slideviz.mesh.model import FloatArray, IntArray, largest_coordinate
 from slideviz.mesh.threads import in_parts
@@ -232,6 +231,8 @@ def correction_of(problem: Problem, nodes: IntArray, errors: FloatArray) -> Corr
     if np.any(problem.shift):
         images = [problem.cartesian(at + s * problem.shift) for s in (-1, 1)]
         sources, lacking = np.concatenate([sources, *images]), np.tile(lacking, (3, 1))
+    from scipy.spatial import cKDTree  # takes long to load
+
     return Correction(cKDTree(sources), lacking, radius)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from slideviz.deformation.memory import NEEDED
 from slideviz.deformation.solver import free_memory
-from slideviz.deformation.streaming import NEEDED
 from slideviz.mesh.io.su2b.layout import Source, find_zone
 from slideviz.mesh.io.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh

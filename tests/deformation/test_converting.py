@@ -8,7 +8,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.deformation import streaming, text_of_binary
+from slideviz.deformation import memory, text_of_binary
 from slideviz.mesh.io import binary_copy
 from slideviz.mesh.io.su2 import scan, write
 from tests.builders import grid
@@ -123,7 +123,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(monkeypatch, caps
     sv.write("mesh.su2", grid((4, 4)))
     expected = converted(capsys, "mesh.su2", ".su2b")
     size = Path("mesh.su2").stat().st_size
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size - 1)
     found = converted(capsys, "mesh.su2", ".su2b")
     assert "mesh.su2 needs about 0 GB of memory, 0 GB are free; it is streamed" in found[2]
     assert found[3] == expected[3]

@@ -16,7 +16,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import course, given_mesh, output, rest, streaming
+from slideviz.deformation import course, given_mesh, memory, output, rest, streaming
 from slideviz.deformation.course import SECONDS
 from slideviz.deformation.solver import folded_at
 from slideviz.deformation.steps import Progress
@@ -531,7 +531,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2b"] * size - 1)
+    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2b"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2b"]) == 0
     told = capsys.readouterr().err
@@ -541,9 +541,9 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     for more in (["-o", "out.vtu"], ["-o", "b.su2b", "--steps-dir", "steps"]):
         assert run([*call, *more, "-q"]) == 0
     assert run([*call, "-q", "-o", "c.su2b", "--set", "METHOD=elastic"]) == 3  # done, with folds
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2b"] * size)
+    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2b"] * size)
     assert run([*call, "-q", "-o", "d.su2b"]) == 0
-    assert streaming.missing_memory(sv.Case()) == ""
+    assert memory.missing_memory(sv.Case()) == ""
 
 
 def test_the_bar_tells_the_phase_and_what_is_left_of_it(tmp_path, monkeypatch):

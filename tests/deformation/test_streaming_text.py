@@ -16,7 +16,7 @@ import pytest
 import slideviz as sv
 from slideviz.cli import run
 from slideviz.cli.options import changed
-from slideviz.deformation import output, streaming, text_of_binary
+from slideviz.deformation import memory, output, streaming, text_of_binary
 from slideviz.deformation.streaming import stream
 from slideviz.errors import MeshError
 from slideviz.mesh.io import binary_copy
@@ -424,7 +424,7 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     case = made(tmp_path, "square", 8)
     size = case.mesh_file.stat().st_size
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2"] * size - 1)
+    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size - 1)
     call = ["run", "square.cfg", "--steps", "1"]
     assert run([*call, "-o", "out.su2"]) == 0
     assert "note: mesh.su2 needs about 0 GB of memory" in capsys.readouterr().err
@@ -433,5 +433,5 @@ def test_a_mesh_too_large_for_the_memory_is_streamed_by_itself(tmp_path, monkeyp
     halo = with_halo(case.mesh_file.read_text())
     Path("halo.su2").write_text(halo)
     assert run([*call, "-o", "out.su2", "-q", "--set", "MESH_FILENAME=halo.su2"]) == 0
-    monkeypatch.setattr(streaming, "free_memory", lambda: streaming.NEEDED["su2"] * size)
+    monkeypatch.setattr(memory, "free_memory", lambda: memory.NEEDED["su2"] * size)
     assert run([*call, "-o", "out.su2", "-q"]) == 0

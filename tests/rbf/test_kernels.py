@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.sparse.linalg import onenormest
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Rotate
@@ -11,7 +12,7 @@ from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.field import linear_terms
 from slideviz.rbf.kernels import KERNELS
 from slideviz.rbf.saddle import saddle_condition, solve_saddle
-from slideviz.rbf.solve import condition
+from slideviz.rbf.solve import _norm, condition
 from slideviz.samples.table import sample, write_sample
 from tests import builders
 
@@ -124,6 +125,13 @@ def test_a_run_counts_the_nodes_that_carry_a_weight():
     assert step.control_nodes == step.candidates
     said = "singular for RBF_KERNEL= quadric, and its .* control nodes are met by least squares"
     assert any(re.search(said, text) for text in step.warnings)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_norm_is_that_of_scipy(seed):
+    whole = np.random.default_rng(seed).standard_normal((40, 40))
+    whole += whole.T
+    assert _norm(lambda x: whole @ x, 40) == onenormest(whole, t=1)
 
 
 def test_condition_is_that_of_numpy():
