@@ -42,11 +42,14 @@ def choose_steps(
     setup = replace(setup, solve=lambda problem, watch: kept.solve(_lasting(problem), watch))
     parts, solutions, points = _reference(case, mesh, replace(setup, target=targets[0]), tell)
     # The other methods choose nothing but the number of steps.
-    for target in targets[1:] if case.method == "rbf" else ():
+    others = list(targets[1:]) if case.method == "rbf" else []
+    if others and setup.reduction is not None and setup.reduction.level != "none":
+        others += targets[:-1]  # a further level can raise errors of those before
+    for target in others:
         further = _further(mesh, replace(setup, target=target), parts, solutions, tell)
         # A system that was solved with more rows and digits for one is so for all.
         solutions = [
-            new if new.refined >= old.refined else old
+            replace(new if new.refined >= old.refined else old, doubt=max(old.doubt, new.doubt))
             for old, new in zip(solutions, further, strict=True)
         ]
     weights = idw_weights(case, mesh.dim) if case.method == "idw" else None

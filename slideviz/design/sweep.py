@@ -228,10 +228,7 @@ class _Loop:
                 self._executor.shutdown(cancel_futures=True)
 
     def _submit(self) -> None:
-        """Give the executor as many designs as keep its workers busy.
-
-        Each has one in work and the next with it, and one more waits, for who is done first.
-        """
+        """Give the executor, for each worker, the design in work, the next, and one in reserve."""
         unknown = max(_slots(self._executor) - len(self.holding) - len(self.lacking), 1)
         window = 3 * len(self.holding) + len(self.lacking) + unknown
         sent = sum(with_mesh for _, with_mesh in self._flying.values())
