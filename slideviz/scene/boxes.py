@@ -48,7 +48,7 @@ class BoxLayer(Layer):
         shown = "ffd" in new.view.drawn
         case = new.case
         definition = case.ffd_boxes, case.ffd_degrees, case.ffd_blending, case.ffd_orders
-        style = self.stage.scheme, self.stage.font_scale
+        style = self.stage.scheme, self.stage.pixel_scale
         key = (new.mesh, _ffd_motions(case), definition, style) if shown else ()
         if key == self._key:
             return
@@ -85,7 +85,7 @@ class BoxLayer(Layer):
     def _add(self, shape: Any, name: str, colour: str) -> Any:
         """Return the actor of lines and points."""
         actor = self.stage.add(shape, name, lighting=False, pickable=False)
-        scale = self.stage.font_scale
+        scale = self.stage.pixel_scale
         actor.prop.color = colour
         actor.prop.line_width, actor.prop.point_size = 2.0 * scale, 8.0 * scale
         actor.prop.render_points_as_spheres = True

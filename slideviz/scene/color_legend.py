@@ -142,7 +142,8 @@ def _line(stage: Stage, sign: str, colour: str, word: str, *, down: float) -> No
         text = pv.Text(what)
         text.GetPositionCoordinate().SetReferenceCoordinate(corner)
         text.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        text.GetPositionCoordinate().SetValue(-edge * stage.font_scale, -down * stage.font_scale)
+        scale = stage.pixel_scale
+        text.GetPositionCoordinate().SetValue(-edge * scale, -down * scale)
         set_letters(text.prop, stage.scheme, letters * stage.font_scale)
         text.prop.color = shade
         text.prop.SetVerticalJustificationToCentered()
@@ -172,6 +173,7 @@ def clear_legend(plotter: Any) -> None:
 def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool) -> None:
     """Draw the colour bar of a mapper, with ``inverted`` below if wanted; `place_bar` places it."""
     scheme, font_scale, title, unit = stage.scheme, stage.font_scale, what.label, what.unit
+    scale = stage.pixel_scale
     bar = stage.plotter.add_scalar_bar(
         title=title,
         mapper=mapper,
@@ -187,8 +189,8 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
     set_letters(bar.GetTitleTextProperty(), scheme, size * font_scale)
     set_letters(bar.GetLabelTextProperty(), scheme, 13 * font_scale)
     set_letters(bar.GetAnnotationTextProperty(), scheme, 12 * font_scale)
-    bar.SetVerticalTitleSeparation(round(8 * font_scale))
-    bar.SetTextPad(round(_GAP * font_scale))
+    bar.SetVerticalTitleSeparation(round(8 * scale))
+    bar.SetTextPad(round(_GAP * scale))
     bar.SetUseCustomLabels(True)
     bar.SetDrawNanAnnotation(inverted)
     bar.SetNanAnnotation("")
@@ -196,7 +198,7 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
         word, right = pv.Text("inverted"), STRIP - 14 - _BAR - _GAP - _INDENT
         word.GetPositionCoordinate().SetReferenceCoordinate(_corner(1.0, _BOTTOM))
         word.GetPositionCoordinate().SetCoordinateSystemToViewport()
-        word.GetPositionCoordinate().SetValue(-right * font_scale, _NAN / 2.0 * font_scale)
+        word.GetPositionCoordinate().SetValue(-right * scale, _NAN / 2.0 * scale)
         set_letters(word.prop, scheme, 12 * font_scale)
         word.prop.SetVerticalJustificationToCentered()
         stage.plotter.add_actor(
@@ -204,24 +206,24 @@ def add_colour_bar(stage: Stage, mapper: Any, what: ColourByTerm, inverted: bool
         )
 
 
-def place_bar(plotter: Any, title: str, below: float, font_scale: float) -> Rect:
+def place_bar(plotter: Any, title: str, below: float, scale: float) -> Rect:
     """Put the colour bar at the right edge of the view as it is now, ``below`` pixels from its top.
 
     There its title ends, where lines about points above it do. Return the room of bar and letters.
     """
     width, height = (max(side, 1) for side in plotter.window_size)
     bar, bottom = plotter.scalar_bars[title], _BOTTOM
-    bar.SetPosition(1.0 - (STRIP - 14) * font_scale / width, bottom)
+    bar.SetPosition(1.0 - (STRIP - 14) * scale / width, bottom)
     # The title is in the middle of that: short ones keep away from the edge of the view.
     wide = STRIP - 20 if len(title) >= _LONG else 66
-    bar.SetWidth(wide * font_scale / width)
+    bar.SetWidth(wide * scale / width)
     bar.SetBarRatio(_BAR / wide)
-    free = 1.0 - below * font_scale / height
+    free = 1.0 - below * scale / height
     part = max(min(0.68, free - bottom), 0.2)
     bar.SetHeight(part)
-    _number(bar, max(part * height - _HEAD * font_scale, 1.0) / font_scale)
-    room = _AIR * font_scale
-    return _rect(plotter, bottom * height - room, (bottom + part) * height + room, font_scale)
+    _number(bar, max(part * height - _HEAD * scale, 1.0) / scale)
+    room = _AIR * scale
+    return _rect(plotter, bottom * height - room, (bottom + part) * height + room, scale)
 
 
 def _number(bar: Any, length: float) -> None:
@@ -234,13 +236,13 @@ def _number(bar: Any, length: float) -> None:
     bar.SetCustomLabels(numpy_to_vtk(at, deep=True))
 
 
-def lines_room(plotter: Any, end: float, font_scale: float) -> Rect:
+def lines_room(plotter: Any, end: float, scale: float) -> Rect:
     """Return the room of lines in the upper right corner, the last ``end`` pixels below the top."""
     height = plotter.window_size[1]
-    return _rect(plotter, height - (end + 13) * font_scale, height, font_scale)
+    return _rect(plotter, height - (end + 13) * scale, height, scale)
 
 
-def _rect(plotter: Any, bottom: float, top: float, font_scale: float) -> Rect:
+def _rect(plotter: Any, bottom: float, top: float, scale: float) -> Rect:
     """Return the strip between two heights, in pixels."""
     width, height = plotter.window_size
-    return width - STRIP * font_scale, bottom, float(width), min(top, float(height))
+    return width - STRIP * scale, bottom, float(width), min(top, float(height))

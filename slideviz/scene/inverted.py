@@ -54,7 +54,7 @@ class InvertedLayer(Layer):
 
     def update(self, _old: Session | None, new: Session) -> None:
         """Draw another state of the session."""
-        key, cut = (new.frame, _wanted(new), self.stage.font_scale), self._cut_cells(new)
+        key, cut = (new.frame, _wanted(new), self.stage.pixel_scale), self._cut_cells(new)
         same = len(cut) == len(self._cut) and all(map(operator.is_, cut, self._cut))
         if key == self._key and same:
             return
@@ -88,7 +88,7 @@ class InvertedLayer(Layer):
         actor = self.stage.add(self._shape, NAME, lighting=False, pickable=False)
         size = next(size for least, size in reversed(SIZES) if len(cells) >= least)
         actor.prop.color = INVERTED_COLOUR
-        actor.prop.point_size = size * self.stage.font_scale
+        actor.prop.point_size = size * self.stage.pixel_scale
         actor.prop.render_points_as_spheres = True
         actor.GetShaderProperty().AddFragmentShaderReplacement(_DISC, False, _RING, False)
         actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()

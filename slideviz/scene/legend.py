@@ -36,7 +36,7 @@ class LegendLayer(Layer):
         self._bar: tuple[str, float] | None = None
         self._plate: Plate | None = None
         self._end = 0.0
-        self._placed: tuple[int, ...] = ()
+        self._placed: tuple[float, ...] = ()
 
     def clear(self) -> None:
         """Forget the mesh."""
@@ -78,8 +78,8 @@ class LegendLayer(Layer):
 
     def _place(self) -> None:
         """Put colour bar and plate where they belong in a view of this size."""
-        plotter, scale = self.stage.plotter, self.stage.font_scale
-        size = tuple(plotter.window_size)
+        plotter, scale = self.stage.plotter, self.stage.pixel_scale
+        size = (*plotter.window_size, scale)
         if size == self._placed or not self._drawn:
             return
         self._placed = size
@@ -97,7 +97,7 @@ class LegendLayer(Layer):
         said = frozenset(session.role(name) for name in names) or has_inverted(session)
         colours = (view.colour_by, view.colour_map, session.colour_range)
         points = self.stage.point_words, self.stage.ring_words
-        style = self.stage.scheme, self.stage.font_scale
+        style = self.stage.scheme, self.stage.font_scale, self.stage.pixel_scale
         shown = "legend" in view.drawn and self.stage.has_legend, self.stage.has_plate
         return (id(mesh), shown, colours, said, points, style)
 
@@ -133,7 +133,7 @@ class TriadLayer(Layer):
         plotter = self.stage.plotter
         shown = "triad" in new.view.drawn and new.mesh is not None
         flat = new.mesh is not None and new.mesh.dim == 2
-        style = (self.stage.scheme, self.stage.font_scale, self.stage.has_plate)
+        style = (self.stage.scheme, self.stage.pixel_scale, self.stage.has_plate)
         key = (shown, flat, style, tuple(plotter.window_size))
         if key == self._drawn or not (shown or self._axes):
             return
@@ -149,7 +149,7 @@ class TriadLayer(Layer):
             letters.SetBackgroundColor(*pv.Color(self.stage.scheme.background).float_rgb)
             letters.SetBackgroundOpacity(OPACITY if self.stage.has_plate else 0.0)
         width, height = plotter.window_size
-        size = SIZE * self.stage.font_scale
+        size = SIZE * self.stage.pixel_scale
         widget = plotter.renderer.axes_widget
         widget.SetViewport(
             0.0, 0.0, min(size / max(width, 1), 0.5), min(size / max(height, 1), 0.5)

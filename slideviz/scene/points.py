@@ -80,7 +80,7 @@ class PointLayer(Layer):
         shape.point_data[_COLOUR] = _RGB[typed.kinds]
         self._shape.copy_from(shape, deep=False)
         size = next(size for least, size in reversed(SIZES) if count >= least)
-        self._actor.prop.point_size = size * self.stage.font_scale
+        self._actor.prop.point_size = size * self.stage.pixel_scale
 
     def _place(self, session: Session) -> None:
         if len(self._drawn.nodes):

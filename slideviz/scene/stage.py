@@ -15,6 +15,9 @@ from slideviz.scene.color_legend import STRIP
 from slideviz.sections.threshold import CellsInRange
 from slideviz.session.state import Frame, Session
 
+USUAL_DPI = 72.0
+"""Dots per inch of a screen whose pixels are those of Qt."""
+
 
 class Layer:
     """A part of the scene that draws one kind of thing.
@@ -71,6 +74,14 @@ class Stage:
         self._values: tuple[object, FloatArray] | None = None
         self._in_threshold: tuple[FloatArray, object, CellsInRange] | None = None
 
+    @property
+    def pixel_scale(self) -> float:
+        """Return how many pixels one is at normal letter size on a usual screen.
+
+        Letters need no more than ``font_scale``: VTK enlarges them where pixels are small.
+        """
+        return float(self.font_scale * self.plotter.render_window.GetDPI() / USUAL_DPI)
+
     def add(self, shape: Any, name: str, **options: Any) -> Any:
         """Return the actor of a new data set, whose cells have no colour of their values yet."""
         valued = VALUES in shape.cell_data
@@ -111,7 +122,7 @@ class Stage:
         """Return the width of the legend's strip, in pixels."""
         if not self.has_legend:
             return 0.0
-        return min(STRIP * self.font_scale, 0.4 * self.plotter.window_size[0])
+        return min(STRIP * self.pixel_scale, 0.4 * self.plotter.window_size[0])
 
     def values(self, session: Session) -> FloatArray:
         """Return the value of every cell of the frame that is shown, (m,), for the colours.

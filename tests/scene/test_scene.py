@@ -77,6 +77,16 @@ def test_an_inverted_cell_has_its_own_colour(scene, session):
     assert count(image(scene), INVERTED_COLOUR) > 50
 
 
+def test_the_legend_has_more_room_where_pixels_are_small(scene, session):
+    opened(scene, changes.set_view(session, colour_by="skew"))
+    strip, left = scene.stage.strip(), scene.plotter.scalar_bars["skew"].GetPosition()[0]
+    scene.plotter.render_window.SetDPI(108)  # VTK's letters are half as large again there
+    scene.resized()
+    assert scene.stage.strip() == pytest.approx(1.5 * strip)
+    wider = 1.0 - scene.plotter.scalar_bars["skew"].GetPosition()[0]
+    assert wider == pytest.approx(1.5 * (1.0 - left))
+
+
 def test_a_sliver_is_found_by_a_ring_of_the_same_size_at_any_zoom(scene, session):
     points = session.mesh.points.copy()
     points[12] = points[6] + [0.5, -0.02]  # of 16 cells, one is hardly inverted

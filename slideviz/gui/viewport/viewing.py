@@ -138,9 +138,8 @@ class Viewing(QWidget):
         """Give both meshes the same room, beside the legend."""
         if self.second is None:
             return
-        strip = round(STRIP / self.devicePixelRatioF())
-        rest = max(self.width() - self._grid.spacing() - strip, 2)
-        for column, width in enumerate((rest // 2, rest - rest // 2 + strip)):
+        rest = max(self.width() - self._grid.spacing() - STRIP, 2)
+        for column, width in enumerate((rest // 2, rest - rest // 2 + STRIP)):
             self._grid.setColumnStretch(column, width)
 
     def _place(self, swapped: bool) -> None:
