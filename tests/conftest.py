@@ -3,6 +3,7 @@
 import gc
 import os
 
+import pytest
 from hypothesis import settings
 
 # No test fails because a machine was busy for a moment.
@@ -14,6 +15,13 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Plotters, scenes and small meshes that the tests of several rooms draw.
 pytest_plugins = ["tests.scenes"]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """Return one process more than cores: where one waits for a program or a timer, it works."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return (len(affinity(0)) if affinity else os.cpu_count() or 1) + 1
 
 
 def pytest_collection_finish():
