@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.deformation.setup import Setup
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.mesh.threads import in_parts
+from slideviz.mesh.threads import PART, in_parts
 from slideviz.rbf.problem import Solution
 
 GROWTH = 5.0
@@ -57,15 +57,17 @@ def unsoundness(
             f"{_cause(setup, mesh, moved)}"
         )
     asked, largest = largest, max(largest, part * least)
-    length = np.empty(len(moved))
+    longest = np.zeros(-(-len(moved) // PART))
 
     def measure(part: slice) -> None:
-        length[part] = np.linalg.norm(moved[part] - setup.coords[part], axis=1)
+        length = np.linalg.norm(moved[part] - setup.coords[part], axis=1)
+        longest[part.start // PART] = length.max()
 
     in_parts(measure, len(moved))
-    if length.max() <= GROWTH * largest:
+    if longest.max() <= GROWTH * largest:
         return None  # as nearly always: the motion reaches that far at least
     shift = moved - setup.coords
+    length = np.linalg.norm(shift, axis=1)
     # Sliding nodes first, for what they do is data to all others.
     reach = np.full(len(length), _reach(setup, shift, largest, ("moving", "fixed", "sliding")))
     slid = setup.classes.sliding

@@ -218,7 +218,7 @@ def problem_at(
 def moved_by(
     setup: Setup, coords: FloatArray, displacement: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the new coordinates; known nodes are where they must be."""
+    """Return the new coordinates, in the place of the displacement; known nodes are as given."""
     moved = shifted(coords, displacement, setup.axis)
     moved[setup.known] = np.where(
         goal == setup.coords[setup.known], setup.coords[setup.known], goal
@@ -227,17 +227,19 @@ def moved_by(
 
 
 def shifted(coords: FloatArray, displacement: FloatArray, axis: np.ndarray) -> FloatArray:
-    """Return the coordinates (n, d) after a displacement; nodes on the ``axis`` (n,) stay on it."""
+    """Return the coordinates (n, d) after a displacement, in its place.
+
+    Nodes on the ``axis`` (n,) stay on it.
+    """
     displacement[axis, :2] = 0.0
-    # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
-    moved = np.empty_like(coords)
 
     def add(part: slice) -> None:
+        # Adding zero would turn -0.0 into 0.0: nodes at rest keep every bit.
         by, before = displacement[part], coords[part]
-        moved[part] = np.where(by == 0, before, before + by)
+        displacement[part] = np.where(by == 0, before, before + by)
 
     in_parts(add, len(coords))
-    return moved
+    return displacement
 
 
 def cartesian(

@@ -14,7 +14,7 @@ from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
 from slideviz.design.frozen_step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.rbf.problem import Levels, Problem, Solution, Watch
+from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
 
 Tell = Callable[[Progress], None]
 
@@ -108,7 +108,7 @@ def _further(
     """Return the solutions of the steps with the control nodes of others, and more where needed."""
     coords, total = setup.coords, len(parts)
     made: list[Solution] = []
-    lag: FloatArray | None = None
+    lag: Lag | None = None
     for k, (part, solution) in enumerate(zip(parts, chosen, strict=True)):
         control = solution.control
         if made:

@@ -23,7 +23,7 @@ from slideviz.rbf.evaluate import Tick
 from slideviz.rbf.exact import ExactFit
 from slideviz.rbf.field import Correction
 from slideviz.rbf.greedy import GreedyFit
-from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Solution, Watch
+from slideviz.rbf.problem import Cycle, Interpolant, Lag, Levels, Problem, Solution, Watch
 
 ROUNDING = 1e-14
 """Part of the largest coordinate by which projecting a point of a flat boundary may move it."""
@@ -170,8 +170,8 @@ def _finish(
     errors = values - displacement[nodes]
     total, lag = problem.behind(nodes) + errors, None
     if problem.reduction is not None:
-        lag = np.zeros_like(displacement)
-        lag[nodes] = total
+        order = np.argsort(nodes)
+        lag = Lag(nodes[order], total[order])
     left_out = np.isin(problem.same_as[nodes], fit.dropped)
     lost = 0.0
     if problem.reduction is None:

@@ -139,7 +139,7 @@ class Problem:
         """Return how much the interpolants of all steps before lack at nodes, (m, d)."""
         if self.before is None or self.before.lag is None:
             return np.zeros((len(nodes), self.values.shape[1]))
-        return self.before.lag[nodes]
+        return self.before.lag.at(nodes)
 
     def beginning(self) -> IntArray:
         """Return the control nodes with which a selection begins.
@@ -152,6 +152,19 @@ class Problem:
             return np.empty(0, np.int64)
         full = settings.max_nodes is not None and len(before.control) >= settings.max_nodes
         return before.control[:0] if full else before.control
+
+
+@dataclass(frozen=True, eq=False)
+class Lag:
+    """What interpolants lack at some nodes, (b,), each once and sorted: (b, d); zero elsewhere."""
+
+    nodes: IntArray
+    values: FloatArray
+
+    def at(self, nodes: IntArray) -> FloatArray:
+        """Return what they lack at nodes, (m, d)."""
+        row = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
+        return np.where((self.nodes[row] == nodes)[:, None], self.values[row], 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +190,7 @@ class Solution:
         What the user should know.
     control : (c,) int64
         The nodes in the final system; empty where a method has no such system.
-    lag : (n, d) float64 or None
+    lag : Lag or None
         How much less than the boundary nodes the interpolants of all steps so far have moved
         there; None without data reduction.
     dropped_error : float
@@ -209,7 +222,7 @@ class Solution:
     history: tuple[Cycle, ...] = ()
     warnings: tuple[str, ...] = ()
     control: IntArray = made_by(default_factory=lambda: np.empty(0, np.int64))
-    lag: FloatArray | None = None
+    lag: Lag | None = None
     dropped_error: float = 0.0
     short: str = ""
     lost: float = 0.0
