@@ -247,10 +247,11 @@ def _points_of(
                 f"coordinates larger than {LARGEST:g}, so correct it or scale the mesh",
             )
     more = dict(outer.values())
-    extra = np.setdiff1d(np.array(list(more), np.int64), numbers)
+    few = np.unique(np.array(list(more), np.int64))
+    extra = few[np.searchsorted(numbers, few) == np.searchsorted(numbers, few, "right")]
     every = np.concatenate([numbers, extra])
     blocks.append(np.array([more[n] for n in extra]).reshape(-1, place.dim))
-    order = np.argsort(every)
+    order = np.argsort(every, kind="stable")  # nearly in order already
     return every[order], np.concatenate(blocks)[order]
 
 
