@@ -1,5 +1,7 @@
 """What the keys do in the panels of boundaries and motions, and where the cursor goes."""
 
+import itertools
+
 import pytest
 from qtpy.QtCore import Qt
 from qtpy.QtGui import QContextMenuEvent
@@ -8,7 +10,6 @@ from qtpy.QtWidgets import QAbstractItemView, QApplication, QMenu, QTableView
 
 from slideviz.case.model import Ffd, FromFile, Radial, Rotate, Scale, Translate
 from slideviz.session import changes
-from tests.slow import one_of_each_fast
 
 
 @pytest.fixture
@@ -26,22 +27,21 @@ def menu_key(view):
     QApplication.sendEvent(view, event)
 
 
-@pytest.mark.parametrize(
-    ("name", "by_click"),
-    one_of_each_fast(["inflow", "periodic_1", "periodic_2", "outflow"], [True, False]),
-)
-def test_the_menu_key_is_about_the_row_that_is_selected(opened, name, by_click):
+def test_the_menu_key_is_about_the_row_that_is_selected(opened):
     panel = opened.window.boundaries
-    if by_click:
-        opened.click_row(name)
-    else:
-        # As a click on the boundary in the view does.
+
+    def select(name):
+        """Select as a click on the boundary in the view does."""
         opened.window.store.change(changes.select, (name,))
-    panel.table.setFocus()
-    menu_key(panel.table)
-    (menu,) = [menu for menu in panel.findChildren(QMenu) if menu.isVisible()]
-    assert menu.actions()[0].text() == name
-    menu.close()
+
+    names = ["inflow", "periodic_1", "periodic_2", "outflow"]
+    for choose, name in itertools.product([opened.click_row, select], names):
+        choose(name)
+        panel.table.setFocus()
+        menu_key(panel.table)
+        (menu,) = [menu for menu in panel.findChildren(QMenu) if menu.isVisible()]
+        assert menu.actions()[0].text() == name
+        menu.close()
 
 
 def test_a_right_click_is_about_the_row_below_the_mouse(opened):
@@ -57,25 +57,23 @@ def test_a_right_click_is_about_the_row_below_the_mouse(opened):
     menu.close()
 
 
-@pytest.mark.parametrize(
-    ("key", "modifier"),
-    [
-        (Qt.Key.Key_F2, Qt.KeyboardModifier.NoModifier),
-        (Qt.Key.Key_Return, Qt.KeyboardModifier.NoModifier),
-        (Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier),
-    ],
-)
-def test_roles_are_chosen_by_keys_alone(opened, key, modifier):
+def test_roles_are_chosen_by_keys_alone(opened):
     table = opened.window.boundaries.table
     table.setFocus()
-    table.setCurrentCell(opened.row("outflow"), 0)
-    QTest.keyClick(table, key, modifier)
-    choice = table.cellWidget(opened.row("outflow"), 2)
-    opened.qtbot.waitUntil(lambda: choice.view().isVisible())
-    QTest.keyClick(choice.view(), Qt.Key.Key_Home)
-    QTest.keyClick(choice.view(), Qt.Key.Key_Return)
-    assert opened.session.role("outflow") == "moving"
-    assert table.hasFocus(), "the next one is chosen by keys, too"
+    for name, key, modifier in (
+        ("outflow", Qt.Key.Key_F2, Qt.KeyboardModifier.NoModifier),
+        ("inflow", Qt.Key.Key_Return, Qt.KeyboardModifier.NoModifier),
+        ("periodic_1", Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier),
+    ):
+        assert opened.session.role(name) != "moving"
+        table.setCurrentCell(opened.row(name), 0)
+        QTest.keyClick(table, key, modifier)
+        view = table.cellWidget(opened.row(name), 2).view()
+        opened.qtbot.waitUntil(view.isVisible)
+        QTest.keyClick(view, Qt.Key.Key_Home)
+        QTest.keyClick(view, Qt.Key.Key_Return)
+        assert opened.session.role(name) == "moving"
+        assert table.hasFocus(), "the next one is chosen by keys, too"
 
 
 @pytest.mark.parametrize("back", [False, True])
@@ -114,13 +112,13 @@ FIRST = {
 }
 
 
-@pytest.mark.parametrize("kind", list(FIRST))
-def test_what_is_typed_after_adding_a_motion_goes_into_its_first_field(opened, kind):
-    opened.add_motion(kind)
-    field = FIRST[kind](opened.window.motions.editor)
-    opened.qtbot.waitUntil(field.hasFocus)
-    QTest.keyClicks(opened.window.focusWidget(), "7")
-    assert field.text() == "7"
+def test_what_is_typed_after_adding_a_motion_goes_into_its_first_field(opened):
+    for kind, first in FIRST.items():
+        opened.add_motion(kind)
+        field = first(opened.window.motions.editor)
+        opened.qtbot.waitUntil(field.hasFocus)
+        QTest.keyClicks(opened.window.focusWidget(), "7")
+        assert field.text() == "7", kind
 
 
 def link(driver):
