@@ -57,10 +57,6 @@ def _switch(name: Shown, window: MainWindow) -> None:
     window.store.change(changes.set_view, **{name: name not in drawn})
 
 
-def _show_all(window: MainWindow) -> None:
-    window.store.change(changes.show, window.store.session.mesh.marker_names)
-
-
 def _add_section(kind: str, window: MainWindow) -> None:
     window.docks_.lead_to("sections")
     panel: Any = window.docks_.panels["sections"]  # a panel, which commands do not know
@@ -268,7 +264,8 @@ _VIEW = Menu("view", "&View", entries=(
     _SIDES,
     COMPARE,
     Command("show_all", "Show &all boundaries", "Show the boundaries that were hidden.",
-            _show_all, ("Shift+A",), enabled=opened),
+            lambda w: w.store.change(changes.show, w.store.session.mesh.marker_names),
+            ("Shift+A",), enabled=opened),
     *(_section(kind, row) for kind, row in SECTION_SHAPES.items()),
     None,
     STEPS,
