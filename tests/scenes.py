@@ -9,7 +9,7 @@ from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import open_mesh
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 def square_mesh(n=4):
@@ -56,7 +56,7 @@ def square():
 
 @pytest.fixture(scope="session")
 def session(square):
-    return open_mesh(Frame(square, quality(square)), None)
+    return open_mesh(StepFrame(square, quality(square)), None)
 
 
 @pytest.fixture(scope="session")

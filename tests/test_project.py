@@ -1,5 +1,6 @@
 """What the project says of itself agrees with the program."""
 
+import ast
 import tomllib
 from configparser import ConfigParser
 from importlib import import_module
@@ -51,3 +52,12 @@ def _name(requirement: str) -> str:
     """Return the name of a requirement as package indexes compare it."""
     kept = requirement.replace("_", "-").lower()
     return kept[: next((i for i, c in enumerate(kept) if c in "=<>~; "), len(kept))]
+
+
+def test_a_name_of_a_class_means_one_thing():
+    places = {}
+    for path in sorted(Path(slideviz.__file__).parent.rglob("*.py")):
+        for part in ast.parse(path.read_text()).body:
+            if isinstance(part, ast.ClassDef) and not part.name.startswith("_"):
+                places.setdefault(part.name, []).append(path.name)
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.baselines.shapes import Block
+from slideviz.baselines.shapes import ShapeBlock
 from slideviz.baselines.stiffness import Conditions
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
@@ -22,7 +22,7 @@ class Body:
 
     Attributes
     ----------
-    parts : list of Block
+    parts : list of ShapeBlock
         Its elements.
     frame : Frame
         In which displacements are given and wanted.
@@ -30,7 +30,7 @@ class Body:
         Nodes on the axis of a cylindrical frame, which move along it only.
     """
 
-    parts: list[Block]
+    parts: list[ShapeBlock]
     frame: Frame
     axis: np.ndarray
 

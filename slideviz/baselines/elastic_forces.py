@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.baselines.shapes import Block
+from slideviz.baselines.shapes import ShapeBlock
 from slideviz.baselines.stiffness import OPTIONS, POISSON, _jacobian, cell_volumes
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray
@@ -33,11 +33,11 @@ class Forces:
     """The forces of a body whose nodes are at ``points`` (n, d)."""
 
     points: FloatArray
-    parts: list[Block]
+    parts: list[ShapeBlock]
     volume: FloatArray
 
     @classmethod
-    def at(cls, points: FloatArray, parts: list[Block]) -> Forces:
+    def at(cls, points: FloatArray, parts: list[ShapeBlock]) -> Forces:
         """Return those at some positions."""
         return cls(points, parts, cell_volumes(points, parts))
 
@@ -73,10 +73,10 @@ class Forces:
             press(self._elements(part), -part.share * rate[part.cell], out)
         return out
 
-    def _elements(self, part: Block) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    def _elements(self, part: ShapeBlock) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
         return self.points, part.nodes, part.shape.gradients, part.shape.weights
 
-    def _modulus(self, part: Block) -> FloatArray:
+    def _modulus(self, part: ShapeBlock) -> FloatArray:
         return np.asarray(part.share / self.volume[part.cell])
 
 

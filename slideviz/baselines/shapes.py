@@ -37,7 +37,7 @@ _ORDER = {5: 1, 9: 2, 10: 1, 12: 2}
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ReferenceShape:
     """A reference element.
 
     Attributes
@@ -53,7 +53,7 @@ class Shape:
 
 
 @cache
-def shape(vtk: int) -> Shape:
+def shape(vtk: int) -> ReferenceShape:
     """Return the shape functions of an element type, in the order of SU2's nodes."""
     import skfem
 
@@ -70,7 +70,9 @@ def shape(vtk: int) -> Shape:
     gradients = [np.asarray(element.lbasis(x, i)[1], float) for i in local]
     # (a, d) or (a, d, q), depending on whether the gradients are constant.
     full = [np.broadcast_to(g.reshape(len(x), -1), x.shape).T for g in gradients]
-    return Shape(np.ascontiguousarray(np.stack(full, axis=1)), np.ascontiguousarray(weights))
+    return ReferenceShape(
+        np.ascontiguousarray(np.stack(full, axis=1)), np.ascontiguousarray(weights)
+    )
 
 
 def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
@@ -88,12 +90,12 @@ def _quadrature(vtk: int, element: object) -> tuple[FloatArray, FloatArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class ShapeBlock:
     """Elements that have one shape.
 
     Attributes
     ----------
-    shape : Shape
+    shape : ReferenceShape
     nodes : (m, a) int64
     cell : (m,) int64
         The cell of the mesh that each element is (a part of).
@@ -101,20 +103,22 @@ class Block:
         How much each counts: 1, or 1/2 for the parts of pyramids.
     """
 
-    shape: Shape
+    shape: ReferenceShape
     nodes: IntArray
     cell: IntArray
     share: float
 
 
-def blocks(cells: Cells) -> list[Block]:
+def blocks(cells: Cells) -> list[ShapeBlock]:
     """Return all cells as elements with shape functions; pyramids in parts."""
     found = []
     for vtk, (ids, nodes) in cells.by_type.items():
         if vtk == PYRAMID:
             # Read-only like the mesh's own, for which the loops are compiled.
             parts = frozen_array(np.concatenate([nodes[:, p] for p in PYRAMID_PARTS]), np.int64)
-            found.append(Block(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5))
+            found.append(
+                ShapeBlock(shape(TETRAHEDRON), parts, np.tile(ids, len(PYRAMID_PARTS)), 0.5)
+            )
         else:
-            found.append(Block(shape(vtk), nodes, ids, 1.0))
+            found.append(ShapeBlock(shape(vtk), nodes, ids, 1.0))
     return found

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
-from slideviz.baselines.shapes import Block
+from slideviz.baselines.shapes import ShapeBlock
 from slideviz.errors import DeformError
 from slideviz.mesh.caching import njit
 from slideviz.mesh.model import FloatArray, IntArray, frozen_array
@@ -60,7 +60,7 @@ class Conditions:
 
 
 def assemble(
-    points: FloatArray, parts: list[Block], conditions: Conditions, tick: Tick = no_tick
+    points: FloatArray, parts: list[ShapeBlock], conditions: Conditions, tick: Tick = no_tick
 ) -> tuple[bsr_array, FloatArray]:
     """Return the matrix (k d, k d) and the right-hand side (k d,) of the unknowns z.
 
@@ -102,7 +102,7 @@ def assemble(
     return matrix, right.ravel()
 
 
-def cell_volumes(points: FloatArray, parts: list[Block]) -> FloatArray:
+def cell_volumes(points: FloatArray, parts: list[ShapeBlock]) -> FloatArray:
     """Return the volumes (areas) of cells, by number."""
     out = np.zeros(max((int(p.cell.max(initial=-1)) + 1 for p in parts), default=0))
     for part in parts:
@@ -112,7 +112,7 @@ def cell_volumes(points: FloatArray, parts: list[Block]) -> FloatArray:
     return out
 
 
-def _pattern(parts: list[Block], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _pattern(parts: list[ShapeBlock], place: IntArray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return indptr and indices of the blocks: which unknowns share an element."""
     rows, columns, offset = [], [], 0
     for part in parts:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from slideviz.case.model import Case
     from slideviz.mesh.model import Mesh
-    from slideviz.study.combinations import Combination, Row
+    from slideviz.study.combinations import Combination, CombinationRow
 
 STEPS = (1, 5, 20)
 TABLE, HISTORY = "compare.csv", "convergence.csv"
@@ -66,7 +66,7 @@ def compare(arguments: argparse.Namespace) -> int:
     """Compare methods on a case, and write table, plots and pictures."""
     from slideviz import read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import Output, make_folder, require_places
+    from slideviz.cli.places import OutputPath, make_folder, require_places
     from slideviz.errors import CaseError
     from slideviz.study.combinations import COMPARED_METHODS, MODES, warm
     from slideviz.study.table import terminal_head
@@ -79,7 +79,7 @@ def compare(arguments: argparse.Namespace) -> int:
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
     tables = [folder / TABLE, folder / HISTORY]
-    require_places(arguments, *(Output(table, "compare", named=False) for table in tables))
+    require_places(arguments, *(OutputPath(table, "compare", named=False) for table in tables))
     cannot = refused(case, mesh, wanted)
 
     known = {"methods": tuple(COMPARED_METHODS), "periodic": tuple(MODES)}
@@ -156,14 +156,14 @@ def _computed(
     wanted: Sequence[Combination],
     cannot: Mapping[Combination, str],
     folder: Path,
-) -> tuple[list[Row], list[Path]]:
+) -> tuple[list[CombinationRow], list[Path]]:
     """Return all rows and the tables written; after each row they have what was finished."""
     from slideviz.study.combinations import bounded, compare
     from slideviz.study.table import csv_text, history_text, save_text, terminal_line
 
     table, histories = folder / TABLE, folder / HISTORY
     files = [table]
-    rows: list[Row] = []
+    rows: list[CombinationRow] = []
     reasons: list[str] = []
     count = len(wanted) - len(cannot)
     bars: list[Bar] = []
@@ -185,7 +185,7 @@ def _computed(
     return rows, files
 
 
-def _expected(rows: Sequence[Row], tried: Combination) -> float | None:
+def _expected(rows: Sequence[CombinationRow], tried: Combination) -> float | None:
     """Return the seconds that a combination may take, by what the same method took before."""
     known = [row for row in rows if row.result and row.combination.method == tried.method]
     alike = [row for row in known if row.combination.periodic == tried.periodic] or known
@@ -196,7 +196,11 @@ def _expected(rows: Sequence[Row], tried: Combination) -> float | None:
 
 
 def _drawn(
-    arguments: argparse.Namespace, case: Case, mesh: Mesh, rows: Sequence[Row], folder: Path
+    arguments: argparse.Namespace,
+    case: Case,
+    mesh: Mesh,
+    rows: Sequence[CombinationRow],
+    folder: Path,
 ) -> list[Path]:
     """Return the plots and pictures written."""
     from slideviz.study.facets import profiler

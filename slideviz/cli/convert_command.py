@@ -30,12 +30,12 @@ def convert(arguments: argparse.Namespace) -> int:
 
     from slideviz import quality, read
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import Output, require_places, tell_lost
+    from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import cell_data
     from slideviz.mesh.io.convert import convert as write_converted
     from slideviz.session.formats import holds_quality, left_out
 
-    require_places(arguments, Output(arguments.output, "OUT", is_mesh=True))
+    require_places(arguments, OutputPath(arguments.output, "OUT", is_mesh=True))
     if _is_to_be_streamed(arguments):
         return _convert_streamed(arguments)
     mesh = read(arguments.mesh, zone=arguments.zone)

@@ -14,7 +14,7 @@ from slideviz.cli.options import add_shared, changed
 if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.design.su2_config import Su2Config
-    from slideviz.design.su2_surface import Surface
+    from slideviz.design.su2_surface import MovingSurface
     from slideviz.mesh.model import Mesh
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
@@ -68,7 +68,7 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
 def run_def(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a configuration of SU2 says, and write it with its boxes."""
     from slideviz import quality, write
-    from slideviz.cli.places import Output, require_places, tell_lost
+    from slideviz.cli.places import OutputPath, require_places, tell_lost
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
     from slideviz.cli.run_outcome import CELLS, tell, write_qualities
@@ -80,12 +80,15 @@ def run_def(arguments: argparse.Namespace) -> int:
     assert output is not None
     remedy = "choose another name in MESH_OUT_FILENAME, or say --force to write over it"
     replaces = config.case.mesh_file if arguments.force else None
-    place = Output(
+    place = OutputPath(
         output, "MESH_OUT_FILENAME", False, is_mesh=kind is None, replaces=replaces, remedy=remedy
     )
     rated = output.with_name(output.stem + "_qual.txt") if config.case.generate_quality else None
     require_places(
-        arguments, place, Output(rated, "GENERATE_QUALITY", False), Output(arguments.json, "--json")
+        arguments,
+        place,
+        OutputPath(rated, "GENERATE_QUALITY", False),
+        OutputPath(arguments.json, "--json"),
     )
     if config.variables[0].kind == "FFD_SETTING":
         return _set_boxes(arguments, config, mesh, begin)
@@ -116,7 +119,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     return tell(arguments, report, {"mesh": output, CELLS: rated}, found, before, folded)
 
 
-def variable_rows(surface: Surface) -> list[dict[str, Any]]:
+def variable_rows(surface: MovingSurface) -> list[dict[str, Any]]:
     """Return what a report says of each design variable."""
     return [
         {"kind": variable.kind, "value": variable.value, "idle": idle}

@@ -27,7 +27,7 @@ def add_dot(calls: argparse._SubParsersAction) -> None:
 def run_dot(arguments: argparse.Namespace) -> int:
     """Write the gradients for moving nodes and for design variables."""
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
     from slideviz.design.su2_gradients import find_gradients
@@ -45,9 +45,9 @@ def run_dot(arguments: argparse.Namespace) -> int:
     gradient = None if "SURFACE_FILE" in kinds else config.files["GRAD_OBJFUNC_FILENAME"]
     require_places(
         arguments,
-        Output(sensitivities, "DV_SENS_FILENAME", False),
-        Output(gradient, "GRAD_OBJFUNC_FILENAME", False),
-        Output(arguments.json, "--json"),
+        OutputPath(sensitivities, "DV_SENS_FILENAME", False),
+        OutputPath(gradient, "GRAD_OBJFUNC_FILENAME", False),
+        OutputPath(arguments.json, "--json"),
     )
     surface = make_surface(config, mesh)
     with Bar(not arguments.quiet) as bar:

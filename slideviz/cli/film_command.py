@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from slideviz.case.model import Case
     from slideviz.export.reel import Reel
     from slideviz.mesh.model import Mesh
-    from slideviz.session.state import Frame, Run
+    from slideviz.session.state import Run, StepFrame
 
 SMOOTH = 4
 """Films of fewer steps get a hint at images in between."""
@@ -87,7 +87,7 @@ def add_film(calls: argparse._SubParsersAction) -> None:
 def film(arguments: argparse.Namespace) -> int:
     """Deform a mesh as a case says, and write its steps as a film."""
     from slideviz.cli.exit_codes import DONE, INVERTED
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.export.encode import kind_of
     from slideviz.export.film import film as draw
@@ -102,7 +102,7 @@ def film(arguments: argparse.Namespace) -> int:
         require_pair(reel.pixels(file))
     case = read_case(arguments)
     if kind_of(file) != ".png":  # of pictures it is not known yet how many there will be
-        require_places(arguments, Output(file, "-o"))
+        require_places(arguments, OutputPath(file, "-o"))
     first, runs = _runs(arguments, case)
     session = of_runs(first, runs, arguments.color)
     drawing = draw(session, file, reel, zoom=arguments.zoom, overwrite=arguments.force)
@@ -116,20 +116,20 @@ def film(arguments: argparse.Namespace) -> int:
     return INVERTED if any(run.frames[-1].quality.inverted for run in runs) else DONE
 
 
-def _runs(arguments: argparse.Namespace, case: Case) -> tuple[Frame, list[Run]]:
+def _runs(arguments: argparse.Namespace, case: Case) -> tuple[StepFrame, list[Run]]:
     """Return the undeformed mesh, the run of the case, and one with the changes of ``--beside``."""
     from slideviz import quality, read
     from slideviz.errors import CaseError
     from slideviz.scene.moved import require_detail
-    from slideviz.session.state import Frame, Run
+    from slideviz.session.state import Run, StepFrame
 
     other = changed(case, arguments.beside, "--beside")  # mistakes before the work
     mesh_file = require_mesh_file(arguments, case)
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     require_detail(arguments.zoom, mesh)
 
-    def undeformed(one: Case) -> Frame:
-        return Frame(mesh, quality(mesh, reference=mesh, metric=one.quality_metric))
+    def undeformed(one: Case) -> StepFrame:
+        return StepFrame(mesh, quality(mesh, reference=mesh, metric=one.quality_metric))
 
     first = undeformed(case)
     if not arguments.beside:
@@ -160,18 +160,18 @@ def _words(case: Case, keys: list[str]) -> str:
     return ", ".join(words)
 
 
-def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[Frame, ...]:
+def _frames(arguments: argparse.Namespace, case: Case, mesh: Mesh) -> tuple[StepFrame, ...]:
     """Return every step with its quality."""
     from slideviz import deform, quality
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks
-    from slideviz.session.state import Frame
+    from slideviz.session.state import StepFrame
 
     frames = []
     with Bar(not arguments.quiet) as bar:
         for step in deform(case, mesh, bar):
             found = quality(step.mesh, reference=mesh, metric=case.quality_metric)
-            frames.append(Frame(step.mesh, found, step))
+            frames.append(StepFrame(step.mesh, found, step))
     print_remarks(step.warnings, quiet=arguments.quiet)
     return tuple(frames)
 

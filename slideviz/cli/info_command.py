@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from slideviz.cli.options import add_shared
 
 if TYPE_CHECKING:
-    from slideviz.cli.report import Counts
+    from slideviz.cli.report import MeshCounts
     from slideviz.ffd.box import Box
     from slideviz.mesh.model import Mesh
     from slideviz.mesh.quality import Quality
@@ -27,24 +27,24 @@ def add_info(calls: argparse._SubParsersAction) -> None:
 
 def info(arguments: argparse.Namespace) -> int:
     """Print the content of a mesh file."""
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
 
-    require_places(arguments, Output(arguments.json, "--json"))
+    require_places(arguments, OutputPath(arguments.json, "--json"))
     if arguments.stream:
-        from slideviz.cli.report import Counts
+        from slideviz.cli.report import MeshCounts
         from slideviz.cli.streamed import rated
 
         with rated(arguments) as (skin, whole, _):
-            counts = Counts(whole.points, whole.unused, whole.types)
+            counts = MeshCounts(whole.points, whole.unused, whole.types)
             return _told(arguments, skin, counts, whole.quality)
     from slideviz import quality, read
-    from slideviz.cli.report import Counts
+    from slideviz.cli.report import MeshCounts
 
     mesh = read(arguments.mesh, zone=arguments.zone)
-    return _told(arguments, mesh, Counts.of(mesh), quality(mesh))
+    return _told(arguments, mesh, MeshCounts.of(mesh), quality(mesh))
 
 
-def _told(arguments: argparse.Namespace, mesh: Mesh, counts: Counts, found: Quality) -> int:
+def _told(arguments: argparse.Namespace, mesh: Mesh, counts: MeshCounts, found: Quality) -> int:
     """Print or write what is in a mesh, of which the boundaries at least are there."""
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import info_report, save_json, table

@@ -30,7 +30,7 @@ _READ = {
 
 
 @dataclass(frozen=True)
-class Output:
+class OutputPath:
     """A file that a command writes, or a folder of files.
 
     Attributes
@@ -72,7 +72,7 @@ def note_case(arguments: argparse.Namespace, case: Case) -> None:
         arguments.inputs.setdefault(path, what)
 
 
-def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
+def require_places(arguments: argparse.Namespace, *outputs: OutputPath) -> None:
     """Raise where a result must not be written, or cannot; tell which older files are replaced.
 
     Raises
@@ -109,7 +109,7 @@ def require_places(arguments: argparse.Namespace, *outputs: Output) -> None:
         _print_replaced([one for one in there if not one.named])
 
 
-def _print_replaced(unnamed: list[Output]) -> None:
+def _print_replaced(unnamed: list[OutputPath]) -> None:
     """Say before the work which older files it will replace, in one line."""
     old_files = []
     for one in unnamed:
@@ -122,7 +122,7 @@ def _print_replaced(unnamed: list[Output]) -> None:
         print(f"slideviz: note: {words}", file=sys.stderr, flush=True)
 
 
-def _paths(one: Output) -> Iterator[Path]:
+def _paths(one: OutputPath) -> Iterator[Path]:
     """Yield the file, or those of the folder that are there."""
     assert one.path is not None
     if not one.files:
@@ -131,7 +131,7 @@ def _paths(one: Output) -> Iterator[Path]:
         yield from sorted(path for path in one.path.iterdir() if re.fullmatch(one.files, path.name))
 
 
-def _meet(one: Output, other: Output) -> bool:
+def _meet(one: OutputPath, other: OutputPath) -> bool:
     """Tell whether two results would go to one file; the other is a file."""
     from slideviz.mesh.io.file_checks import same_file
 

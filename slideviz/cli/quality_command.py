@@ -43,7 +43,7 @@ def quality(arguments: argparse.Namespace) -> int:
     """Print the quality of a mesh, compared with the undeformed one if it is given."""
     from slideviz import quality as rate
     from slideviz import read, write
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.report import cell_data, worst_cells
     from slideviz.cli.streamed import rated, require_no_file
 
@@ -53,8 +53,8 @@ def quality(arguments: argparse.Namespace) -> int:
     case = given_case(arguments)
     require_places(
         arguments,
-        Output(arguments.output, "-o", is_mesh=not is_table),
-        Output(arguments.json, "--json"),
+        OutputPath(arguments.output, "-o", is_mesh=not is_table),
+        OutputPath(arguments.json, "--json"),
     )
     if arguments.stream:
         with rated(arguments, case) as (skin, whole, path):

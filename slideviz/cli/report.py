@@ -134,7 +134,7 @@ def worst_cells(mesh: Mesh, quality: Quality, count: int = WORST) -> list[tuple[
 
 
 @dataclass(frozen=True)
-class Counts:
+class MeshCounts:
     """How many points a mesh has, and points that no cell uses, and cells of each type."""
 
     points: int
@@ -142,14 +142,14 @@ class Counts:
     types: Mapping[int, int]
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Counts:
+    def of(cls, mesh: Mesh) -> MeshCounts:
         """Return those of a mesh in memory."""
         types = {vtk: len(ids) for vtk, (ids, _) in mesh.cells.by_type.items()}
         return cls(len(mesh.points), len(unused_nodes(mesh)), types)
 
 
 def info_report(
-    mesh: Mesh, pairs: Sequence[Any], counts: Counts, quality: Quality
+    mesh: Mesh, pairs: Sequence[Any], counts: MeshCounts, quality: Quality
 ) -> dict[str, Any]:
     """Return the JSON object of ``info --json``; of ``mesh`` its boundaries are looked at."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)

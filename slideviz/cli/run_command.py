@@ -103,10 +103,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture:
         from slideviz.export.picture import SIZE, picture
         from slideviz.session.opening import of_runs
-        from slideviz.session.state import Frame, Run
+        from slideviz.session.state import Run, StepFrame
 
-        named = Frame(replace(last.mesh, name=output.name), found, last)
-        session = of_runs(Frame(mesh, before), [Run(1, case, (named,), "done")])
+        named = StepFrame(replace(last.mesh, name=output.name), found, last)
+        session = of_runs(StepFrame(mesh, before), [Run(1, case, (named,), "done")])
         picture(session, arguments.picture, arguments.picture_size or SIZE, arguments.zoom)
     seconds["total"] = time.perf_counter() - begin
     folded = folded_cells(steps, mesh, found)
@@ -119,12 +119,12 @@ def _require_places(
     arguments: argparse.Namespace, case: Case, output: Path, qualities: Path | None
 ) -> None:
     """Raise where a result could not be written, before the work and not after it."""
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
     from slideviz.mesh.io.file_checks import same_file
 
     assert case.mesh_file is not None
     may_force = not arguments.force and same_file(output, case.mesh_file)
-    mesh = Output(
+    mesh = OutputPath(
         output,
         "-o" if arguments.output else "MESH_OUT_FILENAME" if case.mesh_out else "without -o",
         named=bool(arguments.output),
@@ -144,12 +144,12 @@ def _require_places(
     require_places(
         arguments,
         mesh,
-        Output(qualities, "GENERATE_QUALITY", named=False),
-        Output(arguments.json, "--json"),
-        Output(arguments.picture, "--picture"),
-        Output(arguments.history, "--history"),
-        Output(arguments.steps_file, "--steps-file"),
-        Output(
+        OutputPath(qualities, "GENERATE_QUALITY", named=False),
+        OutputPath(arguments.json, "--json"),
+        OutputPath(arguments.picture, "--picture"),
+        OutputPath(arguments.history, "--history"),
+        OutputPath(arguments.steps_file, "--steps-file"),
+        OutputPath(
             arguments.steps_dir,
             "--steps-dir",
             named=False,

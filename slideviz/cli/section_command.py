@@ -109,7 +109,7 @@ class _Scene:
 
 def section(arguments: argparse.Namespace) -> int:
     """Draw a section of a mesh."""
-    from slideviz.cli.places import Output, require_places
+    from slideviz.cli.places import OutputPath, require_places
     from slideviz.errors import CaseError
     from slideviz.plots.around import surroundings
     from slideviz.plots.section_paint import paint
@@ -125,7 +125,9 @@ def section(arguments: argparse.Namespace) -> int:
     _check_usage(arguments)
     require_picture_name(arguments.output)
     case = given_case(arguments)
-    require_places(arguments, Output(arguments.output, "-o"), Output(arguments.json, "--json"))
+    require_places(
+        arguments, OutputPath(arguments.output, "-o"), OutputPath(arguments.json, "--json")
+    )
     scene = (_streamed if arguments.stream else _in_memory)(arguments, case)
     mesh, chosen = scene.mesh, scene.chosen
     painted = paint(mesh, scene.found, arguments.color, scene.base)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from slideviz.design.sweep_designs import Designs
-    from slideviz.design.sweep_row import Row
+    from slideviz.design.sweep_row import DesignRow
 
 _LISTED = 5
 """Designs that are named, of those with inverted cells, and reasons of those that failed."""
@@ -66,7 +66,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz import read
     from slideviz import sweep as sweep_of
     from slideviz.cli.exit_codes import DONE
-    from slideviz.cli.places import Output, make_folder, require_places
+    from slideviz.cli.places import OutputPath, make_folder, require_places
     from slideviz.cli.report import save_json
     from slideviz.design.sweep_designs import read_designs
     from slideviz.design.sweep_results import RESULTS
@@ -82,7 +82,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     folder = arguments.output or Path(f"{arguments.case.stem}_swept")
     mesh = read(mesh_file, zone=case.zone, file_format=case.mesh_format)
     make_folder(folder)
-    require_places(arguments, Output(arguments.json, "--json"))
+    require_places(arguments, OutputPath(arguments.json, "--json"))
     with _executor(arguments) as executor:
         rows = sweep_of(
             case,
@@ -163,12 +163,12 @@ def _executor(arguments: argparse.Namespace) -> Iterator[Executor | None]:
 
 
 def _pulled(
-    arguments: argparse.Namespace, rows: Iterator[Row], total: int, results: Path
-) -> list[Row]:
+    arguments: argparse.Namespace, rows: Iterator[DesignRow], total: int, results: Path
+) -> list[DesignRow]:
     """Return all rows; a bar tells how many there are and how long the rest will take."""
     from slideviz.mesh.io.cleanup import keep
 
-    found: list[Row] = []
+    found: list[DesignRow] = []
     begin, earlier = time.monotonic(), 0
     with Bar(not arguments.quiet) as bar:
         bar.count(0, total, "designs:")
@@ -183,7 +183,7 @@ def _pulled(
 
 
 def _report(
-    arguments: argparse.Namespace, designs: Designs, rows: Sequence[Row], seconds: float
+    arguments: argparse.Namespace, designs: Designs, rows: Sequence[DesignRow], seconds: float
 ) -> dict[str, Any]:
     """Return the JSON object of a sweep."""
     done = sorted((row for row in rows if not row.problem), key=lambda row: (-row.min, row.design))
@@ -203,11 +203,11 @@ def _report(
     }
 
 
-def _number(row: Row) -> int:
+def _number(row: DesignRow) -> int:
     return row.design
 
 
-def _named(row: Row) -> dict[str, Any]:
+def _named(row: DesignRow) -> dict[str, Any]:
     """Return a design with its values and quality."""
     return {"design": row.design, "min": row.min, "mean": row.mean, "values": dict(row.values)}
 
@@ -237,7 +237,7 @@ def _print_sweep(report: dict[str, Any]) -> None:
     print(f"results: {report['results']}")
 
 
-def _warn(warnings: Sequence[str], rows: Sequence[Row], quiet: bool) -> None:
+def _warn(warnings: Sequence[str], rows: Sequence[DesignRow], quiet: bool) -> None:
     """Print the warnings of the case, and why designs failed, each reason once."""
     from slideviz.cli.report import print_remarks
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from slideviz.deformation.measuring import PointFiles
 from slideviz.errors import MeshError
 from slideviz.mesh.io.su2b.elements import element_block
-from slideviz.mesh.io.su2b.layout import Source, find_zone
+from slideviz.mesh.io.su2b.layout import BinaryFile, find_zone
 from slideviz.mesh.io.su2b.read import read_elements
 from slideviz.mesh.model import Cells, IntArray
 from slideviz.mesh.orientation import corner_sums, facets_of
@@ -31,7 +31,7 @@ Numbers = NDArray[np.uint64]
 def facing(path: Path, zone: int | None) -> Iterator[Callable[[tuple[int, int]], int]]:
     """Return what adds up the numbers of the facets of a part of the cells."""
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
         files = PointFiles(source, source, place)
         tables = (

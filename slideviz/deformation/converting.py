@@ -15,7 +15,7 @@ from slideviz.mesh.io.binary_copy import Plan, fill, planned
 from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import require_text_names
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone, find_zones
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone, find_zones
 from slideviz.mesh.io.su2b.write import (
     file_head,
     halo_error,
@@ -109,7 +109,7 @@ def _require_binary(text: Text, name: str) -> None:
 
 def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tick) -> None:
     with source.open("rb") as file:
-        binary = Source(source, file)
+        binary = BinaryFile(source, file)
         places = find_zones(binary) if zone is None else (find_zone(binary, zone),)
         for place in places:
             require_text_names(binary.name, (marker.name for marker in place.markers))
@@ -129,7 +129,7 @@ def _to_text(source: Path, target: Path, zone: int | None, warn: Warn, tick: Tic
     tick(1.0)
 
 
-def _text_blocks(binary: Source, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
+def _text_blocks(binary: BinaryFile, places: Sequence[ZonePlace], folder: Path) -> Iterator[bytes]:
     if len(places) == 1:
         yield from text_of_binary(binary, places[0], binary, folder)
         return

@@ -26,7 +26,7 @@ from slideviz.mesh.io.files import format_of
 from slideviz.mesh.io.su2.lines import Piece
 from slideviz.mesh.io.su2.text import Text, find_text
 from slideviz.mesh.io.su2.write import box_edits, moved_rows, patched_blocks, require_text_names
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import finish_head, partial_file
 from slideviz.mesh.io.su2b.write import lost_of_text, require_binary_names, sentence_of_lost
 from slideviz.mesh.model import Mesh
@@ -227,7 +227,7 @@ def _lost_in_text(output: Path, path: Path, zone: int | None) -> str:
         The name of a boundary cannot stand in a text.
     """
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
     name = printable(path.name)
     require_text_names(name, (marker.name for marker in place.markers))
@@ -243,7 +243,7 @@ def lost_zones(output: Path, name: str, zone: int) -> str:
 
 
 def text_blocks(
-    given: Given, source: Source, place: ZonePlace, after: Path, ffd: bytes | None
+    given: Given, source: BinaryFile, place: ZonePlace, after: Path, ffd: bytes | None
 ) -> Iterator[bytes]:
     """Yield a text with other coordinates: those that stand in ``after`` as in its binary copy.
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.solver import folded_at
 from slideviz.mesh.io.cleanup import draft
-from slideviz.mesh.io.su2b.elements import Block
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace
+from slideviz.mesh.io.su2b.elements import ElementBlock
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, Quality, quality
 from slideviz.mesh.skin import Index, index_of
@@ -34,18 +34,18 @@ SPARSE = 8
 class PointFiles:
     """The points of a mesh in its file and in that of the deformed one."""
 
-    before: Source
-    after: Source
+    before: BinaryFile
+    after: BinaryFile
     place: ZonePlace
 
-    def cells_of(self, block: Block) -> tuple[Mesh, Mesh]:
+    def cells_of(self, block: ElementBlock) -> tuple[Mesh, Mesh]:
         """Return the cells of a block as a mesh, before and after."""
         nodes, flat = nodes_of(block)
         cells = Cells.from_types(block.types, flat)
         base = Mesh(self.points(self.before, nodes), cells, name=self.before.name)
         return base, base.with_points(self.points(self.after, nodes))
 
-    def points(self, source: Source, nodes: IntArray) -> FloatArray:
+    def points(self, source: BinaryFile, nodes: IntArray) -> FloatArray:
         """Return the points of nodes (k,), ascending; those close to each other in one piece."""
         kind = source.point(self.place.dim)
         out = np.empty((len(nodes), self.place.dim))
@@ -62,7 +62,7 @@ class PointFiles:
         return out
 
 
-def nodes_of(block: Block) -> tuple[IntArray, IntArray]:
+def nodes_of(block: ElementBlock) -> tuple[IntArray, IntArray]:
     """Return numbers of points (k,), ascending, among them those of a block, and their places."""
     low, high = int(block.nodes.min()), int(block.nodes.max()) + 1
     if high - low <= SPARSE * len(block.types):
@@ -77,7 +77,7 @@ def ways_of(signs: NDArray[np.int8]) -> NDArray[np.int8]:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredBlock:
     """The quality of a block of cells, before and after.
 
     Attributes
@@ -103,12 +103,14 @@ class Measured:
     inverted: dict[int, tuple[int, IntArray]]
 
 
-def measured(block: Block, base: Mesh, moved: Mesh, metric: Metric, listed: int) -> Measured:
+def measured(
+    block: ElementBlock, base: Mesh, moved: Mesh, metric: Metric, listed: int
+) -> MeasuredBlock:
     """Return the quality of a block; of inverted cells the ``listed`` with the lowest numbers."""
     one, other = quality(base, metric=metric), quality(moved, base, metric)
     ends, inverted = moved.cells.offsets, np.flatnonzero(other.status == INVERTED)
     lowest = inverted[np.argsort(block.ids[inverted])][:listed].tolist()
-    return Measured(
+    return MeasuredBlock(
         index_of(block.ids),
         other.values,
         one.values,
@@ -139,7 +141,7 @@ class Rating:
         self._signs = np.zeros(0, np.int8)
         self.inverted: dict[int, tuple[int, IntArray]] = {}
 
-    def add(self, found: Measured, listed: int) -> None:
+    def add(self, found: MeasuredBlock, listed: int) -> None:
         """Keep a block; of inverted cells the ``listed`` with the lowest numbers."""
         self._signs = ways_of(np.concatenate([self._signs, found.signs]))
         ids = found.ids

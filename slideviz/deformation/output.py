@@ -19,14 +19,14 @@ import numpy as np
 
 from slideviz.deformation.both_ways import facing, require_right
 from slideviz.deformation.given_mesh import Given, text_blocks
-from slideviz.deformation.measuring import Measured, PointFiles, Rating, measured
+from slideviz.deformation.measuring import MeasuredBlock, PointFiles, Rating, measured
 from slideviz.deformation.rest import Rest
 from slideviz.deformation.text_of_binary import text_of_binary
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.file_checks import require_no_input
 from slideviz.mesh.io.su2b.elements import element_block
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import Partial, partial_copy, partial_file
 from slideviz.mesh.ranks import Alone
 from slideviz.rbf.problem import Watch
@@ -68,7 +68,7 @@ class Output:
         self._stack, self._given, self._path, self._watch = stack, given, output, watch
         self._metric, self._ranks, self._is_text, self._replaces = metric, ranks, is_text, replaces
         self._mesh_file, self._zone = given.path, given.zone
-        source = Source(given.path, stack.enter_context(given.path.open("rb")))
+        source = BinaryFile(given.path, stack.enter_context(given.path.open("rb")))
         self._place = find_zone(source, given.zone)
         self.files = PointFiles(source, source, self._place)
         about = f"{about} {is_text} {parts(self._place.n_points)[0]}"
@@ -199,7 +199,7 @@ def moving(
             os.close(out)
 
 
-def move(source: Source, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
+def move(source: BinaryFile, place: ZonePlace, rest: Rest, out: int, part: Part) -> int:
     """Write the points of a part to an open file, and return the checksum of its bytes."""
     kind = source.point(place.dim)
     at = place.points + part[0] * kind.itemsize
@@ -234,13 +234,13 @@ def checking(path: Path, zone: int | None, partial: Path) -> Iterator[Callable[[
 @contextmanager
 def measuring(
     path: Path, zone: int | None, partial: Path, metric: Metric, listed: int
-) -> Iterator[Callable[[Part], Measured]]:
+) -> Iterator[Callable[[Part], MeasuredBlock]]:
     """Return what measures the cells of a part."""
     with path.open("rb") as file, partial.open("rb") as other:
         source, place = _zone(path, file, zone)
         files = PointFiles(source, source.of(other), place)
 
-        def measure(part: Part) -> Measured:
+        def measure(part: Part) -> MeasuredBlock:
             size = part[1] - part[0]
             block = element_block(source, place, place.cells, place.dim, part[0], size)
             return measured(block, *files.cells_of(block), metric, listed)
@@ -248,6 +248,6 @@ def measuring(
         yield measure
 
 
-def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[Source, ZonePlace]:
-    source = Source(path, file)
+def _zone(path: Path, file: BinaryIO, zone: int | None) -> tuple[BinaryFile, ZonePlace]:
+    source = BinaryFile(path, file)
     return source, find_zone(source, zone)

@@ -12,8 +12,8 @@ import numpy as np
 from slideviz.deformation.both_ways import facing, require_right
 from slideviz.deformation.measuring import PointFiles, Scratch, nodes_of, ways_of
 from slideviz.errors import MeshError
-from slideviz.mesh.io.su2b.elements import Block, element_blocks
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.elements import ElementBlock, element_blocks
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, IntArray, Mesh
 from slideviz.mesh.quality import Quality, quality
 from slideviz.mesh.ranks import ALONE
@@ -194,10 +194,10 @@ def rated_whole(
     )
 
 
-def _opened(stack: ExitStack, zone: Zone) -> tuple[Source, ZonePlace]:
-    source = Source(zone[0], stack.enter_context(zone[0].open("rb")))
+def _opened(stack: ExitStack, zone: Zone) -> tuple[BinaryFile, ZonePlace]:
+    source = BinaryFile(zone[0], stack.enter_context(zone[0].open("rb")))
     return source, find_zone(source, zone[1])
 
 
-def _blocks(source: Source, place: ZonePlace) -> Iterator[Block]:
+def _blocks(source: BinaryFile, place: ZonePlace) -> Iterator[ElementBlock]:
     return element_blocks(source, place, place.cells, place.dim, CELLS)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 from slideviz.case.model import Case
-from slideviz.rbf.problem import Reduction
+from slideviz.rbf.problem import GreedySettings
 
 EXACT_NODES = 2000
 """Control candidates up to which DATA_REDUCTION= AUTO takes them all."""
@@ -18,7 +18,9 @@ LOOSE = 0.1
 """A tolerance above this part of the largest displacement leaves much to the correction."""
 
 
-def find_reduction(case: Case, extent: float, largest: float, candidates: int) -> Reduction | None:
+def find_reduction(
+    case: Case, extent: float, largest: float, candidates: int
+) -> GreedySettings | None:
     """Return the settings of the selection in the solver's terms; None for the exact method.
 
     Parameters
@@ -38,7 +40,7 @@ def find_reduction(case: Case, extent: float, largest: float, candidates: int) -
     level: Literal["none", "size", "ratio"] = "none"
     if given.multilevel:
         level = "size" if given.criterion == "size" else "ratio"
-    return Reduction(
+    return GreedySettings(
         tolerance=given.relative * extent if given.relative else given.tolerance,
         pick=given.selection,
         level=level,
@@ -50,7 +52,7 @@ def find_reduction(case: Case, extent: float, largest: float, candidates: int) -
 
 
 def loose_warnings(
-    case: Case, reduction: Reduction | None, largest: float, extent: float
+    case: Case, reduction: GreedySettings | None, largest: float, extent: float
 ) -> list[str]:
     """Return a warning about a tolerance that is not far below the largest displacement."""
     if reduction is None or not largest > 0.0 or reduction.tolerance <= LOOSE * largest:

@@ -9,7 +9,7 @@ from pathlib import Path
 from slideviz.errors import MeshError
 from slideviz.mesh.io.atomic import reason_of
 from slideviz.mesh.io.binary_copy import Plan
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.partial import names_of
 
 RATED = 18
@@ -52,7 +52,7 @@ def bytes_of_text(plan: Plan, is_text: bool, later: int) -> int:
 def bytes_of_binary(path: Path, zone: int | None, *, is_text: bool, later: int) -> int:
     """Return how many bytes the run of a binary mesh needs on the disk, at most at a time."""
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
     result = text_size(place) if is_text else source.size
     points = place.n_points * source.point(place.dim).itemsize if is_text else 0

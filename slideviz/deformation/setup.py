@@ -31,7 +31,7 @@ from slideviz.rbf.evaluate import Basis
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.images import COINCIDENT
 from slideviz.rbf.methods import SLIDING_METHODS
-from slideviz.rbf.problem import Problem, Reduction, Solution, Watch
+from slideviz.rbf.problem import GreedySettings, Problem, Solution, Watch
 from slideviz.rbf.projection import Tracks, find_tracks
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Setup:
         Nodes that stand for their periodic images, and these: they move alike.
     candidates : int
         Nodes that could be control nodes; periodic images count as one.
-    reduction : Reduction or None
+    reduction : GreedySettings or None
         Settings of the greedy selection; None: all candidates are control nodes.
     axis : (n,) bool
         Nodes on the axis of a cylindrical frame.
@@ -88,7 +88,7 @@ class Setup:
     same_as: IntArray
     images: IntArray
     candidates: int
-    reduction: Reduction | None
+    reduction: GreedySettings | None
     axis: np.ndarray
     held: IntArray
     boundary: Boundary

@@ -43,7 +43,7 @@ Tell = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Streamed:
+class StreamedRun:
     """The outcome of a streamed run.
 
     Attributes
@@ -81,7 +81,7 @@ def stream(
     listed: int = 100,
     later: int = 0,
     ranks: Alone = ALONE,
-) -> Streamed:
+) -> StreamedRun:
     """Deform the mesh of a case from file to file; what is in memory is its boundary.
 
     Parameters
@@ -172,7 +172,7 @@ def stream(
         if is_text:
             course.next()
         out.finish(None if moved is rest.skin.origin.ffd else moved)
-    return Streamed(
+    return StreamedRun(
         rest.skin,
         _of_whole(rest.steps, rest.skin),
         rating.quality(),

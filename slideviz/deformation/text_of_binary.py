@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.deformation.measuring import Scratch
 from slideviz.mesh.io.su2.write import text_of_parts
 from slideviz.mesh.io.su2b.elements import element_blocks, elements_between
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace
 from slideviz.mesh.io.su2b.read import read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker
 from slideviz.mesh.skin import index_of
@@ -21,7 +21,7 @@ NEAR = 256
 
 
 def text_of_binary(
-    source: Source, place: ZonePlace, after: Source, folder: Path
+    source: BinaryFile, place: ZonePlace, after: BinaryFile, folder: Path
 ) -> Iterator[bytes]:
     """Yield the zone of a binary mesh as a text of its own, with the points of ``after``.
 
@@ -56,7 +56,9 @@ def text_of_binary(
         )
 
 
-def _places(stack: ExitStack, source: Source, place: ZonePlace, folder: Path) -> IntArray | None:
+def _places(
+    stack: ExitStack, source: BinaryFile, place: ZonePlace, folder: Path
+) -> IntArray | None:
     """Return where each cell stands among the elements of a file (m,); None where in order."""
     scratch: Scratch | None = None
     for block in element_blocks(source, place, place.cells, place.dim):
@@ -71,7 +73,7 @@ def _places(stack: ExitStack, source: Source, place: ZonePlace, folder: Path) ->
     return None if scratch is None else scratch.array
 
 
-def _gathered(source: Source, place: ZonePlace, where: IntArray) -> Cells:
+def _gathered(source: BinaryFile, place: ZonePlace, where: IntArray) -> Cells:
     """Return the elements at some places (k,), in that order; those near each other in one go."""
     ordered = np.sort(where)
     cuts = np.flatnonzero(np.diff(ordered) > NEAR) + 1

@@ -12,7 +12,7 @@ from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
 from slideviz.deformation.reduction import AUTO_TOLERANCE
 from slideviz.deformation.setup import Setup
 from slideviz.design.doubt import largest_condition
-from slideviz.design.frozen_step import FrozenStep, State
+from slideviz.design.frozen_step import FrozenStep, StepState
 from slideviz.design.loops import farthest
 from slideviz.design.operations import flat
 from slideviz.design.tape import value
@@ -43,7 +43,7 @@ class Checks:
     facets: Mapping[int, IntArray]
     least: float
 
-    def errors(self, targets: FloatArray, states: list[State]) -> FloatArray:
+    def errors(self, targets: FloatArray, states: list[StepState]) -> FloatArray:
         """Return the largest error of each design, (...,).
 
         Raises
@@ -58,7 +58,7 @@ class Checks:
             errors = np.maximum(errors, state.max_error)
         return errors
 
-    def require_sound(self, index: int, part: float, targets: FloatArray, state: State) -> None:
+    def require_sound(self, index: int, part: float, targets: FloatArray, state: StepState) -> None:
         """Raise where the results of a step cannot be right: what every run checks.
 
         Nodes may go as far as by the reference, or by an edge of what moves: the finite difference

@@ -20,7 +20,7 @@ from slideviz.design.doubt import (
     warn_of_doubt,
     warn_of_errors,
 )
-from slideviz.design.frozen_step import FrozenStep, State
+from slideviz.design.frozen_step import FrozenStep, StepState
 from slideviz.design.given import given_input
 from slideviz.design.loops import to_points
 from slideviz.design.tape import Array, Tape, Variable, value
@@ -251,9 +251,9 @@ class Deformer:
             raise CaseError(f"{name} has numbers that are not finite")
         return out
 
-    def _run(self, target: Array) -> list[State]:
+    def _run(self, target: Array) -> list[StepState]:
         """Return the states after all steps."""
-        states = [State(self._setup.coords)]
+        states = [StepState(self._setup.coords)]
         for step in self._steps:
             states.append(step.run(states[-1], target))
         return states[1:]
@@ -282,7 +282,7 @@ class Deformer:
         """Deform designs in one step into ``room`` (k, n, d); return their errors and doubts."""
         setup, (step,) = self._setup, self._steps
         targets = value(self._input.target(displacement))
-        state = step.moved(State(setup.coords), targets, room)
+        state = step.moved(StepState(setup.coords), targets, room)
         errors = np.maximum(self._checks.off_track(room), state.max_error)
         self._checks.require_sound(1, 1.0, targets, state)
         one, two = setup.images.T
@@ -293,7 +293,7 @@ class Deformer:
             self._checks.require_alike(points)
         return np.stack([errors, np.broadcast_to(state.doubt, errors.shape)])
 
-    def _taped(self, displacement: FloatArray) -> tuple[list[State], Variable, Variable]:
+    def _taped(self, displacement: FloatArray) -> tuple[list[StepState], Variable, Variable]:
         """Return the states of a design, and input and points as variables of one tape."""
         given = self._shaped(displacement, self.displacement.shape, "displacement")
         if given.ndim == 3:

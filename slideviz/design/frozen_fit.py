@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from slideviz.design.frozen_solve import LeastSquares, Measured, columnwise, solved, whole
+from slideviz.design.frozen_solve import LeastSquares, MeasuredSystem, columnwise, solved, whole
 from slideviz.design.operations import columns, radial_sum, terms
 from slideviz.design.tape import (
     Array,
@@ -52,7 +52,7 @@ class Sum:
 
 
 @dataclass(eq=False)
-class Rows:
+class TapedRows:
     """Constraint rows whose data are on a tape: as ``ConstraintRows``, ``right`` (..., r, m)."""
 
     nodes: IntArray
@@ -99,15 +99,15 @@ class FrozenFit:
         tailed = KERNELS[basis.kernel].polynomial
         self._refined, self._checked = refined and usable(basis), checked and not tailed
         self.doubt: FloatArray = np.zeros(())
-        self._rows: Rows | None = None
+        self._rows: TapedRows | None = None
         self._factors: dict[int, tuple[IntArray, Factor]] = {}
         self.found: Sum | None = None
 
-    def add(self, rows: Rows, levels: Levels, stage: str) -> None:
+    def add(self, rows: TapedRows, levels: Levels, stage: str) -> None:
         """Meet further rows too, of which those of each level are in its system."""
         if self._rows is not None:
             nodes = np.concatenate([self._rows.nodes, rows.nodes])
-            rows = Rows(nodes, None, join(self._rows.right, rows.right))
+            rows = TapedRows(nodes, None, join(self._rows.right, rows.right))
         self._rows = rows
         names = row_names(ConstraintRows(rows.nodes, None, np.empty((0, 0))))
         sums: list[Sum] = []
@@ -118,7 +118,7 @@ class FrozenFit:
             if sums:
                 settled = self.at(rows.nodes[index], self._plus(sums))
                 right = right - (settled if normals is None else dot(settled, normals))
-            part = Rows(rows.nodes[index], normals, right)
+            part = TapedRows(rows.nodes[index], normals, right)
             sums.append(self._solved(part, index, level, stage))
         self.found = self._plus(sums) if sums else None
 
@@ -152,14 +152,14 @@ class FrozenFit:
             tail = each if tail is None else tail + each
         return Sum(nodes, weights, tail)
 
-    def _solved(self, rows: Rows, index: IntArray, level: int, stage: str) -> Sum:
+    def _solved(self, rows: TapedRows, index: IntArray, level: int, stage: str) -> Sum:
         """Return the interpolant of some rows."""
         count, m = len(rows.nodes), value(rows.right).shape[-1]
         solve, extra = self._solver(rows, index, level, stage)
         right = np.zeros((*value(rows.right).shape[:-2], count + extra, m))
         right[..., :count, :] = value(rows.right)
         found: Array = solve(right)
-        if isinstance(solve, Measured):
+        if isinstance(solve, MeasuredSystem):
             self.doubt = np.maximum(self.doubt, solve.doubt)
         if any(isinstance(x, Variable) for x in (rows.right, rows.normals, self._features)):
             data = join(rows.right, np.zeros((extra, m))) if extra else rows.right
@@ -178,7 +178,7 @@ class FrozenFit:
         nodes, place = _firsts(rows.nodes)
         return Sum(nodes, gather(multiply(rows.normals, own), place, len(nodes)), tail)
 
-    def _met(self, rows: Rows, found: FloatArray, *, extra: int) -> Array:
+    def _met(self, rows: TapedRows, found: FloatArray, *, extra: int) -> Array:
         """Return the product of the system with ``found``, which is constant, where it changes."""
         count, m = len(rows.nodes), found.shape[-1]
         if not (isinstance(self._features, Variable) or isinstance(rows.normals, Variable)):
@@ -200,7 +200,7 @@ class FrozenFit:
         return join(s, *below)
 
     def _solver(
-        self, rows: Rows, index: IntArray, level: int, stage: str
+        self, rows: TapedRows, index: IntArray, level: int, stage: str
     ) -> tuple[Callable[[FloatArray], FloatArray], int]:
         """Return what solves the system of some rows, and how many unknowns a polynomial adds."""
         place = value(self._features)[:, rows.nodes]
@@ -240,7 +240,7 @@ class FrozenFit:
             places = [(features[:, b], None if normals is None else normals[b]) for b in blocks]
             return [System(self._basis, *both) for both in zip(places, factors, strict=True)]
 
-        return Measured(blocks, self._fixed(name, make), refined=self._refined)
+        return MeasuredSystem(blocks, self._fixed(name, make), refined=self._refined)
 
     def _factor(self, place: FloatArray, normals: FloatArray) -> Factor:
         system = matrix(self._basis, (place, normals))

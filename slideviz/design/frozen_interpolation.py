@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from slideviz.design.frozen_fit import FrozenFit, Rows
+from slideviz.design.frozen_fit import FrozenFit, TapedRows
 from slideviz.design.frozen_method import Method, Solved
-from slideviz.design.frozen_spread import Spread, chosen_spread, shares
+from slideviz.design.frozen_spread import FrozenSpread, chosen_spread, shares
 from slideviz.design.loops import take_over
 from slideviz.design.tape import (
     Array,
@@ -111,9 +111,9 @@ class Interpolation(Method):
         """Give a fit the rows of nodes with known displacement."""
         merged, data = self._merged(nodes, self._plus_behind(values, nodes))
         stage = f"stage {len(self._stages)}"
-        fit.add(Rows(merged, None, data), self._stages.pop(0), stage)
+        fit.add(TapedRows(merged, None, data), self._stages.pop(0), stage)
 
-    def _sliding_rows(self) -> Rows:
+    def _sliding_rows(self) -> TapedRows:
         """Return the rows of direct sliding (`slideviz.rbf.constraint_rows.sliding_rows`)."""
         known, same = self._known, self._setup.same_as
         d = self._setup.coords.shape[1]
@@ -136,7 +136,7 @@ class Interpolation(Method):
             rows = starts[mixed & (count == size), None] + np.arange(size)
             normals, right = self._orthonormal(nodes, normals, right, rows, keep)
         kept = np.flatnonzero(keep)
-        return Rows(stands[kept], take(normals, kept), take(right, kept))
+        return TapedRows(stands[kept], take(normals, kept), take(right, kept))
 
     def _orthonormal(
         self, nodes: IntArray, normals: Array, right: Array, rows: IntArray, keep: np.ndarray
@@ -178,7 +178,7 @@ class Interpolation(Method):
             gap = np.linalg.norm(value(errors), axis=-1)
             lost = np.where(inside, gap, 0.0).max(axis=-1, initial=0.0)
 
-        def choose() -> Spread | None:
+        def choose() -> FrozenSpread | None:
             most = float(np.linalg.norm(value(values), axis=-1).max(initial=0.0))
             needed = float(np.max(lost)) > LOST * most or len(self._step.dropped) > 0
             return chosen_spread(setup, value(self._coords), nodes, value(errors), needed=needed)
@@ -190,7 +190,7 @@ class Interpolation(Method):
         most = size.max(axis=-1, initial=0.0)
         return Solved(displacement, lag, nodes, most, lost, doubt=fit.doubt)
 
-    def _spread(self, displacement: Array, spread: Spread, errors: Array) -> Array:
+    def _spread(self, displacement: Array, spread: FrozenSpread, errors: Array) -> Array:
         """Add what targets take over."""
         setup = self._setup
         means = spread.mixing(value(errors).shape[-2])

@@ -29,7 +29,7 @@ from slideviz.rbf.constraint_rows import AGREE, refuse
 from slideviz.rbf.primitives import primitives
 
 if TYPE_CHECKING:
-    from slideviz.design.frozen_step import FrozenStep, State
+    from slideviz.design.frozen_step import FrozenStep, StepState
 
 ROUNDING = 1e-14
 """Part of the largest coordinate below which a distance is rounding."""
@@ -61,7 +61,7 @@ class Method(ABC):
     """The method on one step, run once."""
 
     def __init__(
-        self, step: FrozenStep, before: State, goal: Array, room: FloatArray | None
+        self, step: FrozenStep, before: StepState, goal: Array, room: FloatArray | None
     ) -> None:
         self._step, self._setup, self._before = step, step.setup, before
         self._room = room

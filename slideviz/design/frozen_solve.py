@@ -15,7 +15,7 @@ from slideviz.rbf.refine import System
 from slideviz.rbf.solve import Factor, enough_threads
 
 
-class Measured:
+class MeasuredSystem:
     """Solves a system in blocks, and measures how wrong the fields of its solutions are.
 
     Attributes

@@ -23,7 +23,7 @@ from slideviz.rbf.methods import GAMMA, NEGLIGIBLE
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class FrozenSpread:
     """Who takes over what boundary nodes lack.
 
     Attributes
@@ -57,7 +57,7 @@ def chosen_spread(
     errors: FloatArray,
     *,
     needed: bool,
-) -> Spread | None:
+) -> FrozenSpread | None:
     """Return who takes over what boundary nodes lack (`slideviz.rbf.methods.correction_of`).
 
     Parameters
@@ -83,7 +83,7 @@ def chosen_spread(
     lacking = np.zeros((tree.n, 1))
     found = Correction(tree, lacking, radius).sources(setup.frame.points(coords[targets]))
     hit, nearest, row, source, weight = found
-    return Spread(
+    return FrozenSpread(
         targets=targets[hit],
         row=row,
         source=once[source % len(once)],
@@ -94,7 +94,7 @@ def chosen_spread(
     )
 
 
-def shares(setup: Setup, coords: Array, spread: Spread) -> Array:
+def shares(setup: Setup, coords: Array, spread: FrozenSpread) -> Array:
     """Return the share that each target takes over, by its distance from the nearest node."""
     frame = setup.frame
     own = points(frame, take(coords, spread.targets))

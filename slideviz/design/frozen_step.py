@@ -39,7 +39,7 @@ from slideviz.terms import Sliding
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class StepState:
     """Where a deformation is after some steps.
 
     Attributes
@@ -124,7 +124,7 @@ class FrozenStep:
     choices: Kept = made_by(default_factory=Kept)
     constants: Kept = made_by(default_factory=Kept)
 
-    def run(self, before: State, target: Array) -> State:
+    def run(self, before: StepState, target: Array) -> StepState:
         """Return where nodes are after this step.
 
         Parameters
@@ -136,7 +136,7 @@ class FrozenStep:
         coords, at = self._with_points(state.coords)
         return replace(state, coords=coords, points=at)
 
-    def moved(self, before: State, target: Array, room: FloatArray | None = None) -> State:
+    def moved(self, before: StepState, target: Array, room: FloatArray | None = None) -> StepState:
         """Return where nodes are after this step, without points, and without copies in a halo.
 
         Parameters
@@ -159,7 +159,7 @@ class FrozenStep:
             displacement = put(displacement, on, still, own=True)
         moved = _shifted(before.coords, displacement, own=True)
         moved = put(moved, setup.known, goal, own=True)
-        return State(
+        return StepState(
             moved, solved.lag, solved.of, solved.max_error, solved.lost, doubt=solved.doubt
         )
 

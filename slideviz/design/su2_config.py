@@ -14,7 +14,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, shown
-from slideviz.design.su2_variables import KINDS, Variable, read_variables
+from slideviz.design.su2_variables import KINDS, DesignVariable, read_variables
 from slideviz.errors import CaseError
 from slideviz.terms import ROLES, Role
 
@@ -78,7 +78,7 @@ class Su2Config:
         Roles and settings, without motions; the files of the meshes, as SU2 has them.
     markers : tuple of str
         The boundaries that the design variables move.
-    variables : tuple of Variable
+    variables : tuple of DesignVariable
     files, words : dict
         The values of ``FILES`` and ``WORDS``.
     ignored : tuple of str
@@ -89,7 +89,7 @@ class Su2Config:
 
     case: Case
     markers: tuple[str, ...]
-    variables: tuple[Variable, ...]
+    variables: tuple[DesignVariable, ...]
     files: dict[str, Path]
     words: dict[str, str]
     ignored: tuple[str, ...]

@@ -13,7 +13,7 @@ from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
 from slideviz.design.su2_sensitivities import CLOSE, match, read_sensitivities
-from slideviz.design.su2_surface import Surface
+from slideviz.design.su2_surface import MovingSurface
 from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, largest_coordinate
 
@@ -56,7 +56,7 @@ class Gradients:
 
 
 def find_gradients(
-    surface: Surface, progress: Callable[[Progress], None] | None = None
+    surface: MovingSurface, progress: Callable[[Progress], None] | None = None
 ) -> Gradients:
     """Return the gradients of the objective whose sensitivities the configuration names.
 
@@ -135,7 +135,7 @@ def _difference(found: FloatArray, written: FloatArray) -> list[str]:
 
 
 def _deformer(
-    surface: Surface, displacement: FloatArray, progress: Callable[[Progress], None] | None
+    surface: MovingSurface, displacement: FloatArray, progress: Callable[[Progress], None] | None
 ) -> Deformer:
     """Return the deformation, prepared at a design."""
     reference = displacement[None]
@@ -146,7 +146,7 @@ def _deformer(
     return deformer
 
 
-def _directions(surface: Surface) -> FloatArray:
+def _directions(surface: MovingSurface) -> FloatArray:
     """Return displacements (k, m, d) as large as ``REACH`` that together move as variables do."""
     sums: list[FloatArray] = []
     for place in range(len(surface.config.variables)):

@@ -13,7 +13,7 @@ import numpy as np
 
 from slideviz.case.words import list_of
 from slideviz.design.su2_config import CONTINUITIES, SU2_CONTINUITY, Su2Config
-from slideviz.design.su2_variables import BOXED, Variable
+from slideviz.design.su2_variables import BOXED, DesignVariable
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 
@@ -128,7 +128,7 @@ def idle_variables(
     return (idle if asked else (False,) * len(idle)), warnings
 
 
-def _checked(variable: Variable) -> tuple[int, int, int]:
+def _checked(variable: DesignVariable) -> tuple[int, int, int]:
     """Return the index that SU2 looks for among the held planes."""
     i, j, k = variable.index
     return (i, j, 0) if variable.kind == "FFD_CONTROL_POINT_2D" else (i, j, k)

@@ -21,7 +21,7 @@ from slideviz.design.su2_config import Su2Config
 from slideviz.design.su2_markers import require_markers
 from slideviz.design.su2_planes import idle_variables
 from slideviz.design.su2_positions import read_positions
-from slideviz.design.su2_variables import BOXED, Variable
+from slideviz.design.su2_variables import BOXED, DesignVariable
 from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.section import boxes_of, with_boxes
@@ -31,7 +31,7 @@ RIGID = ("TRANSLATION", "ROTATION", "SCALE")
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class MovingSurface:
     """The moving boundaries of a configuration, and its design.
 
     Attributes
@@ -103,7 +103,7 @@ class Surface:
         # The others are linear; what SURFACE_FILE does has no value to change.
         return self._moved(place, replace(variable, value=1.0), points)
 
-    def _moved(self, place: int, variable: Variable, points: FloatArray) -> FloatArray:
+    def _moved(self, place: int, variable: DesignVariable, points: FloatArray) -> FloatArray:
         """Return what a variable does to points (m, d)."""
         value, dim = self.scale * variable.value, self.mesh.dim
         if variable.kind == "TRANSLATION":
@@ -144,7 +144,7 @@ class Surface:
         return with_boxes(mesh, moved) if moved else mesh
 
 
-def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
+def make_surface(config: Su2Config, mesh: Mesh) -> MovingSurface:
     """Return what the variables of a configuration move.
 
     Raises
@@ -171,7 +171,7 @@ def make_surface(config: Su2Config, mesh: Mesh) -> Surface:
         warnings += [text for name in config.markers for text in off_points(box, mesh, name)]
     idle, held = idle_variables(config, mesh, boxes)
     warnings += [*held, *_overlaps(inside), *_left_behind(config, mesh)]
-    return Surface(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
+    return MovingSurface(config, mesh, nodes, boxes, inside, idle, tuple(warnings))
 
 
 def at_rest(case: Case, mesh: Mesh) -> Step:

@@ -27,7 +27,7 @@ ALONE = ("SURFACE_FILE", "FFD_SETTING")
 
 
 @dataclass(frozen=True)
-class Variable:
+class DesignVariable:
     """A design variable.
 
     Attributes
@@ -48,7 +48,9 @@ class Variable:
     index: tuple[int, int, int] = (0, 0, 0)
 
 
-def read_variables(rows: Mapping[str, Entry], problems: list[Problem]) -> tuple[Variable, ...]:
+def read_variables(
+    rows: Mapping[str, Entry], problems: list[Problem]
+) -> tuple[DesignVariable, ...]:
     """Return the design variables of ``DV_KIND``, ``DV_PARAM`` and ``DV_VALUE``.
 
     What is wrong is added to the problems.
@@ -122,15 +124,15 @@ def _groups(
     return groups
 
 
-def _variable(kind: str, value: float, group: list[Word]) -> Variable:
+def _variable(kind: str, value: float, group: list[Word]) -> DesignVariable:
     needed = f"{kind} needs {KINDS[kind]}"
     if kind in NUMBERS:
         numbers = tuple(number(word.text) for word in group)
         if len(numbers) != NUMBERS[kind]:
             raise CaseError(f"{len(numbers)} numbers are given; {needed}")
-        return Variable(kind, value, numbers)
+        return DesignVariable(kind, value, numbers)
     if kind not in BOXED:
-        return Variable(kind, value)
+        return DesignVariable(kind, value)
     if len(group) != BOXED[kind]:
         raise CaseError(f"{len(group)} parameters are given; {needed}")
     count = 3 if kind == "FFD_CONTROL_POINT" else 2
@@ -139,4 +141,4 @@ def _variable(kind: str, value: float, group: list[Word]) -> Variable:
         raise CaseError(f"an index is no whole number from -1; {needed}")
     i, j, k = (*(int(place) for place in at), -1)[:3]
     shift = tuple(number(word.text) for word in group[1 + count :])
-    return Variable(kind, value, (*shift, 0.0)[:3], group[0].text, (i, j, k))
+    return DesignVariable(kind, value, (*shift, 0.0)[:3], group[0].text, (i, j, k))

@@ -12,8 +12,8 @@ from pathlib import Path
 from slideviz.case.model import Case, Ffd, FromFile
 from slideviz.design.sweep_designs import Design, Table, read_designs
 from slideviz.design.sweep_processes import Processes, usable_cores
-from slideviz.design.sweep_results import Results, sources_of
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_results import SweepResults, sources_of
+from slideviz.design.sweep_row import DesignRow
 from slideviz.design.sweep_worker import Answer, Packed, Task, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.io.files import read, usual_ending
@@ -38,7 +38,7 @@ def sweep(
     resume: bool = False,
     force: bool = False,
     going_on: Callable[[], object] = lambda: None,
-) -> Iterator[Row]:
+) -> Iterator[DesignRow]:
     """Return an iterator over the results of designs, each as it comes.
 
     Each design is deformed as ``slideviz run`` would with its values: to the bit where that has one
@@ -74,7 +74,7 @@ def sweep(
 
     Yields
     ------
-    Row
+    DesignRow
         A design that fails is a row with the reason. A worker that is lost (killed, out of memory)
         loses one design, which is done again.
 
@@ -116,9 +116,9 @@ def sweep(
         mesh = read(case.mesh_file, zone=case.zone, file_format=case.mesh_format)
     if folder is None and (meshes or resume):
         raise CaseError("meshes and resume need a folder; give folder=")
-    results, earlier = None, list[Row]()
+    results, earlier = None, list[DesignRow]()
     if folder is not None:
-        results = Results(Path(folder), asked, sources_of(case, mesh))
+        results = SweepResults(Path(folder), asked, sources_of(case, mesh))
         earlier = results.start(resume=resume, force=force, meshes=meshes)
     done = {row.design for row in earlier}
     waiting = deque(row for row in asked.rows if row.number not in done)
@@ -129,7 +129,9 @@ def sweep(
     return _rows(_Loop(executor, tasks, waiting, going_on), earlier, results)
 
 
-def _rows(loop: _Loop, earlier: list[Row], results: Results | None) -> Iterator[Row]:
+def _rows(
+    loop: _Loop, earlier: list[DesignRow], results: SweepResults | None
+) -> Iterator[DesignRow]:
     """Yield the rows of a stopped sweep and then the others as they come; keep them in a table."""
     rows = list(earlier)
     with closing(loop.rows()) as coming, nullcontext() if results is None else closing(results):
@@ -209,7 +211,7 @@ class _Loop:
         self.lacking: set[str] = set()
         self._refused = False
 
-    def rows(self) -> Generator[Row, None, None]:
+    def rows(self) -> Generator[DesignRow, None, None]:
         """Yield the rows as they come; when it is closed, what is in work is given up."""
         try:
             while self._waiting or self._flying:
@@ -248,7 +250,7 @@ class _Loop:
                 ) from problem
             self._flying[future] = design, with_mesh
 
-    def _row(self, future: Future[Answer], design: Design) -> Row | None:
+    def _row(self, future: Future[Answer], design: Design) -> DesignRow | None:
         """Return the row of a design; None where it is to be done again."""
         try:
             answer = future.result()
@@ -265,7 +267,7 @@ class _Loop:
         self.holding.add(answer.worker)
         return replace(answer.row, values=design.values, lost=lost)
 
-    def _lost(self, design: Design, problem: Exception) -> Row | None:
+    def _lost(self, design: Design, problem: Exception) -> DesignRow | None:
         """Let a design be done again whose worker was lost; a row when that was so too often."""
         if isinstance(self._executor, Processes) and self._executor.cannot_start:
             raise DeformError(
@@ -279,7 +281,7 @@ class _Loop:
             self._waiting.appendleft(design)
             return None
         reason = " ".join(f"{type(problem).__name__}: {problem}".split())
-        return Row(
+        return DesignRow(
             design.number,
             design.values,
             lost=lost,

@@ -44,7 +44,7 @@ _LISTED = 24
 
 
 @dataclass(frozen=True)
-class Place:
+class NumberPlace:
     """The place of a number: which motion (from 0), its field, and which of several numbers."""
 
     motion: int
@@ -67,9 +67,9 @@ class Place:
         motions[self.motion] = replace(motion, **{self.field: new})
 
 
-def numbers_of(case: Case) -> dict[str, Place]:
+def numbers_of(case: Case) -> dict[str, NumberPlace]:
     """Return the numbers of a case's motions by name, the shortest that tells each apart."""
-    found: dict[str, Place] = {}
+    found: dict[str, NumberPlace] = {}
     heads = [_head(motion) for motion in case.motions]
     for at, (motion, head) in enumerate(zip(case.motions, heads, strict=True)):
         name = head if heads.count(head) == 1 else f"motion{at + 1}"
@@ -77,7 +77,7 @@ def numbers_of(case: Case) -> dict[str, Place]:
     return found
 
 
-def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
+def columns_of(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
     """Return for the name of each column the place of its number, or its key.
 
     Raises
@@ -85,8 +85,8 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
     CaseError
         Some are unknown, mean the same, or cannot vary: a sentence for each.
     """
-    found: dict[str, Place | str] = {}
-    first: dict[Place | str, str] = {}
+    found: dict[str, NumberPlace | str] = {}
+    first: dict[NumberPlace | str, str] = {}
     problems = []
     known = _all_names(case)
     for name in names:
@@ -97,7 +97,7 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
             found[name] = meant
         except CaseError as problem:
             problems.append(f"column {shown(name)}: {problem}")
-    places = [name for name, what in found.items() if isinstance(what, Place)]
+    places = [name for name, what in found.items() if isinstance(what, NumberPlace)]
     whole = [name for name, what in found.items() if what in _WHOLE_MOTION]
     if places and whole:
         problems.append(
@@ -109,7 +109,9 @@ def columns_of(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
     return found
 
 
-def applied(case: Case, columns: Mapping[str, Place | str], values: Mapping[str, Value]) -> Case:
+def applied(
+    case: Case, columns: Mapping[str, NumberPlace | str], values: Mapping[str, Value]
+) -> Case:
     """Return the case of one design; an empty value is that of the case.
 
     Raises
@@ -147,11 +149,11 @@ def column_name(name: str) -> str:
     return plain.upper() if plain.upper() in KEYS else plain
 
 
-def own_values(case: Case, columns: Mapping[str, Place | str]) -> dict[str, Value]:
+def own_values(case: Case, columns: Mapping[str, NumberPlace | str]) -> dict[str, Value]:
     """Return what the case itself has in each column: a number, or a text."""
     found: dict[str, Value] = {}
     for name, what in columns.items():
-        if isinstance(what, Place):
+        if isinstance(what, NumberPlace):
             found[name] = what.of(case)
         else:
             value = KEYS[what].get(case)
@@ -159,7 +161,7 @@ def own_values(case: Case, columns: Mapping[str, Place | str]) -> dict[str, Valu
     return found
 
 
-def _meant(case: Case, name: str, known: Mapping[str, Place]) -> Place | str:
+def _meant(case: Case, name: str, known: Mapping[str, NumberPlace]) -> NumberPlace | str:
     """Return the place of a number, or the key, that a name means.
 
     ``known`` has the numbers by all their names: the shortest, and by the place of the motion.
@@ -192,7 +194,7 @@ def _meant(case: Case, name: str, known: Mapping[str, Place]) -> Place | str:
     )
 
 
-def _all_names(case: Case) -> dict[str, Place]:
+def _all_names(case: Case) -> dict[str, NumberPlace]:
     """Return the numbers of the motions by all their names."""
     return numbers_of(case) | {
         f"motion{at + 1}.{part}": place
@@ -215,7 +217,7 @@ def _head(motion: Motion) -> str:
     return head
 
 
-def _parts(motion: Motion, at: int) -> Iterator[tuple[str, Place]]:
+def _parts(motion: Motion, at: int) -> Iterator[tuple[str, NumberPlace]]:
     """Yield the names and places of the numbers of a motion."""
     if isinstance(motion, FromFile | Prescribed):
         return
@@ -224,14 +226,14 @@ def _parts(motion: Motion, at: int) -> Iterator[tuple[str, Place]]:
             continue
         value = getattr(motion, field.name)
         if _is_number(value):
-            yield field.name, Place(at, field.name)
+            yield field.name, NumberPlace(at, field.name)
         elif isinstance(value, tuple) and value and all(map(_is_number, value)):
             if field.name == "factors" and len(value) == 1:
-                yield "factor", Place(at, field.name, 0)
+                yield "factor", NumberPlace(at, field.name, 0)
                 continue
             head = _SHORT.get(field.name, f"{field.name}_")
             for component, axis in zip(range(len(value)), _AXES, strict=False):
-                yield f"{head}{axis}", Place(at, field.name, component)
+                yield f"{head}{axis}", NumberPlace(at, field.name, component)
 
 
 def _is_number(value: object) -> bool:

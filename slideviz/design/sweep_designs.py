@@ -12,7 +12,7 @@ from typing import Any
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
-from slideviz.design.sweep_columns import Place, Value, applied, column_name, columns_of
+from slideviz.design.sweep_columns import NumberPlace, Value, applied, column_name, columns_of
 from slideviz.errors import CaseError
 
 _SEPARATORS = (",", ";", "\t")
@@ -31,7 +31,7 @@ class Design:
 class Designs:
     """The designs of a table, and what its columns mean."""
 
-    columns: Mapping[str, Place | str]
+    columns: Mapping[str, NumberPlace | str]
     rows: tuple[Design, ...]
 
 
@@ -129,9 +129,9 @@ def _read_csv(case: Case, path: Path) -> Designs:
     return Designs(columns, tuple(designs))
 
 
-def _known(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
+def _known(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
     """Return the columns that mean something, so that the mistakes in their rows are told, too."""
-    found: dict[str, Place | str] = {}
+    found: dict[str, NumberPlace | str] = {}
     for name in names:
         with suppress(CaseError):
             found |= columns_of(case, [name])
@@ -139,12 +139,12 @@ def _known(case: Case, names: Iterable[str]) -> dict[str, Place | str]:
 
 
 def _design(
-    case: Case, columns: Mapping[str, Place | str], number: int, values: Mapping[str, Value]
+    case: Case, columns: Mapping[str, NumberPlace | str], number: int, values: Mapping[str, Value]
 ) -> Design:
     """Return a design, with the numbers of motions as numbers."""
     made = applied(case, columns, values)
     plain = {
-        name: float(value) if isinstance(columns[name], Place) and value != "" else value
+        name: float(value) if isinstance(columns[name], NumberPlace) and value != "" else value
         for name, value in values.items()
     }
     return Design(number, plain, made)

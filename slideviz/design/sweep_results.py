@@ -25,7 +25,7 @@ from slideviz.case.model import Case, Ffd, FromFile, Prescribed
 from slideviz.design.sweep_columns import Value
 from slideviz.design.sweep_designs import Designs
 from slideviz.design.sweep_lock import FolderLock
-from slideviz.design.sweep_row import NUMBERS, Row
+from slideviz.design.sweep_row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.io.atomic import atomic_write, reason_of
@@ -35,7 +35,7 @@ RESULTS, SOURCES = "results.csv", "sweep.json"
 _WORDS = ("mesh", "warnings", "problem")
 
 
-class Results:
+class SweepResults:
     """The results of a sweep in a folder, which no other sweep writes to until `close`.
 
     Parameters
@@ -56,7 +56,7 @@ class Results:
         """Return the table."""
         return self._folder / RESULTS
 
-    def start(self, *, resume: bool, force: bool, meshes: bool) -> list[Row]:
+    def start(self, *, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
         """Begin the table, or return the rows of a stopped sweep that need not be done again.
 
         Designs that failed are done again, and those whose mesh is wanted and missing.
@@ -85,7 +85,7 @@ class Results:
         if self._lock is not None:
             self._lock.release()
 
-    def _started(self, resume: bool, force: bool, meshes: bool) -> list[Row]:
+    def _started(self, resume: bool, force: bool, meshes: bool) -> list[DesignRow]:
         if resume and self.path.exists():
             found = {row.design: row for row in self._go_on()}
             return [row for row in found.values() if not row.problem and _has(row, meshes)]
@@ -105,7 +105,7 @@ class Results:
         with atomic_write(self.path, CaseError) as file:
             file.write(_line(self._head))
 
-    def _go_on(self) -> list[Row]:
+    def _go_on(self) -> list[DesignRow]:
         """Return the rows that are there, after a check that they are of the same sweep.
 
         A line that was cut off when the sweep was stopped is taken away.
@@ -127,7 +127,7 @@ class Results:
             )
         return [self._row(at, line) for at, line in enumerate(lines, start=2)]
 
-    def add(self, row: Row) -> None:
+    def add(self, row: DesignRow) -> None:
         """Add a row at the end of the table, in one piece.
 
         Raises
@@ -141,7 +141,7 @@ class Results:
         except OSError as problem:
             raise CaseError(f"{self.path}: cannot be written: {reason_of(problem)}") from problem
 
-    def sort(self, rows: Iterable[Row]) -> None:
+    def sort(self, rows: Iterable[DesignRow]) -> None:
         """Write the table anew, in the order of the designs, each once."""
         last = {row.design: row for row in rows}
         with atomic_write(self.path, CaseError) as file:
@@ -149,7 +149,7 @@ class Results:
             for number in sorted(last):
                 file.write(_line(self._cells(last[number])))
 
-    def _cells(self, row: Row) -> list[Any]:
+    def _cells(self, row: DesignRow) -> list[Any]:
         done = not row.problem
         return [
             row.design,
@@ -160,7 +160,7 @@ class Results:
             " ".join(row.problem.split()),
         ]
 
-    def _row(self, line: int, cells: Sequence[str]) -> Row:
+    def _row(self, line: int, cells: Sequence[str]) -> DesignRow:
         """Return the row of a line, after a check that it is of the design of that number."""
         try:
             if len(cells) != len(self._head):
@@ -189,7 +189,7 @@ class Results:
                     f"{value or '(that of the case)'}, and the table of designs has "
                     f"{now or '(that of the case)'} now; {_REMEDY}"
                 )
-        return Row(
+        return DesignRow(
             number,
             rows[number - 1].values,
             **numbers,  # type: ignore[arg-type]
@@ -253,7 +253,7 @@ def sources_of(case: Case, mesh: Mesh) -> dict[str, str]:
     return found
 
 
-def _has(row: Row, meshes: bool) -> bool:
+def _has(row: DesignRow, meshes: bool) -> bool:
     return not meshes or (row.mesh is not None and row.mesh.is_file())
 
 

@@ -11,7 +11,7 @@ from slideviz.design.sweep_columns import Value
 
 
 @dataclass(frozen=True)
-class Row:
+class DesignRow:
     """The result of a design, or the reason why there is none.
 
     Attributes

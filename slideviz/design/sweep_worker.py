@@ -23,7 +23,7 @@ from slideviz import __version__
 from slideviz.case.model import Case
 from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Step
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.io.files import write
 from slideviz.mesh.model import Mesh
@@ -63,7 +63,7 @@ class Answer:
     """What came of a task, and who did it; no row where the mesh is not held there."""
 
     worker: str
-    row: Row | None = None
+    row: DesignRow | None = None
 
 
 def packed(mesh: Mesh) -> Packed:
@@ -85,7 +85,9 @@ def work(task: Task) -> Answer:
     """Return the result of a design: whatever goes wrong with it is a row with the reason."""
     if task.version != __version__:
         reason = f"the worker {_myself()} has slideviz {__version__}, this is {task.version}"
-        return Answer(_myself(), Row(task.design, problem=f"{reason}; install the same version"))
+        return Answer(
+            _myself(), DesignRow(task.design, problem=f"{reason}; install the same version")
+        )
     with _one_at_a_time:
         if task.packed is not None:
             hold(task.packed)
@@ -97,15 +99,17 @@ def work(task: Task) -> Answer:
             with _one_thread():
                 row = _result(task, mesh, begin)
         except SlidevizError as problem:
-            row = Row(task.design, problem="; ".join(str(problem).splitlines()))
+            row = DesignRow(task.design, problem="; ".join(str(problem).splitlines()))
         except MemoryError:
-            row = Row(task.design, problem="out of memory; a coarser mesh or fewer workers")
+            row = DesignRow(task.design, problem="out of memory; a coarser mesh or fewer workers")
         except Exception as problem:
-            row = Row(task.design, problem=f"internal error ({type(problem).__name__}: {problem})")
+            row = DesignRow(
+                task.design, problem=f"internal error ({type(problem).__name__}: {problem})"
+            )
         return Answer(_myself(), row)
 
 
-def _result(task: Task, mesh: Mesh, begin: float) -> Row:
+def _result(task: Task, mesh: Mesh, begin: float) -> DesignRow:
     """Deform the mesh as ``slideviz run`` does, and return the row."""
     last, errors = None, []
     for step in deform(task.case, mesh):
@@ -115,7 +119,7 @@ def _result(task: Task, mesh: Mesh, begin: float) -> Row:
     found = quality(last.mesh, reference=mesh, metric=task.case.quality_metric)
     if task.output is not None:
         write(task.output, last.mesh, base=mesh, file_format=task.file_format)
-    return Row(
+    return DesignRow(
         design=task.design,
         min=found.min,
         mean=found.mean,

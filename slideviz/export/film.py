@@ -17,7 +17,7 @@ from slideviz.export.encode import Pixels
 from slideviz.export.offscreen import LETTERS
 from slideviz.export.offscreen_renderer import OffscreenRenderer
 from slideviz.export.picture_options import PictureOptions, letters_across, panes
-from slideviz.export.reel import USUAL, Drawn, Reel, check_film, exposing, images_drawn
+from slideviz.export.reel import USUAL, FilmProgress, Reel, check_film, exposing, images_drawn
 from slideviz.export.titles import (
     DETAIL,
     LETTER_WIDTH,
@@ -30,7 +30,7 @@ from slideviz.export.titles import (
 from slideviz.mesh.quality import Quality, quality
 from slideviz.scene.moved import Zoom
 from slideviz.session.pieces import Beside, GoingOn, never
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 _NARROWEST = 160
 """Pixels that each of two pictures beside each other has at least for the mesh."""
@@ -43,7 +43,7 @@ class Shot:
     ``place`` is what stands beside the name of the run: of one step, nothing.
     """
 
-    frame: Frame
+    frame: StepFrame
     words: str
     place: str
 
@@ -59,7 +59,7 @@ def film(
     *,
     zoom: Zoom = "auto",
     overwrite: bool = False,
-) -> Generator[Drawn, None, None]:
+) -> Generator[FilmProgress, None, None]:
     """Yield after each image of a film of one run, or of two beside each other.
 
     Of two runs beside each other the film has the steps of the run that has more of them. Of the
@@ -174,14 +174,14 @@ def require_pair(size: tuple[int, int]) -> None:
         )
 
 
-def require_steps(frames: Sequence[Frame], file: Path, reel: Reel, overwrite: bool) -> None:
+def require_steps(frames: Sequence[StepFrame], file: Path, reel: Reel, overwrite: bool) -> None:
     """Raise SlidevizError where there are no steps, or no such film can be made of them."""
     if len(frames) < 2:
         raise SlidevizError("there are no steps to make a film of; run the case first")
     check_film(file, reel, frames=len(frames), overwrite=overwrite)
 
 
-def shot_at(frames: Sequence[Frame], position: float, going_on: GoingOn = never) -> Shot:
+def shot_at(frames: Sequence[StepFrame], position: float, going_on: GoingOn = never) -> Shot:
     """Return a step, or, between two steps, a mesh on the way from one to the next."""
     step, steps = int(position), len(frames) - 1
     place = place_words(position, steps)
@@ -191,15 +191,17 @@ def shot_at(frames: Sequence[Frame], position: float, going_on: GoingOn = never)
     return Shot(frame, place, place)
 
 
-def _blend(start: Frame, end: Frame, part: float, first: Frame, going_on: GoingOn) -> Frame:
+def _blend(
+    start: StepFrame, end: StepFrame, part: float, first: StepFrame, going_on: GoingOn
+) -> StepFrame:
     """Return the mesh on the way from one frame to the next, with its own quality."""
     points = (1.0 - part) * start.mesh.points + part * end.mesh.points
     mesh = end.mesh.with_points(points)
     found = quality(mesh, reference=first.mesh, metric=end.quality.metric, going_on=going_on)
-    return Frame(mesh, found, end.step)
+    return StepFrame(mesh, found, end.step)
 
 
-def _showing(session: Session, frame: Frame) -> Session:
+def _showing(session: Session, frame: StepFrame) -> Session:
     """Return the session with one frame in the place of all its steps, colours as they are."""
     run = session.run_shown
     assert run is not None

@@ -16,7 +16,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.scene.moved import Zoom
 from slideviz.session.opening import of_runs
 from slideviz.session.pieces import whole
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 
 SIZE = PictureOptions.size
 WHITE = 250
@@ -57,12 +57,12 @@ def picture(
         renderer.write(PictureOptions(size, title=True, heading=words), Path(file))
 
 
-def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixels]:
+def pictures_alike(frames: Sequence[StepFrame], base: Mesh, side: int) -> list[Pixels]:
     """Return a square picture (side, side, 3) of each mesh, without legend, all from one camera.
 
     Parameters
     ----------
-    frames : sequence of Frame
+    frames : sequence of StepFrame
         What became of the mesh.
     base : Mesh
         The undeformed mesh.
@@ -70,7 +70,7 @@ def pictures_alike(frames: Sequence[Frame], base: Mesh, side: int) -> list[Pixel
         Pixels.
     """
     runs = [Run(k, Case(), (frame,), "done") for k, frame in enumerate(frames, start=1)]
-    session = of_runs(Frame(base, frames[0].quality), runs)
+    session = of_runs(StepFrame(base, frames[0].quality), runs)
     with OffscreenRenderer.of_runs(session) as renderer:
         options = PictureOptions((side, side), legend=False, edges=False, both=False, film=True)
         scene = renderer.pose(options)

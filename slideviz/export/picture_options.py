@@ -17,7 +17,7 @@ from slideviz.export.titles import (
 )
 from slideviz.scene.color_legend import STRIP
 from slideviz.session.colors import as_drawn
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 from slideviz.terms import Shown
 
 Background = Literal["white", "shown", "transparent"]
@@ -146,7 +146,7 @@ def panes(options: PictureOptions, gap: int) -> tuple[PictureOptions, PictureOpt
 
 def title_of(session: Session, options: PictureOptions) -> str:
     """Return the words above a picture: run, step and quality; less where it is narrow."""
-    frame: Frame | None = session.frame
+    frame: StepFrame | None = session.frame
     assert frame is not None
     steps = len(session.frames) - 1
     at, letters = min(session.view.frame, steps), options.size[0] / (LETTER_WIDTH * options.scale)

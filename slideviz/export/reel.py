@@ -110,18 +110,18 @@ def check_film(
 
 
 @dataclass(frozen=True)
-class Drawn:
+class FilmProgress:
     """Progress of a film: images written, of so many in all."""
 
     done: int
     total: int
 
 
-def images_drawn(pieces: Generator[object, Any, None]) -> Generator[Drawn, None, None]:
+def images_drawn(pieces: Generator[object, Any, None]) -> Generator[FilmProgress, None, None]:
     """Yield the progress of a film, all of its pieces done here."""
     run = here(pieces)
     try:
-        yield from (piece for piece in run if isinstance(piece, Drawn))
+        yield from (piece for piece in run if isinstance(piece, FilmProgress))
     finally:
         run.close()
 
@@ -157,7 +157,7 @@ def exposing(
             image = yield from draw(position)
             seconds = 1.0 / pace if done < total else max(reel.hold, 1.0 / pace)
             yield Beside(partial(_add, add, image, seconds))
-            yield Drawn(done, total)
+            yield FilmProgress(done, total)
         yield Beside(lambda _: stack.close())
 
 

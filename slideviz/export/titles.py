@@ -14,7 +14,7 @@ from slideviz.mesh.surfaces import padded
 from slideviz.scene.color_legend import set_letters
 from slideviz.session.inspect import nodes_of
 from slideviz.session.runs_words import apart, differing, method_words, run_words
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 from slideviz.terms import ColourBy
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def names_of(session: Session) -> list[str]:
 
 
 def title_words(
-    session: Session, frame: Frame, place: str, letters: float, longest: str = ""
+    session: Session, frame: StepFrame, place: str, letters: float, longest: str = ""
 ) -> str:
     """Return a title for a room of so many letters.
 
@@ -73,7 +73,7 @@ def title_words(
     ----------
     session : Session
         With the runs there are.
-    frame : Frame
+    frame : StepFrame
         What is shown.
     place : str
         Where in the run that is (`place_words`).

@@ -20,7 +20,7 @@ Row = tuple[int, list[str]]
 
 
 @dataclass
-class Entry:
+class BoxEntry:
     """A keyword line, and the rows that follow it, as words."""
 
     value: str
@@ -28,7 +28,7 @@ class Entry:
     rows: list[Row] = field(default_factory=list)
 
 
-Entries = dict[str, Entry]
+Entries = dict[str, BoxEntry]
 """The keyword lines of a box."""
 
 
@@ -93,7 +93,7 @@ def entries_of(lines: list[str]) -> list[Entries]:
     for number, line in enumerate(lines):
         text = line.partition("%")[0]
         if key := key_of(line):
-            entry = Entry(_value(line), number)
+            entry = BoxEntry(_value(line), number)
             if key == "FFD_TAG":
                 found.append({})
             if found:
@@ -220,7 +220,7 @@ class _Reader:
             table[k] = numbers
         return table
 
-    def entry(self, key: str) -> Entry:
+    def entry(self, key: str) -> BoxEntry:
         """Return the line of a key."""
         if key not in self.entries:
             raise self.error(f"{key}= is missing")

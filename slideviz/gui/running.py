@@ -24,7 +24,7 @@ from slideviz.session.run_messages import (
     notes_of,
     warnings_of,
 )
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
@@ -219,7 +219,7 @@ class Running(QObject):
             self.banner.hide()
 
 
-def _steps_text(frame: Frame) -> str:
+def _steps_text(frame: StepFrame) -> str:
     """Return how many steps an automatic run took, and what else it tried; else nothing."""
     if frame.step is None or not frame.step.tried:
         return ""

@@ -15,7 +15,7 @@ from slideviz.session.jobs import Doing, Report, Stopped, require_going
 from slideviz.session.panes import shown_views
 from slideviz.session.section_cuts import is_awaited
 from slideviz.session.slabs import keep_slab, plain, read_slab
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 from slideviz.session.store import Store
 
 log = logging.getLogger("slideviz")
@@ -66,7 +66,7 @@ class SectionReader(QObject):
         if session.in_file:
             self._timer.start()
 
-    def _wanted(self) -> list[tuple[Frame, Section]]:
+    def _wanted(self) -> list[tuple[StepFrame, Section]]:
         """Return the sections whose cells are still to be read, the first one first."""
         return [
             (view.frame, plain(section))
@@ -90,7 +90,7 @@ class SectionReader(QObject):
             self._now = frame.mesh, section
             self._runner.start(_reading, frame, section)
 
-    def _read(self, slab: Frame) -> None:
+    def _read(self, slab: StepFrame) -> None:
         assert self._now is not None
         keep_slab(*self._now, slab)
         self.said.emit("")
@@ -105,7 +105,7 @@ class SectionReader(QObject):
         self._timer.start()
 
 
-def _reading(frame: Frame, section: Section, report: Report, stopped: Stopped) -> Frame:
+def _reading(frame: StepFrame, section: Section, report: Report, stopped: Stopped) -> StepFrame:
     def tell(part: float) -> None:
         report(Doing(f"{READING}: {part:.0%}"))
 

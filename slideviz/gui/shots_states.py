@@ -67,7 +67,7 @@ OUTER = ("SHROUD", "PER1", "PER2", "INFLOW", "OUTFLOW")
 
 
 @dataclass(frozen=True)
-class State:
+class ShotState:
     """A state of the window: name of its picture, and function that brings it about."""
 
     name: str
@@ -178,11 +178,11 @@ def dark(window: MainWindow, place: Path) -> None:
 
 
 STATES = (
-    State("roles", roles),
-    State("quality", quality),
-    State("section", section),
-    State("side-by-side", beside),
-    State("dark", dark),
+    ShotState("roles", roles),
+    ShotState("quality", quality),
+    ShotState("section", section),
+    ShotState("side-by-side", beside),
+    ShotState("dark", dark),
 )
 
 
@@ -193,13 +193,13 @@ def film_of_passage(path: Path) -> Path:
     from slideviz.export.reel import Reel
     from slideviz.mesh.quality import quality as quality_of
     from slideviz.session.opening import of_runs
-    from slideviz.session.state import Frame, Run
+    from slideviz.session.state import Run, StepFrame
 
     made = sample("passage", 24)
     case = made.case.change(motions=FAR)
     steps = deform(case, made.mesh)
-    frames = tuple(Frame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps)
-    session = of_runs(Frame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")])
+    frames = tuple(StepFrame(step.mesh, quality_of(step.mesh, made.mesh), step) for step in steps)
+    session = of_runs(StepFrame(made.mesh, quality_of(made.mesh)), [Run(1, case, frames, "done")])
     for _ in film(session, path, Reel((480, 300), 5.0, 1.5, 1), overwrite=True):
         pass
     return path

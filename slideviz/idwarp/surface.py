@@ -21,7 +21,7 @@ COINCIDES = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class SolverSurface:
     """Nodes of a mesh as a solver has them.
 
     Attributes
@@ -114,7 +114,7 @@ class Surface:
         return out
 
 
-def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> Surface:
+def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> SolverSurface:
     """Return the surface whose undeformed coordinates (N, d) are given.
 
     Raises
@@ -124,7 +124,7 @@ def surface_at(mesh: Mesh, moving: IntArray, given: FloatArray) -> Surface:
     """
     boundary = np.unique(np.concatenate([moving, *(marker.nodes for marker in mesh.markers)]))
     distance, found = cKDTree(mesh.points[boundary]).query(given)
-    far, surface = np.asarray(distance), Surface(mesh, moving, boundary[found])
+    far, surface = np.asarray(distance), SolverSurface(mesh, moving, boundary[found])
     if far.max(initial=0.0) > surface.tolerance:
         worst = int(far.argmax())
         raise CaseError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slideviz.errors import CaseError
-from slideviz.idwarp.surface import Surface, surface_at
+from slideviz.idwarp.surface import SolverSurface, surface_at
 from slideviz.mesh.io.cgns.read import CgnsForm
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
@@ -79,7 +79,7 @@ class USMesh:
         self.comm = comm
         self.deformer = Deformer(mesh, case, displacements)
         nodes = np.asarray(self.deformer.nodes)
-        self._surface = Surface(mesh, nodes, nodes)
+        self._surface = SolverSurface(mesh, nodes, nodes)
         # The nodes of a CGNS file: those where its blocks meet are in it several times.
         self._order: IntArray = (
             np.concatenate(mesh.origin.numbers)

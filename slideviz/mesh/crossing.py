@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from slideviz.mesh.model import column_bounds, sorted_nodes
-from slideviz.mesh.planes import Planes, Surface, line_normals, normals
+from slideviz.mesh.planes import FacetSimplices, Planes, line_normals, normals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -80,9 +80,9 @@ def first_crossing(
         An element has another dimension than a boundary.
     """
     points = np.asarray(points, np.float64)
-    body = Surface.of(moved, points.shape[1])
+    body = FacetSimplices.of(moved, points.shape[1])
     for name, cells in others:
-        wall = Surface.of(cells, points.shape[1]).without(moved.nodes)
+        wall = FacetSimplices.of(cells, points.shape[1]).without(moved.nodes)
         free = body.without(cells.nodes)
         margin = _margin(points, free, wall)
         hit = pierced(points, free, wall, margin)
@@ -117,9 +117,9 @@ def swept_crossing(
     before, after = np.asarray(before, np.float64), np.asarray(after, np.float64)
     goes = reduce(np.logical_or, (before != after).T)
     going = np.flatnonzero(goes)
-    body = Surface.of(moved, after.shape[1])
+    body = FacetSimplices.of(moved, after.shape[1])
     for name, cells in others:
-        wall = Surface.of(cells, after.shape[1]).without(going)
+        wall = FacetSimplices.of(cells, after.shape[1]).without(going)
         free = body.without(cells.nodes)
         nodes = sorted_nodes(free.nodes)
         nodes = nodes[goes[nodes]]
@@ -134,7 +134,7 @@ def swept_crossing(
     return None
 
 
-def _margin(points: FloatArray, a: Surface, b: Surface) -> float:
+def _margin(points: FloatArray, a: FacetSimplices, b: FacetSimplices) -> float:
     """Return ``TOLERANCE`` as a length."""
     used = points[np.concatenate((a.nodes, b.nodes)).ravel()]
     if not len(used):
@@ -143,7 +143,7 @@ def _margin(points: FloatArray, a: Surface, b: Surface) -> float:
     return TOLERANCE * float((high - low).max())
 
 
-def pierced(points: FloatArray, a: Surface, b: Surface, margin: float) -> Hit | None:
+def pierced(points: FloatArray, a: FacetSimplices, b: FacetSimplices, margin: float) -> Hit | None:
     """Return where an edge or a node of ``a`` passes through ``b``, and the facets of both.
 
     Two surfaces cross where an edge of one goes through a simplex of the other, so this has to
@@ -189,7 +189,7 @@ def self_crossing(points: FloatArray, cells: Cells) -> Hit | None:
     MeshError
         An element has another dimension than a boundary.
     """
-    surface = Surface.of(cells, points.shape[1])
+    surface = FacetSimplices.of(cells, points.shape[1])
     if not len(surface):
         return None
     planes = Planes.of(points, surface, _margin(points, surface, surface))
@@ -243,7 +243,7 @@ def _strike(
 
 
 def _node_through(
-    points: FloatArray, a: Surface, b: Surface, planes: Planes, touches: IntArray
+    points: FloatArray, a: FacetSimplices, b: FacetSimplices, planes: Planes, touches: IntArray
 ) -> Hit | None:
     """Return a node of ``a`` that lies on ``b``, where ``a`` goes on on both sides.
 

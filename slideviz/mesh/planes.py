@@ -32,7 +32,7 @@ ANGLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class FacetSimplices:
     """Simplices in the order of the facets that they are part of.
 
     Attributes
@@ -47,7 +47,7 @@ class Surface:
     facet: IntArray
 
     @classmethod
-    def of(cls, cells: Cells, dim: int) -> Surface:
+    def of(cls, cells: Cells, dim: int) -> FacetSimplices:
         """Return the simplices of a boundary of a mesh of dimension ``dim``.
 
         Raises
@@ -73,11 +73,11 @@ class Surface:
     def __len__(self) -> int:
         return len(self.nodes)
 
-    def keep(self, wanted: NDArray[np.bool_]) -> Surface:
+    def keep(self, wanted: NDArray[np.bool_]) -> FacetSimplices:
         """Return the simplices where ``wanted`` (s,) is true."""
-        return Surface(self.nodes[wanted], self.facet[wanted])
+        return FacetSimplices(self.nodes[wanted], self.facet[wanted])
 
-    def without(self, nodes: IntArray) -> Surface:
+    def without(self, nodes: IntArray) -> FacetSimplices:
         """Return the surface without the facets that have any of ``nodes``."""
         marked = np.zeros(max(self.nodes.max(initial=0), nodes.max(initial=0)) + 1, bool)
         marked[nodes] = True
@@ -85,7 +85,7 @@ class Surface:
         held[self.facet[marked[self.nodes].any(axis=1)]] = True
         return self.keep(~held[self.facet])
 
-    def within(self, points: FloatArray, other: Surface, margin: float) -> Surface:
+    def within(self, points: FloatArray, other: FacetSimplices, margin: float) -> FacetSimplices:
         """Return the simplices that the box around ``other`` touches; points are (n, d)."""
         if not len(other):
             return other
@@ -200,7 +200,7 @@ class Planes:
     margin: float
 
     @classmethod
-    def of(cls, points: FloatArray, surface: Surface, margin: float) -> Planes:
+    def of(cls, points: FloatArray, surface: FacetSimplices, margin: float) -> Planes:
         """Return the planes of a surface that is not empty, with its nodes at ``points``."""
         corners = points[surface.nodes]
         sides = np.roll(corners, -1, axis=1) - corners

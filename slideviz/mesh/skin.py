@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from slideviz.errors import MeshError
 from slideviz.mesh.check import LARGEST, first_fault, printable
-from slideviz.mesh.io.su2b.elements import BLOCK, Block, element_block, require_used
-from slideviz.mesh.io.su2b.layout import Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.elements import BLOCK, ElementBlock, element_block, require_used
+from slideviz.mesh.io.su2b.layout import BinaryFile, ZonePlace, find_zone
 from slideviz.mesh.io.su2b.read import point_block, read_elements
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Part, frozen_array
 from slideviz.mesh.ranks import ALONE, Alone
@@ -42,7 +42,7 @@ def read_skin(
         It cannot be read.
     """
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
         markers = [
             Marker(
@@ -120,7 +120,7 @@ def _cells_near(
 ) -> Iterator[Callable[[int], _Near]]:
     """Return what reads the cells at a boundary (nodes, (k,)), a block at a time."""
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
         on = np.zeros(place.n_points, bool)
         on[boundary] = True
@@ -147,7 +147,9 @@ def index_of(ids: IntArray) -> Index:
     return ids
 
 
-def _cells_at(source: Source, place: ZonePlace, found: Iterator[_Near]) -> tuple[Cells, IntArray]:
+def _cells_at(
+    source: BinaryFile, place: ZonePlace, found: Iterator[_Near]
+) -> tuple[Cells, IntArray]:
     """Return the cells that may have a side on the boundary, and their numbers."""
     kept: list[_Near] = []
     seen = np.zeros(place.cells.count, bool)
@@ -169,7 +171,7 @@ def _cells_at(source: Source, place: ZonePlace, found: Iterator[_Near]) -> tuple
     return Cells.from_types(types, nodes).take(order), ids[order]
 
 
-def _check_block(source: Source, place: ZonePlace, block: Block, cells: Cells) -> None:
+def _check_block(source: BinaryFile, place: ZonePlace, block: ElementBlock, cells: Cells) -> None:
     """Raise where a cell of a block has a node twice, or its index is no number or another's."""
     if not np.array_equal(block.ids, np.arange(block.first, block.first + len(block.ids))):
         wrong = block.ids.view(np.uint64) >= place.cells.count
@@ -182,7 +184,7 @@ def _check_block(source: Source, place: ZonePlace, block: Block, cells: Cells) -
         raise _cell_error(source, place, block.first + fault[0], fault[1])
 
 
-def _twice(source: Source, place: ZonePlace, element: int, index: int) -> MeshError:
+def _twice(source: BinaryFile, place: ZonePlace, element: int, index: int) -> MeshError:
     return _cell_error(
         source,
         place,
@@ -192,7 +194,7 @@ def _twice(source: Source, place: ZonePlace, element: int, index: int) -> MeshEr
     )
 
 
-def _cell_error(source: Source, place: ZonePlace, element: int, message: str) -> MeshError:
+def _cell_error(source: BinaryFile, place: ZonePlace, element: int, message: str) -> MeshError:
     at = source.count(place.cells.offsets + element * source.width, "an offset")
     return source.error(place.cells.entries + at * source.width, f"element {element}: {message}")
 
@@ -207,7 +209,7 @@ def _points_near(
 ) -> Iterator[Callable[[tuple[int, IntArray]], tuple[FloatArray, Outer]]]:
     """Return what reads a block of points: those of some nodes (k,) in it, and the outermost."""
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
 
         def read(task: tuple[int, IntArray]) -> tuple[FloatArray, Outer]:
@@ -224,7 +226,7 @@ def _points_near(
 
 
 def _points_of(
-    source: Source,
+    source: BinaryFile,
     place: ZonePlace,
     numbers: IntArray,
     found: Iterator[tuple[FloatArray, Outer]],

@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.plots.draw import GreedyRun, StepRun
 from slideviz.plots.spanwise import Profile, along, along_radius
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 
 Coordinate = Literal["r", "x", "y", "z"]
 
@@ -67,7 +67,7 @@ class Profiles:
     """Quality along the span, each profile made once as long as its frame is there."""
 
     def __init__(self) -> None:
-        self._made: WeakKeyDictionary[Frame, dict[object, Profile]] = WeakKeyDictionary()
+        self._made: WeakKeyDictionary[StepFrame, dict[object, Profile]] = WeakKeyDictionary()
 
     def of(self, session: Session, coordinate: Coordinate) -> list[Profile]:
         """Return the profiles of the step shown, of other runs' last, of the undeformed mesh.
@@ -88,7 +88,7 @@ class Profiles:
         return found
 
     def _one(
-        self, session: Session, frame: Frame, coordinate: Coordinate, run: Run | None
+        self, session: Session, frame: StepFrame, coordinate: Coordinate, run: Run | None
     ) -> Profile:
         case, mesh = session.case, session.mesh
         assert mesh is not None

@@ -11,7 +11,7 @@ import numpy as np
 
 from slideviz.case.words import is_number
 from slideviz.color_scheme import SELECTED_COLOUR
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.plots.style import PRINT, Style, add_legend, dress
 from slideviz.session.design_table import DesignTable
@@ -74,7 +74,7 @@ def design_curves(table: DesignTable, column: str, what: str) -> list[DesignCurv
     """
     at = table.columns.index(column)
     place_of, words = _places(table, column)
-    groups: dict[tuple[str, ...], list[Row]] = {}
+    groups: dict[tuple[str, ...], list[DesignRow]] = {}
     for number, row in sorted(table.results.items()):
         if not row.problem:
             values = table.rows[number - 1]

@@ -14,7 +14,7 @@ from slideviz.plots.histogram import draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.style import Style
 from slideviz.plots.ticks import rounded_out
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.whole import FINE, PartQuality
 from slideviz.terms import QUANTITIES, ColourBy, Quantity, quantity_of
 
@@ -32,12 +32,14 @@ MOST = 4
 Range = tuple[float, float]
 
 
-class Counts:
+class FrameCounts:
     """The counts of frames, made once as long as a frame is there."""
 
     def __init__(self) -> None:
-        self._kept: WeakKeyDictionary[Frame, dict[object, Distribution]] = WeakKeyDictionary()
-        self._spreads: WeakKeyDictionary[Frame, dict[ColourBy, Range | None]] = WeakKeyDictionary()
+        self._kept: WeakKeyDictionary[StepFrame, dict[object, Distribution]] = WeakKeyDictionary()
+        self._spreads: WeakKeyDictionary[StepFrame, dict[ColourBy, Range | None]] = (
+            WeakKeyDictionary()
+        )
 
     def limits(self, session: Session, whole: bool) -> Range:
         """Return round numbers around the values that cells have, or can have.
@@ -57,7 +59,7 @@ class Counts:
             return (0.0, 1.0) if whole else rounded_out(min(low, high - LEAST_SPREAD), high)
         return rounded_out(0.0 if whole else low, high)
 
-    def of(self, session: Session, frame: Frame, limits: Range) -> Distribution:
+    def of(self, session: Session, frame: StepFrame, limits: Range) -> Distribution:
         """Return the counts of a frame of the session between limits."""
         what = shown_measure(session)
         kept = self._kept.setdefault(frame, {})
@@ -67,13 +69,13 @@ class Counts:
 
 
 def draw_histogram(
-    counts: Counts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
+    counts: FrameCounts, session: Session, figure: Figure, style: Style, *, log: bool, whole: bool
 ) -> None:
     """Draw the histogram of a session; nothing without a mesh.
 
     Parameters
     ----------
-    counts : Counts
+    counts : FrameCounts
     session : Session
     figure : Figure
     style : Style
@@ -156,7 +158,7 @@ BINS = 25
 
 
 def distribution(
-    frame: Frame,
+    frame: StepFrame,
     what: ColourBy,
     limits: tuple[float, float] = (0.0, 1.0),
     undeformed: Mesh | None = None,
@@ -172,7 +174,7 @@ def distribution(
 
 
 def spread(
-    frame: Frame, what: ColourBy, undeformed: Mesh | None = None
+    frame: StepFrame, what: ColourBy, undeformed: Mesh | None = None
 ) -> tuple[float, float] | None:
     """Return the lowest and the highest value of the cells of a frame; None if all are inverted."""
     if isinstance(frame.quality, PartQuality):
@@ -183,6 +185,6 @@ def spread(
     return (float(right.min()), float(right.max())) if len(right) else None
 
 
-def _values(frame: Frame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
+def _values(frame: StepFrame, what: ColourBy, undeformed: Mesh | None) -> FloatArray:
     """Return the values of the cells of a frame without those of a halo."""
     return np.asarray(frame.shown_values(what, undeformed)[frame.quality.counted])

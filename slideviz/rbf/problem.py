@@ -40,7 +40,7 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class Reduction:
+class GreedySettings:
     """Settings of the greedy selection of control nodes (thesis section 2.5).
 
     Attributes
@@ -104,7 +104,7 @@ class Problem:
         Whether slid nodes must be projected after direct sliding.
     coords, shift : (n, d), (d,) float64
         Current positions in the frame, and one period in it (zero: none), for the correction.
-    reduction : Reduction or None
+    reduction : GreedySettings or None
         None: all candidates are control nodes.
     before : Solution or None
         That of the step before.
@@ -130,7 +130,7 @@ class Problem:
     cartesian: Callable[[FloatArray], FloatArray]
     coords: FloatArray
     shift: FloatArray
-    reduction: Reduction | None = None
+    reduction: GreedySettings | None = None
     before: Solution | None = None
     stages: tuple[Levels, ...] = ()
     lasting: bool = False

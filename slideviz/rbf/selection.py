@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.problem import Reduction
+from slideviz.rbf.problem import GreedySettings
 from slideviz.rbf.solve import PIVOT_GUARD, solve_lower
 
 POOL = 768
@@ -163,7 +163,7 @@ def favour(coords: FloatArray) -> FloatArray:
 def pool(
     errors: FloatArray,
     vectors: FloatArray,
-    settings: Reduction,
+    settings: GreedySettings,
     *,
     chosen: int,
     chosen_in_level: int,

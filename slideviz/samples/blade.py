@@ -18,7 +18,7 @@ TAIL = (0.07, 0.012)
 
 
 @dataclass(frozen=True)
-class Section:
+class BladeSection:
     """A blade and the channel it stands in. The axial chord is 1, from x = 0.
 
     Attributes
@@ -44,11 +44,11 @@ class Section:
     hole: tuple[float, float, float] = (-0.1, 1.12, 0.14)
 
 
-PASSAGE = Section()
+PASSAGE = BladeSection()
 """Of the sample ``passage``."""
 
 
-def camber(x: FloatArray, section: Section = PASSAGE) -> FloatArray:
+def camber(x: FloatArray, section: BladeSection = PASSAGE) -> FloatArray:
     """Return y of the camber line, with its tangents before x = 0 and behind x = 1."""
     first, last = np.tan(np.radians(section.angles_deg))
     inside = np.clip(x, 0.0, 1.0)
@@ -56,7 +56,7 @@ def camber(x: FloatArray, section: Section = PASSAGE) -> FloatArray:
     return first * (inside + ahead) + (last - first) / 2 * inside**2 + last * behind
 
 
-def blade_nodes(lower: int, upper: int, section: Section = PASSAGE) -> FloatArray:
+def blade_nodes(lower: int, upper: int, section: BladeSection = PASSAGE) -> FloatArray:
     """Return the nodes counter-clockwise from the leading edge: (lower + upper, 2).
 
     ``lower`` edges lead along the pressure side to the trailing edge, ``upper`` back along the
@@ -68,7 +68,7 @@ def blade_nodes(lower: int, upper: int, section: Section = PASSAGE) -> FloatArra
     return np.concatenate([there[:-1], back[:0:-1]])
 
 
-def _surface(phi: FloatArray, side: float, section: Section) -> FloatArray:
+def _surface(phi: FloatArray, side: float, section: BladeSection) -> FloatArray:
     """Return the points of one side at x = (1 - cos phi) / 2: (m, 2)."""
     x = (1 - np.cos(phi)) / 2
     a, b, c = section.thickness
@@ -115,7 +115,7 @@ PASSAGE_SHARES = Shares()
 
 
 @dataclass(frozen=True)
-class Counts:
+class GridCounts:
     """Numbers of cells of the channel and of the O-grid around the blade.
 
     Attributes
@@ -146,7 +146,7 @@ class Counts:
         return self.nose + self.along + self.tail
 
 
-def counts(size: int, shares: Shares = PASSAGE_SHARES) -> Counts:
+def counts(size: int, shares: Shares = PASSAGE_SHARES) -> GridCounts:
     """Return the numbers of cells for ``size`` cells along the inflow.
 
     Raises
@@ -161,7 +161,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> Counts:
     below = (size - beside) // 2
     nose, tail = round(beside * shares.nose), round(beside * shares.tail)
     above = size - beside - below
-    return Counts(
+    return GridCounts(
         ahead=ahead,
         along=along,
         behind=behind,
@@ -174,7 +174,7 @@ def counts(size: int, shares: Shares = PASSAGE_SHARES) -> Counts:
     )
 
 
-def channel_numbers(n: Counts) -> IntArray:
+def channel_numbers(n: GridCounts) -> IntArray:
     """Return the node number at each place of the channel, -1 inside the hole."""
     shape = (n.ahead + n.along + n.behind + 1, n.below + n.beside + n.above + 1)
     kept = np.ones(shape, bool)
@@ -182,7 +182,7 @@ def channel_numbers(n: Counts) -> IntArray:
     return np.where(kept, np.cumsum(kept).reshape(shape) - 1, -1)
 
 
-def channel_points(n: Counts, section: Section = PASSAGE) -> FloatArray:
+def channel_points(n: GridCounts, section: BladeSection = PASSAGE) -> FloatArray:
     """Return the channel's nodes with straight lines, hole included: (m, 2)."""
     first, last, half = section.hole
     x = _pieces((section.ends[0], first, last, section.ends[1]), (n.ahead, n.along, n.behind))

@@ -26,8 +26,8 @@ from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.blade import (
     PASSAGE,
-    Counts,
-    Section,
+    BladeSection,
+    GridCounts,
     blade_nodes,
     channel_numbers,
     channel_points,
@@ -52,7 +52,7 @@ class Grid:
 
     Attributes
     ----------
-    n : Counts
+    n : GridCounts
     number : (i, j) int
         Node at each place of the channel, -1 inside the hole.
     ring : (layers + 1, k) int
@@ -61,7 +61,7 @@ class Grid:
         Nodes of the cells, counter-clockwise.
     """
 
-    n: Counts
+    n: GridCounts
     number: IntArray
     ring: IntArray
     quads: IntArray
@@ -112,14 +112,14 @@ def passage_case() -> Case:
     )
 
 
-def make_grid(n: Counts) -> Grid:
+def make_grid(n: GridCounts) -> Grid:
     """Return the grid of so many cells."""
     number = channel_numbers(n)
     ring = _ring(n, number)
     return Grid(n, number, ring, _quads(n, number, ring))
 
 
-def straight_points(grid: Grid, section: Section) -> FloatArray:
+def straight_points(grid: Grid, section: BladeSection) -> FloatArray:
     """Return nodes on straight lines (m, 2), to start from."""
     channel = channel_points(grid.n, section)[grid.number.ravel() >= 0]
     rim = channel[grid.ring[-1]]
@@ -138,13 +138,13 @@ def smoothed(grid: Grid, points: FloatArray, tolerance: float = 1e-7) -> FloatAr
     return smooth(points, grid.quads, rho, unknown, tolerance)
 
 
-def layer_parts(n: Counts) -> FloatArray:
+def layer_parts(n: GridCounts) -> FloatArray:
     """Return how far out each row of the O-grid lies, from 0 to 1: (layers + 1,)."""
     heights = WALL ** (np.arange(n.layers)[::-1] / (n.layers - 1))
     return np.concatenate([[0.0], np.cumsum(heights) / heights.sum()])
 
 
-def _ring(n: Counts, number: IntArray) -> IntArray:
+def _ring(n: GridCounts, number: IntArray) -> IntArray:
     """Return the nodes of the O-grid, from the blade out, counter-clockwise: (layers + 1, k).
 
     Column 0 starts at the leading edge, on the hole's first side.
@@ -156,7 +156,7 @@ def _ring(n: Counts, number: IntArray) -> IntArray:
     return np.concatenate([inner, rim[None]])
 
 
-def _quads(n: Counts, number: IntArray, ring: IntArray) -> IntArray:
+def _quads(n: GridCounts, number: IntArray, ring: IntArray) -> IntArray:
     """Return the cells (m, 4), counter-clockwise: first the channel, then the O-grid."""
     around = np.roll(ring, -1, axis=1)
     channel = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from slideviz.mesh.model import FloatArray
-from slideviz.samples.blade import Counts, Section, blade_nodes
+from slideviz.samples.blade import BladeSection, GridCounts, blade_nodes
 from slideviz.samples.passage import Grid, layer_parts
 
 
-def refined(coarse: Grid, points: FloatArray, fine: Grid, section: Section) -> FloatArray:
+def refined(coarse: Grid, points: FloatArray, fine: Grid, section: BladeSection) -> FloatArray:
     """Return the fine grid's nodes (m, 2), at the same relative places as the coarse one's.
 
     Blade nodes are put onto the blade, and the O-grid above them moves along.
@@ -41,13 +41,13 @@ def refined(coarse: Grid, points: FloatArray, fine: Grid, section: Section) -> F
     return found
 
 
-def _channel_knots(n: Counts) -> tuple[list[int], list[int]]:
+def _channel_knots(n: GridCounts) -> tuple[list[int], list[int]]:
     """Return where the blocks of the channel begin and end, in both directions."""
     along = np.cumsum([0, n.ahead, n.along, n.behind]).tolist()
     return along, np.cumsum([0, n.below, n.beside, n.above]).tolist()
 
 
-def _ring_knots(n: Counts) -> list[int]:
+def _ring_knots(n: GridCounts) -> list[int]:
     """Return the columns of the O-grid at the corners of the hole, the first one again."""
     return (n.nose + np.cumsum([0, n.along, n.beside, n.along, n.beside])).tolist()
 

@@ -19,9 +19,9 @@ import numpy as np
 from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Reduction
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import Zone
+from slideviz.mesh.io.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
-from slideviz.samples.blade import Section, Shares, camber, counts
+from slideviz.samples.blade import BladeSection, Shares, camber, counts
 from slideviz.samples.passage import Grid, make_grid, smoothed, straight_points
 from slideviz.samples.refined import refined
 from slideviz.samples.reshaping import reshaped
@@ -69,7 +69,7 @@ def stator_mesh(size: int) -> Mesh:
     return mesh_of(stator_stack(size), "stator")
 
 
-def stator_zone(size: int) -> tuple[Zone, Displacements]:
+def stator_zone(size: int) -> tuple[ZoneContent, Displacements]:
     """Return what a file of the mesh is written from, block by block, and its displacement.
 
     Raises
@@ -211,7 +211,7 @@ def _plane(grid: Grid, radius: float, angles_deg: tuple[float, float]) -> FloatA
     """Return z and theta of the smoothed grid on the cylinder of that radius: (m, 2)."""
     pitch = 2 * np.pi * radius / BLADES / CHORD
     ends = (-LEADING_EDGE / CHORD, (DEPTH - LEADING_EDGE) / CHORD)
-    section = Section(angles_deg, THICKNESS, pitch, ends, HOLE)
+    section = BladeSection(angles_deg, THICKNESS, pitch, ends, HOLE)
     along = grid.n.below + grid.n.beside + grid.n.above
     if along <= COARSE:
         points = smoothed(grid, straight_points(grid, section))

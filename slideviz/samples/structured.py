@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import Zone
+from slideviz.mesh.io.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 
 LINE, QUADRILATERAL, HEXAHEDRON = 3, 9, 12
@@ -50,7 +50,7 @@ def mesh_of(grid: Structured, name: str) -> Mesh:
     return Mesh(grid.points(np.arange(grid.n_points)), cells, grid.markers(), name=name)
 
 
-def zone_of(grid: Structured) -> Zone:
+def zone_of(grid: Structured) -> ZoneContent:
     """Return what a file of the mesh is written from, block by block.
 
     Raises
@@ -68,7 +68,7 @@ def zone_of(grid: Structured) -> Zone:
         ids = np.arange(i, j)
         return types(i, j), grid.cells(ids).ravel(), ids
 
-    return Zone(
+    return ZoneContent(
         dim=grid.dim,
         n_cells=grid.n_cells,
         n_points=grid.n_points,

@@ -12,7 +12,7 @@ from slideviz.case.model import Case, FromFile
 from slideviz.case.words import nearest
 from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.mesh.io.su2b.write import Zone, file_head, zone_blocks
+from slideviz.mesh.io.su2b.write import ZoneContent, file_head, zone_blocks
 from slideviz.mesh.model import Mesh
 from slideviz.samples.passage import passage_case, passage_mesh
 from slideviz.samples.stator import stator_case, stator_displacement, stator_mesh, stator_zone
@@ -45,10 +45,10 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Streamed:
+class StreamedSample:
     """A sample as ``Sample``, but for its mesh, which can be of any size: ``zone`` makes blocks."""
 
-    zone: Zone
+    zone: ZoneContent
     case: Case
     displacement: Displacements | None = None
 
@@ -77,15 +77,15 @@ class SampleKind:
     size: int
     make: Callable[[str, int, str], Sample]
     variants: tuple[str, ...] = ("motion",)
-    stream: Callable[[str, int, str], Streamed] | None = None
+    stream: Callable[[str, int, str], StreamedSample] | None = None
 
 
 def _thesis(name: str, size: int, variant: str) -> Sample:
     return Sample(name, *thesis_case(name, size, variant))
 
 
-def _streamed_thesis(name: str, size: int, variant: str) -> Streamed:
-    return Streamed(*thesis_zone(name, size, variant))
+def _streamed_thesis(name: str, size: int, variant: str) -> StreamedSample:
+    return StreamedSample(*thesis_zone(name, size, variant))
 
 
 def _passage(name: str, size: int, _variant: str) -> Sample:
@@ -103,9 +103,9 @@ def _stator(name: str, size: int, _variant: str) -> Sample:
     return Sample(name, mesh, stator_case(), moved)
 
 
-def _streamed_stator(_name: str, size: int, _variant: str) -> Streamed:
+def _streamed_stator(_name: str, size: int, _variant: str) -> StreamedSample:
     zone, displacement = stator_zone(size)
-    return Streamed(zone, stator_case(), displacement)
+    return StreamedSample(zone, stator_case(), displacement)
 
 
 SAMPLES: Mapping[str, SampleKind] = {
@@ -224,7 +224,7 @@ def write_sample(
     from slideviz.mesh.io.files import write
 
     row, kind = _row(name, variant)
-    made: Sample | Streamed
+    made: Sample | StreamedSample
     if file_format == "su2b" and row.stream is not None:
         made = row.stream(name, row.size if size is None else size, kind)
     else:
@@ -240,7 +240,7 @@ def write_sample(
     except OSError as problem:
         reason = problem.strerror or problem
         raise CaseError(f"{folder}: cannot make the folder: {reason}; choose another") from problem
-    if isinstance(made, Streamed):
+    if isinstance(made, StreamedSample):
         _write_blocks(mesh, made.zone, overwrite)
     else:
         write(mesh, made.mesh, overwrite)
@@ -252,7 +252,7 @@ def write_sample(
     return paths
 
 
-def _write_blocks(mesh: Path, zone: Zone, overwrite: bool) -> None:
+def _write_blocks(mesh: Path, zone: ZoneContent, overwrite: bool) -> None:
     """Write a mesh as SU2's binary, block by block."""
     with atomic_write(mesh, MeshError, mesh if overwrite else None) as file:
         for block in chain(file_head(1), zone_blocks(zone, 1)):

@@ -16,7 +16,7 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.model import Case, FromFile, Motion, Rotate, Translate
 from slideviz.case.motion import displacement_of
 from slideviz.errors import CaseError
-from slideviz.mesh.io.su2b.write import Zone
+from slideviz.mesh.io.su2b.write import ZoneContent
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh
 from slideviz.samples.structured import LINE, QUADRILATERAL, mesh_of, zone_of
 from slideviz.terms import Role
@@ -57,7 +57,9 @@ def thesis_case(name: str, size: int, variant: str) -> tuple[Mesh, Case, Displac
     return mesh_of(grid, name), *_case(grid, variant)
 
 
-def thesis_zone(name: str, size: int, variant: str) -> tuple[Zone, Case, Displacements | None]:
+def thesis_zone(
+    name: str, size: int, variant: str
+) -> tuple[ZoneContent, Case, Displacements | None]:
     """Return the same, but for the mesh: what its file is written from, block by block.
 
     Raises

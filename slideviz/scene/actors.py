@@ -21,7 +21,7 @@ LIFT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnBoundary:
     """A boundary in the scene: its surface, its geometry and its actors.
 
     Attributes

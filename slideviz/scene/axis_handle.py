@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, Mesh
-from slideviz.sections.around_axis import TURN, Patch, Place, patch_of, shape_of
+from slideviz.sections.around_axis import TURN, Patch, PlaceOnSection, patch_of, shape_of
 from slideviz.sections.model import Section
 from slideviz.session.section_cuts import Cuts
 
@@ -52,7 +52,7 @@ def frame_of(section: Section, patch: Patch) -> list[FloatArray]:
 
 
 def drag(
-    seen: Seen, section: Section, place: Place, size: float
+    seen: Seen, section: Section, place: PlaceOnSection, size: float
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Return the pixel of a place on a section, and how far the mouse goes for a unit of size.
 
@@ -76,7 +76,7 @@ def drag(
 
 
 def dragged_size(
-    seen: Seen, section: Section, place: Place, *, start: FloatArray, now: FloatArray
+    seen: Seen, section: Section, place: PlaceOnSection, *, start: FloatArray, now: FloatArray
 ) -> float:
     """Return the size of a section after a drag of one of its places.
 

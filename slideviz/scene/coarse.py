@@ -7,7 +7,7 @@ from typing import Any
 
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import VALUES, Drawn, see_through
+from slideviz.scene.actors import VALUES, DrawnBoundary, see_through
 from slideviz.scene.mesh import BoundaryLayer
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
@@ -42,7 +42,7 @@ class CoarseLayer(Layer):
     def clear(self) -> None:
         """Forget the mesh."""
         self.on = False
-        self.drawn: dict[str, Drawn] = {}
+        self.drawn: dict[str, DrawnBoundary] = {}
         self._made_of: tuple[object, ...] = ()
         self._session = Session()
         self._edged: list[Any] = []
@@ -93,9 +93,9 @@ class CoarseLayer(Layer):
         for prop in self._edged:
             prop.show_edges = False
 
-    def _add(self, surface: Surface) -> Drawn:
+    def _add(self, surface: Surface) -> DrawnBoundary:
         assert self._session.mesh is not None
         shape: Any = actors.surface_shape(surface, self._session.mesh.points)
-        return Drawn(
+        return DrawnBoundary(
             surface, shape, self.stage.add(shape, f"coarse:{surface.name}", pickable=False)
         )

@@ -15,7 +15,7 @@ from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.sections import SectionLayer
 from slideviz.scene.stage import Layer, Stage
 from slideviz.session.inspect import inverted_cells, middles
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 NAME = "points:inverted"
 MOST = 1000
@@ -71,7 +71,7 @@ class InvertedLayer(Layer):
             return []
         return [cells for _, cells in self.sections.pickable()]
 
-    def _draw(self, frame: Frame, cut: list[IntArray]) -> None:
+    def _draw(self, frame: StepFrame, cut: list[IntArray]) -> None:
         """Draw the rings of a frame, of those cells only that are cut, where some are."""
         own, count = frame.extra or frame, frame.quality.inverted
         cells = inverted_cells(own)

@@ -13,9 +13,9 @@ from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED
 from slideviz.mesh.surfaces import Surface
 from slideviz.scene import actors
-from slideviz.scene.actors import CELL, POINT, VALUES, Band, Drawn, see_through
+from slideviz.scene.actors import CELL, POINT, VALUES, Band, DrawnBoundary, see_through
 from slideviz.scene.stage import Layer, Stage
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 from slideviz.terms import ROLES
 
 FADED = 0.3
@@ -77,7 +77,7 @@ class CellLayer(Layer):
         """Forget the mesh."""
         self.shape = self.actor = self.order = None
 
-    def _stack(self, frame: Frame) -> None:
+    def _stack(self, frame: StepFrame) -> None:
         """Draw inverted cells last: folded cells overlap, and of these they are to be seen."""
         folded = frame.quality.status == INVERTED
         order = np.argsort(folded, kind="stable") if folded.any() else None
@@ -127,7 +127,7 @@ class BoundaryLayer(Layer):
 
     Attributes
     ----------
-    drawn : dict of str to Drawn
+    drawn : dict of str to DrawnBoundary
         By name.
     bands : dict of str to Band
         Of those that are, or were, selected.
@@ -137,7 +137,7 @@ class BoundaryLayer(Layer):
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
-        self.drawn: dict[str, Drawn] = {}
+        self.drawn: dict[str, DrawnBoundary] = {}
         self.bands: dict[str, Band] = {}
         self.glass: frozenset[str] = frozenset()
         self._lift = 0.0
@@ -161,12 +161,12 @@ class BoundaryLayer(Layer):
         """Return the data sets of all boundaries."""
         return [one.shape for one in self.drawn.values()]
 
-    def _add(self, surface: Surface, points: FloatArray) -> Drawn:
+    def _add(self, surface: Surface, points: FloatArray) -> DrawnBoundary:
         shape = actors.surface_shape(surface, points, 2 * self._lift)
         actor = self.stage.add(shape, f"marker:{surface.name}", lighting=not surface.flat)
         if not surface.flat:
             actor.prop.ambient, actor.prop.diffuse = 0.6, 0.4
-        return Drawn(surface, shape, actor)
+        return DrawnBoundary(surface, shape, actor)
 
     def _add_band(self, surface: Surface, points: FloatArray) -> Band:
         """Return the band of a boundary, made at the first call: most are never selected."""
@@ -221,7 +221,7 @@ class BoundaryLayer(Layer):
             if one.surface.name in self.bands:
                 actors.place(self.bands[one.surface.name].shape, at, self._lift)
 
-    def _style(self, name: str, one: Drawn, session: Session, by_value: bool) -> None:
+    def _style(self, name: str, one: DrawnBoundary, session: Session, by_value: bool) -> None:
         view = session.view
         shown = name not in view.hidden
         one.actor.visibility = shown

@@ -9,7 +9,7 @@ import numpy as np
 import pyvista as pv
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.scene.actors import Drawn
+from slideviz.scene.actors import DrawnBoundary
 
 REACH = 9.0
 """A click this many pixels beside a line still means the line."""
@@ -26,7 +26,7 @@ def to_display(plotter: Any, points: FloatArray) -> FloatArray:
     return (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * size
 
 
-def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> str | None:
+def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the boundary of a 2D mesh nearest to a pixel, within `REACH`."""
     best, found = REACH, None
     at = np.array([x, y])
@@ -42,7 +42,7 @@ def nearest_line(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> st
     return found
 
 
-def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[Drawn]) -> str | None:
+def front_surface(plotter: Any, x: float, y: float, drawn: Iterable[DrawnBoundary]) -> str | None:
     """Return the boundary of a 3D mesh that is in front at a pixel."""
     picker = _cell_picker()
     names = {}

@@ -16,7 +16,7 @@ from slideviz.color_scheme import LIGHT, ColorScheme
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.surfaces import Surface, padded
 from slideviz.scene import pick
-from slideviz.scene.actors import CELL, Drawn
+from slideviz.scene.actors import CELL, DrawnBoundary
 from slideviz.scene.boxes import BoxLayer
 from slideviz.scene.camera import Camera
 from slideviz.scene.coarse import CoarseLayer
@@ -91,7 +91,7 @@ class Scene:
         return self.stage.scheme
 
     @property
-    def drawn(self) -> dict[str, Drawn]:
+    def drawn(self) -> dict[str, DrawnBoundary]:
         """Return the boundaries, by name."""
         return self._boundaries.drawn
 

@@ -20,7 +20,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.session.passages import keeps, moved
 from slideviz.session.section_cuts import Cuts, can_cut, cut_frame, is_awaited
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 NAME, BAND, RIM = "section:", "band:", "rim:"
 """What names of actors begin with: of what a section shows, and of what is below it in 2D."""
@@ -37,7 +37,7 @@ class SectionDrawn:
 
     shown: PolygonActor
     made_of: tuple[object, ...] = ()
-    frame: Frame | None = None
+    frame: StepFrame | None = None
     of: Mesh | None = None
 
     @property

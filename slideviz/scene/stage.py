@@ -13,7 +13,7 @@ from slideviz.mesh.surfaces import Surface
 from slideviz.scene.actors import LIFT, VALUES, draw_fine_edges, lookup_table
 from slideviz.scene.color_legend import STRIP
 from slideviz.sections.threshold import CellsInRange
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 USUAL_DPI = 72.0
 """Dots per inch of a screen whose pixels are those of Qt."""
@@ -136,7 +136,9 @@ class Stage:
             self._values = key, frame.shown_values(what, session.mesh)
         return self._values[1]
 
-    def values_of(self, session: Session, cells: IntArray, of: Frame | None = None) -> FloatArray:
+    def values_of(
+        self, session: Session, cells: IntArray, of: StepFrame | None = None
+    ) -> FloatArray:
         """Return the values of some cells (k,) only, (k,): what nobody sees is not computed.
 
         ``of`` is the frame that has them, if it is not the one that is shown.

@@ -90,7 +90,7 @@ def _seam(angle: FloatArray) -> float:
     return float(turned[widest] + gaps[widest] / 2.0)
 
 
-Place = tuple[float, float]
+PlaceOnSection = tuple[float, float]
 """A place on a section of any size: its angle in radians, and how far along its lines it is."""
 
 
@@ -110,7 +110,7 @@ class Patch:
 
     angles: tuple[float, float]
     along: tuple[float, float]
-    middle: Place
+    middle: PlaceOnSection
     places: FloatArray
 
     @property

@@ -8,7 +8,7 @@ from typing import Literal
 
 from slideviz.case.model import Case
 from slideviz.session.changes_view import set_view, show_frame
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 from slideviz.session.undoable import undoable
 
 UNDEFORMED = 0
@@ -30,7 +30,7 @@ def start_run(session: Session, case: Case | None = None, name: str = "") -> Ses
     return show_frame(session, 0)
 
 
-def add_frames(session: Session, frames: Sequence[Frame]) -> Session:
+def add_frames(session: Session, frames: Sequence[StepFrame]) -> Session:
     """Return the session with steps just computed by the newest run; the last is shown."""
     newest = session.runs[-1]
     grown = replace(newest, frames=(*newest.frames, *frames), saved=False)

@@ -7,7 +7,7 @@ import numpy as np
 from slideviz.mesh.quality import INVERTED
 from slideviz.session.changes_runs import seen_beside
 from slideviz.session.changes_view import set_view
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.state import Session
 from slideviz.session.undoable import undoable
 
@@ -62,9 +62,9 @@ def _limits(session: Session, every: bool) -> tuple[float, float] | None:
     return _outwards(min(lows), max(highs))
 
 
-def _frames(session: Session, every: bool) -> set[Frame]:
+def _frames(session: Session, every: bool) -> set[StepFrame]:
     """Return what is seen now, or every step that can be."""
-    shown: set[Frame] = set()
+    shown: set[StepFrame] = set()
     for one in (session, seen_beside(session)):
         if one.frame is not None:
             shown.add(one.frame)

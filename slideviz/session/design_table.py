@@ -18,7 +18,7 @@ from slideviz.case.model import Case
 from slideviz.case.words import is_number
 from slideviz.design.sweep_columns import numbers_of, own_values
 from slideviz.design.sweep_designs import read_designs
-from slideviz.design.sweep_row import NUMBERS, Row
+from slideviz.design.sweep_row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh
@@ -39,13 +39,13 @@ class DesignTable:
     columns : tuple of str
     rows : tuple of tuple of str
         The values of each design, a text for each column.
-    results : mapping of int to Row
+    results : mapping of int to DesignRow
         By the number of the design, from 1.
     """
 
     columns: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
-    results: Mapping[int, Row] = field(default_factory=lambda: MappingProxyType({}))
+    results: Mapping[int, DesignRow] = field(default_factory=lambda: MappingProxyType({}))
 
     def crossed(self, column: str, values: Iterable[str]) -> DesignTable:
         """Return the table in which each design there is has each of these values.
@@ -83,7 +83,7 @@ class DesignTable:
         kept = tuple(self.rows[at] for at in left)
         return DesignTable(self.columns if kept else (), kept, MappingProxyType(results))
 
-    def with_results(self, rows: Iterable[Row]) -> DesignTable:
+    def with_results(self, rows: Iterable[DesignRow]) -> DesignTable:
         """Return the table with more results."""
         more = {row.design: row for row in rows}
         return replace(self, results=MappingProxyType({**self.results, **more}))

@@ -19,7 +19,7 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.quality import INVERTED, corner_jacobians, quality
 from slideviz.mesh.surfaces import padded
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import CELL_STATES, CellState, ColourBy
 
 WORST = 100
@@ -101,7 +101,9 @@ def measure(colour_by: ColourBy) -> ColourBy:
     return colour_by if colour_by in ("size", "skew") else "size-skew"
 
 
-def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = WORST) -> WorstCells:
+def worst_cells(
+    frames: Sequence[StepFrame], at: int, what: ColourBy, count: int = WORST
+) -> WorstCells:
     """Return the worst cells of the frame ``at``, and the frame in which each was worst.
 
     Only the listed cells are followed through the frames, so that neither time nor memory grows
@@ -130,7 +132,7 @@ def worst_cells(frames: Sequence[Frame], at: int, what: ColourBy, count: int = W
     )
 
 
-def _listed(frame: Frame, extra: Frame, at: int, count: int) -> WorstCells:
+def _listed(frame: StepFrame, extra: StepFrame, at: int, count: int) -> WorstCells:
     """Return the worst cells of a mesh of which only the boundary is in memory, by size-skew."""
     assert extra.mesh.part is not None
     assert extra.base is not None
@@ -153,7 +155,7 @@ def _listed(frame: Frame, extra: Frame, at: int, count: int) -> WorstCells:
     )
 
 
-def inverted_cells(frame: Frame) -> IntArray:
+def inverted_cells(frame: StepFrame) -> IntArray:
     """Return the inverted cells of a frame, (k,), without those of a halo."""
     bad = frame.quality.status == INVERTED
     if frame.quality.halo is not None:
@@ -178,7 +180,7 @@ def surroundings(mesh: Mesh, cell: int) -> tuple[FloatArray, float]:
     return points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def cell_info(frame: Frame, cell: int) -> CellInfo:
+def cell_info(frame: StepFrame, cell: int) -> CellInfo:
     """Return the facts about a cell.
 
     Raises

@@ -26,7 +26,7 @@ from slideviz.session.keep import Camera, kept_camera
 from slideviz.session.large import first_frame, is_large, read_boundary
 from slideviz.session.motions import Ghosts
 from slideviz.session.passages import find_period
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 Report = Callable[[object], None]
 Stopped = Callable[[], bool]
@@ -119,7 +119,7 @@ def prepare(
         report(Doing("Measuring the cells", fraction))
 
     if mesh.part is None:
-        first = Frame(mesh, quality(mesh, metric=metric, going_on=going_on))
+        first = StepFrame(mesh, quality(mesh, metric=metric, going_on=going_on))
     else:
         first = first_frame(mesh, metric, measuring)
     going_on()
@@ -136,7 +136,7 @@ def prepare(
     return Opened(session, surfaces, ghosts, bool(case.view), kept_camera(case), coarse)
 
 
-def _look_ahead(frame: Frame) -> None:
+def _look_ahead(frame: StepFrame) -> None:
     """Find what is kept of a frame and asked for at once: of many cells it takes a while."""
     mesh, measured = frame.mesh, frame.quality
     _ = mesh.bounds, mesh.extent, mesh.cells.nodes, mesh.cells.by_type
@@ -175,7 +175,7 @@ def compute(case: Case, mesh: Mesh, report: Report, stopped: Stopped) -> None:
         unfinished = step.index < step.total
         report(Doing(f"Step {step.index} of {step.total}: quality", step.index / step.total))
         measured = quality(step.mesh, mesh, case.quality_metric, going_on)
-        frame = Frame(step.mesh, measured, step)
+        frame = StepFrame(step.mesh, measured, step)
         _look_ahead(frame)
         report(frame)
         going_on()
@@ -196,7 +196,7 @@ def overall(now: object) -> float:
 
 def save_mesh(
     path: Path,
-    frame: Frame,
+    frame: StepFrame,
     overwrite: bool,
     report: Report,
     stopped: Stopped,
@@ -219,7 +219,7 @@ def save_mesh(
     return path
 
 
-def cell_values(frame: Frame) -> dict[str, FloatArray]:
+def cell_values(frame: StepFrame) -> dict[str, FloatArray]:
     """Return the quality of the cells of a frame by name, each (m,)."""
     measured = frame.quality
     return {"size_skew": measured.values, "size": measured.size, "skew": measured.skew}

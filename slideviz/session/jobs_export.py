@@ -13,14 +13,14 @@ from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.io.vtkhdf import VTKHDF, vtkhdf_series
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.session.jobs import Doing, Report, Stopped, cell_values, require_going, save_mesh
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import CELL_STATES
 
 _ROWS = 5_000
 """Cells written between two looks at whether to stop."""
 
 
-def save_quality(path: Path, frame: Frame, report: Report, stopped: Stopped) -> Path:
+def save_quality(path: Path, frame: StepFrame, report: Report, stopped: Stopped) -> Path:
     """Write a CSV file with a row for every cell: id, type, size, skew, size-skew, status, middle.
 
     Raises
@@ -76,10 +76,10 @@ def step_paths(path: Path, count: int) -> list[Path]:
 
 def save_steps(
     path: Path,
-    frames: Sequence[Frame],
+    frames: Sequence[StepFrame],
     report: Report,
     stopped: Stopped,
-    first: Frame | None = None,
+    first: StepFrame | None = None,
 ) -> list[Path]:
     """Write the mesh of every step, whole files only, and return them.
 
@@ -89,7 +89,7 @@ def save_steps(
     ----------
     path : Path
         The name to put numbers into (see `step_paths`).
-    frames : sequence of Frame
+    frames : sequence of StepFrame
         The steps, without the undeformed mesh.
 
     Raises
@@ -108,7 +108,7 @@ def save_steps(
     return paths
 
 
-def _save_series(path: Path, frames: Sequence[Frame], report: Report, stopped: Stopped) -> None:
+def _save_series(path: Path, frames: Sequence[StepFrame], report: Report, stopped: Stopped) -> None:
     """Write all frames into one file, with quality, and displacement from the first of them."""
     start = frames[0].mesh
     with vtkhdf_series(path, start) as series:

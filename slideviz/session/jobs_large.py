@@ -10,12 +10,12 @@ from slideviz.deformation.solver import Progress
 from slideviz.deformation.streaming import stream
 from slideviz.session.jobs import PHASES, Doing, Report, Stopped, overall, require_going
 from slideviz.session.large import frame_of
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.whole import tally_of
 
 
 def compute_in_file(
-    case: Case, first: Frame, output: Path, report: Report, stopped: Stopped
+    case: Case, first: StepFrame, output: Path, report: Report, stopped: Stopped
 ) -> None:
     """Deform a mesh that is in its file; report the progress, and the last step as a `Frame`.
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from slideviz.deformation.memory import NEEDED
 from slideviz.deformation.solver import free_memory
-from slideviz.mesh.io.su2b.layout import Source, find_zone
+from slideviz.mesh.io.su2b.layout import BinaryFile, find_zone
 from slideviz.mesh.io.su2b.read import is_su2b
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.quality import quality
 from slideviz.mesh.skin import read_skin
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.whole import PartQuality, Tally, measure_all, worst_frame
 from slideviz.terms import Metric
 
@@ -34,7 +34,7 @@ def is_large(path: Path, zone: int | None) -> bool:
     if path.suffix.lower() != ".su2b" or not is_su2b(path):
         return False
     with path.open("rb") as file:
-        place = find_zone(Source(path, file), zone)
+        place = find_zone(BinaryFile(path, file), zone)
     if place.dim == 2:  # all of its cells are what is drawn
         return False
     cells = place.cells.count
@@ -60,16 +60,16 @@ def read_boundary(path: Path, zone: int | None, tick: Callable[[float], object])
     return replace(skin, remarks=(*skin.remarks, remark))
 
 
-def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> Frame:
+def first_frame(skin: Mesh, metric: Metric, tick: Callable[[float], object]) -> StepFrame:
     """Return the undeformed frame of a mesh that is in its file; all of its cells are measured."""
     assert skin.source is not None
     tally = measure_all(skin.source, skin.zone, metric, tick)
     return frame_of(skin, skin, skin.source, tally, metric)
 
 
-def frame_of(now: Mesh, skin: Mesh, file: Path, tally: Tally, metric: Metric) -> Frame:
+def frame_of(now: Mesh, skin: Mesh, file: Path, tally: Tally, metric: Metric) -> StepFrame:
     """Return the frame of a boundary, ``skin`` undeformed, with its cells in a file."""
     assert skin.source is not None
     extra = worst_frame(skin.source, skin.zone, file, tally.worst, metric)
     found = PartQuality.of(quality(now, skin, metric), tally)
-    return Frame(now, found, extra=extra, file=file)
+    return StepFrame(now, found, extra=extra, file=file)

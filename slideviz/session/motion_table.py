@@ -20,7 +20,7 @@ LARGEST = 5_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class TableRows:
     """The rows that a table of displacements may have.
 
     Attributes
@@ -38,7 +38,7 @@ class Rows:
     shape: tuple[int, ...]
 
     @classmethod
-    def on(cls, mesh: Mesh, case: Case, marker: Target) -> Rows:
+    def on(cls, mesh: Mesh, case: Case, marker: Target) -> TableRows:
         """Return the rows of some boundaries, or of all that move where ``marker`` is empty."""
         names = named(marker) or case.markers_with("moving")
         nodes = np.unique(np.concatenate([mesh.marker(name).nodes for name in names]))

@@ -12,7 +12,7 @@ from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
 from slideviz.session.changes_view import flat_one
 from slideviz.session.keep import kept_view
-from slideviz.session.state import Frame, Guess, Run, Session, ViewState
+from slideviz.session.state import Guess, Run, Session, StepFrame, ViewState
 from slideviz.terms import ColourBy, Role
 
 RELATIVE_TOLERANCE = 1e-5
@@ -21,7 +21,7 @@ STEPS = 5
 
 
 def open_mesh(
-    first: Frame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
+    first: StepFrame, path: Path | None, pairs: Sequence[Pair] = (), case: Case | None = None
 ) -> Session:
     """Return a session with a mesh just read; without a case its roles are guessed."""
     mesh = first.mesh
@@ -52,12 +52,14 @@ def suggested_reduction(mesh: Mesh) -> Reduction:
     return Reduction(tolerance=float(f"{RELATIVE_TOLERANCE * mesh.extent:.2g}") or 1e-300)
 
 
-def of_runs(first: Frame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew") -> Session:
+def of_runs(
+    first: StepFrame, runs: Sequence[Run] = (), colour_by: ColourBy = "size-skew"
+) -> Session:
     """Return a session that shows the last step of a run, and of a second one beside it.
 
     Parameters
     ----------
-    first : Frame
+    first : StepFrame
         The undeformed mesh.
     runs : sequence of Run
         Of that mesh: none, one or two, each with another number.

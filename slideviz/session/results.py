@@ -24,7 +24,7 @@ LABEL = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class StepFrame:
     """The mesh after a step, with its quality; the first frame is the undeformed mesh.
 
     Attributes
@@ -33,7 +33,7 @@ class Frame:
         Of one that is larger than memory, its boundary (see `slideviz.mesh.skin`).
     quality : Quality
     step : Step or None
-    extra : Frame or None
+    extra : StepFrame or None
         The worst cells of a mesh of which only the boundary is in memory, worst first. Where one
         cell is meant, they are counted on after those of the boundary (see `place_of`).
     base : Mesh or None
@@ -45,7 +45,7 @@ class Frame:
     mesh: Mesh
     quality: Quality
     step: Step | None = None
-    extra: Frame | None = None
+    extra: StepFrame | None = None
     base: Mesh | None = None
     file: Path | None = None
 
@@ -54,7 +54,7 @@ class Frame:
         more = 0 if self.extra is None else len(self.extra.mesh.cells)
         return cell is not None and 0 <= cell < len(self.mesh.cells) + more
 
-    def place_of(self, cell: int) -> tuple[Frame, int]:
+    def place_of(self, cell: int) -> tuple[StepFrame, int]:
         """Return the frame that has a cell, this one or `extra`, and its number there."""
         own = len(self.mesh.cells)
         return (self, cell) if self.extra is None or cell < own else (self.extra, cell - own)
@@ -95,7 +95,7 @@ class Run:
         From 1, in the order of the starts; never used twice in a session.
     case : Case
         The settings.
-    frames : tuple of Frame
+    frames : tuple of StepFrame
         The steps, without the undeformed mesh.
     end : {"", "done", "cancelled", "failed"}
         How it ended; empty while it goes on.
@@ -103,7 +103,7 @@ class Run:
         Whether the mesh of its last step was written.
     name : str
         What the user calls it; empty as long as nobody did.
-    undeformed : Frame or None
+    undeformed : StepFrame or None
         The undeformed mesh, where the metric of this run judges it otherwise than the session's.
     panels : Case or None
         Of a design, what the panels had when it was asked for: settings of another deformation.
@@ -111,11 +111,11 @@ class Run:
 
     number: int
     case: Case
-    frames: tuple[Frame, ...] = ()
+    frames: tuple[StepFrame, ...] = ()
     end: Literal["", "done", "cancelled", "failed"] = ""
     saved: bool = False
     name: str = ""
-    undeformed: Frame | None = None
+    undeformed: StepFrame | None = None
     panels: Case | None = None
 
     @property
@@ -127,7 +127,7 @@ class Run:
         return f"run {self.number}: {short}"
 
     @property
-    def last(self) -> Frame | None:
+    def last(self) -> StepFrame | None:
         """Return the frame of the last step."""
         return self.frames[-1] if self.frames else None
 

@@ -12,7 +12,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.polygons import Polygons
 from slideviz.sections.threshold import CellsInRange
 from slideviz.session.passages import moved
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.slabs import slab_of
 
 NOTHING = Polygons(np.empty((0, 3)), *(np.zeros(n, np.int64) for n in (1, 0, 0)))
@@ -32,7 +32,7 @@ class Cuts:
         self._cutter: Cutter | None = None
         self._points: FloatArray | None = None
         self._found: dict[tuple[Section, bytes, CellsInRange | None], Polygons] = {}
-        self._slabs: dict[tuple[Frame, bool], Polygons] = {}
+        self._slabs: dict[tuple[StepFrame, bool], Polygons] = {}
 
     def cutter(self, mesh: Mesh) -> Cutter:
         """Return the cutter of a mesh; the steps of a deformation share it."""
@@ -80,7 +80,7 @@ class Cuts:
         return self._slabs[key]
 
 
-def cut_frame(frame: Frame, section: Section) -> Frame:
+def cut_frame(frame: StepFrame, section: Section) -> StepFrame:
     """Return the frame that the cells of a section's polygons belong to.
 
     That is the frame itself, or the cells that were read for the section from the mesh's file.

@@ -20,7 +20,7 @@ from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.threads import Tick
 from slideviz.sections.cut import sides_of
 from slideviz.sections.model import ON_SECTION, Section
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.whole import measured_part, open_points
 from slideviz.terms import Metric
 
@@ -71,7 +71,7 @@ class Groups:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class FramePlace:
     """Where a frame of a large mesh is: its file, zone, and that of the deformed points."""
 
     path: Path
@@ -79,14 +79,14 @@ class Place:
     moved: Path
 
     @classmethod
-    def of(cls, frame: Frame) -> Place:
+    def of(cls, frame: StepFrame) -> FramePlace:
         """Return the place of a frame."""
         assert frame.mesh.source is not None
         return cls(frame.mesh.source, frame.mesh.zone, frame.file or frame.mesh.source)
 
 
 _GROUPS: WeakKeyDictionary[Mesh, Groups] = WeakKeyDictionary()
-_SLABS: WeakKeyDictionary[Mesh, dict[Section, Frame]] = WeakKeyDictionary()
+_SLABS: WeakKeyDictionary[Mesh, dict[Section, StepFrame]] = WeakKeyDictionary()
 
 
 def plain(section: Section) -> Section:
@@ -94,12 +94,12 @@ def plain(section: Section) -> Section:
     return replace(section, name="", shown=True, flat=False, whole=False)
 
 
-def slab_of(mesh: Mesh, section: Section) -> Frame | None:
+def slab_of(mesh: Mesh, section: Section) -> StepFrame | None:
     """Return the cells that a section cuts, if they were read, of a mesh that is in its file."""
     return _SLABS.get(mesh, {}).get(plain(section))
 
 
-def keep_slab(mesh: Mesh, section: Section, slab: Frame) -> None:
+def keep_slab(mesh: Mesh, section: Section, slab: StepFrame) -> None:
     """Keep the cells that a section cuts, for all that show it."""
     kept = _SLABS.setdefault(mesh, {})
     while len(kept) >= KEPT:
@@ -108,8 +108,8 @@ def keep_slab(mesh: Mesh, section: Section, slab: Frame) -> None:
 
 
 def read_slab(
-    frame: Frame, section: Section, report: Tick, going_on: Callable[[], object]
-) -> Frame:
+    frame: StepFrame, section: Section, report: Tick, going_on: Callable[[], object]
+) -> StepFrame:
     """Return the cells that a section cuts as a frame of their own, with their quality.
 
     Raises
@@ -119,7 +119,7 @@ def read_slab(
     OSError
         It cannot be read.
     """
-    place, metric = Place.of(frame), frame.quality.metric
+    place, metric = FramePlace.of(frame), frame.quality.metric
     with ExitStack() as stack:
         files = open_points(stack, place.path, place.zone, place.moved)
         groups = _GROUPS.get(frame.mesh)
@@ -185,7 +185,7 @@ def _runs(groups: IntArray, cells: int) -> Iterator[tuple[int, int]]:
             yield first, min(first + len(part) * GROUP, cells) - first
 
 
-def _nothing(files: PointFiles, metric: Metric) -> Frame:
+def _nothing(files: PointFiles, metric: Metric) -> StepFrame:
     """Return a frame without cells."""
     from slideviz.mesh.quality import Quality
 
@@ -193,4 +193,4 @@ def _nothing(files: PointFiles, metric: Metric) -> Frame:
     mesh = Mesh(np.empty((0, dim)), Cells.from_types([], []), name=files.before.name)
     codes = np.empty(0, np.uint8)
     found = Quality(none, none, none, codes, np.empty(0, np.int8), metric)
-    return Frame(mesh, found, base=mesh)
+    return StepFrame(mesh, found, base=mesh)

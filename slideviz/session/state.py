@@ -14,7 +14,7 @@ from slideviz.case.check import effective
 from slideviz.case.model import Case
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import Pair
-from slideviz.session.results import Frame, Run, cell_displacement
+from slideviz.session.results import Run, StepFrame, cell_displacement
 from slideviz.terms import SHOWN, ColourBy, PointsShown, Role, Shown
 
 if TYPE_CHECKING:
@@ -112,11 +112,11 @@ class ViewState:
 
 
 __all__ = [
-    "Frame",
+    "FramePlace",
     "Guess",
-    "Place",
     "Run",
     "Session",
+    "StepFrame",
     "ViewState",
     "cell_displacement",
     "essence",
@@ -130,7 +130,7 @@ IN_FILE = (
 )
 """Why something cannot be done with a large mesh."""
 
-Place = Literal["open", "boundaries", "motion", "method"]
+FramePlace = Literal["open", "boundaries", "motion", "method"]
 """Where something is put right before a run: a panel, or the choice of a file."""
 
 
@@ -158,7 +158,7 @@ class Session:
         The boundaries whose role nobody has confirmed yet.
     pairs : tuple of Pair
         Boundaries that match each other.
-    first : Frame or None
+    first : StepFrame or None
         The undeformed mesh with its quality.
     runs : tuple of Run
         What was computed, in the order of the starts.
@@ -184,14 +184,14 @@ class Session:
     case: Case = field(default_factory=Case)
     guesses: Mapping[str, Guess] = field(default_factory=dict)
     pairs: tuple[Pair, ...] = ()
-    first: Frame | None = None
+    first: StepFrame | None = None
     runs: tuple[Run, ...] = ()
     shown: int | None = None
     saved: Case | None = None
     view: ViewState = field(default_factory=ViewState)
     intersection: str = ""
     folding: str = ""
-    invalid: tuple[tuple[Place, str], ...] = ()
+    invalid: tuple[tuple[FramePlace, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0
 
@@ -215,7 +215,7 @@ class Session:
         return self.run(self.shown)
 
     @property
-    def frames(self) -> tuple[Frame, ...]:
+    def frames(self) -> tuple[StepFrame, ...]:
         """Return the undeformed mesh and every step of the run that is shown."""
         run = self.run_shown
         first = (run and run.undeformed) or self.first
@@ -228,13 +228,13 @@ class Session:
         return run.case if run is not None else None
 
     @property
-    def frame(self) -> Frame | None:
+    def frame(self) -> StepFrame | None:
         """Return the frame that is shown."""
         frames = self.frames
         return frames[min(self.view.frame, len(frames) - 1)] if frames else None
 
     @property
-    def deformed(self) -> Frame | None:
+    def deformed(self) -> StepFrame | None:
         """Return the last step of the run that is shown."""
         run = self.run_shown
         return run.last if run is not None else None

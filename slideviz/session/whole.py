@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from slideviz.deformation.measuring import PointFiles
 from slideviz.mesh.elements import SIZES
-from slideviz.mesh.io.su2b.elements import Block, element_at, element_blocks
-from slideviz.mesh.io.su2b.layout import Source, find_zone
+from slideviz.mesh.io.su2b.elements import ElementBlock, element_at, element_blocks
+from slideviz.mesh.io.su2b.layout import BinaryFile, find_zone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, Part, frozen_array
 from slideviz.mesh.quality import INVERTED, UNPROVEN, Quality, quality
 from slideviz.mesh.threads import Tick
 from slideviz.session.inspect import WORST
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.terms import Metric
 
 FINE = 10_000
@@ -174,11 +174,13 @@ def measure_all(path: Path, zone: int | None, metric: Metric, tick: Tick) -> Tal
 
 def open_points(stack: ExitStack, path: Path, zone: int | None, moved: Path) -> PointFiles:
     """Return the points of a mesh in its file and in that of the deformed one, both opened."""
-    before, after = (Source(one, stack.enter_context(one.open("rb"))) for one in (path, moved))
+    before, after = (BinaryFile(one, stack.enter_context(one.open("rb"))) for one in (path, moved))
     return PointFiles(before, after, find_zone(before, zone))
 
 
-def worst_frame(path: Path, zone: int | None, moved: Path, ids: IntArray, metric: Metric) -> Frame:
+def worst_frame(
+    path: Path, zone: int | None, moved: Path, ids: IntArray, metric: Metric
+) -> StepFrame:
     """Return some cells (k,) of a mesh in files as a frame of their own, in that order."""
     with ExitStack() as stack:
         files = open_points(stack, path, zone, moved)
@@ -186,7 +188,7 @@ def worst_frame(path: Path, zone: int | None, moved: Path, ids: IntArray, metric
         types = np.array([vtk for vtk, _ in rows], np.uint8)
         nodes = np.concatenate([nodes for _, nodes in rows])
         used = np.unique(nodes)
-        base, now = files.cells_of(Block(0, types, nodes, ids))
+        base, now = files.cells_of(ElementBlock(0, types, nodes, ids))
         low = int(used[0])
         # A block of cells close to each other has the nodes between theirs, too.
         numbers = np.arange(low, low + len(base.points)) if len(base.points) > len(used) else used
@@ -195,14 +197,14 @@ def worst_frame(path: Path, zone: int | None, moved: Path, ids: IntArray, metric
 
 def measured_part(
     base: Mesh, now: Mesh, nodes: IntArray, ids: IntArray, files: PointFiles, metric: Metric
-) -> Frame:
+) -> StepFrame:
     """Return some cells of a mesh, before and after, as a frame with their quality."""
     place = files.place
     part = Part(
         frozen_array(nodes, np.int64), frozen_array(ids, np.int64), place.n_points, len(ids)
     )
     mesh = Mesh(now.points, now.cells, name=base.name, part=part)
-    return Frame(mesh, quality(now, base, metric), base=base)
+    return StepFrame(mesh, quality(now, base, metric), base=base)
 
 
 def _elements(files: PointFiles, ids: IntArray) -> list[tuple[int, IntArray]]:

@@ -118,7 +118,7 @@ class Result:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class CombinationRow:
     """A combination with its result, or with the reason why there is none."""
 
     combination: Combination
@@ -126,7 +126,7 @@ class Row:
     problem: str = ""
 
 
-def bounded(rows: Iterable[Row], bytes_kept: int) -> Iterator[Row]:
+def bounded(rows: Iterable[CombinationRow], bytes_kept: int) -> Iterator[CombinationRow]:
     """Yield the rows; meshes are kept until their points take so many bytes, then no more."""
     kept = 0
     for row in rows:
@@ -169,7 +169,7 @@ def compare(
     mesh: Mesh,
     wanted: Sequence[Combination],
     tell: Callable[[Combination, Progress], None] | None = None,
-) -> Iterator[Row]:
+) -> Iterator[CombinationRow]:
     """Yield a row for each combination, in order.
 
     Parameters
@@ -188,15 +188,19 @@ def compare(
             if shared is None or not shared.serves(combination):
                 shared = None  # the old one need not be kept while the new one is made
                 shared = _share(combination, case, mesh)
-            yield Row(combination, _result(combination, case, mesh, shared, tell))
+            yield CombinationRow(combination, _result(combination, case, mesh, shared, tell))
         except Cancelled:
             raise
         except SlidevizError as problem:
-            yield Row(combination, problem=str(problem))
+            yield CombinationRow(combination, problem=str(problem))
         except MemoryError:
-            yield Row(combination, problem="out of memory; a coarser mesh or DATA_REDUCTION= YES")
+            yield CombinationRow(
+                combination, problem="out of memory; a coarser mesh or DATA_REDUCTION= YES"
+            )
         except Exception as problem:  # one that fails must not take the others with it
-            yield Row(combination, problem=f"internal error ({type(problem).__name__}: {problem})")
+            yield CombinationRow(
+                combination, problem=f"internal error ({type(problem).__name__}: {problem})"
+            )
 
 
 def _share(combination: Combination, case: Case, mesh: Mesh) -> _Shared:

@@ -16,18 +16,18 @@ from slideviz.errors import CaseError, MeshError
 from slideviz.mesh.model import Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.plots.spanwise import Profile, along, along_radius
-from slideviz.study.combinations import COMPARED_METHODS, MODES, Result, Row
+from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
 
 Span = Literal["r", "x", "y", "z"]
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class FacetLine:
     """A row with the name and the number of its line in a facet."""
 
     label: str
     series: int
-    row: Row
+    row: CombinationRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +35,10 @@ class Facet:
     """Rows that are drawn together; ``title`` is empty where there is one facet only."""
 
     title: str
-    lines: tuple[Line, ...]
+    lines: tuple[FacetLine, ...]
 
 
-def facets(rows: Sequence[Row]) -> tuple[Facet, ...]:
+def facets(rows: Sequence[CombinationRow]) -> tuple[Facet, ...]:
     """Return rows with a result in facets; a line has the same look in each."""
     asked = [list(dict.fromkeys(_titles(row)[axis] for row in rows)) for axis in (0, 1)]
     done = [row for row in rows if row.result is not None]
@@ -46,26 +46,26 @@ def facets(rows: Sequence[Row]) -> tuple[Facet, ...]:
     # What has a line for each; the other has the facets.
     lined = 0 if modes == 1 or modes < methods else 1
     other = 1 - lined
-    found: dict[str, list[Line]] = {title: [] for title in asked[other]}
+    found: dict[str, list[FacetLine]] = {title: [] for title in asked[other]}
     for row in done:
         titles = _titles(row)
-        line = Line(titles[lined], asked[lined].index(titles[lined]), row)
+        line = FacetLine(titles[lined], asked[lined].index(titles[lined]), row)
         found[titles[other]].append(line)
     several = len(found) > 1
     made = [Facet(title if several else "", tuple(lines)) for title, lines in found.items()]
     return tuple(facet for facet in made if facet.lines)
 
 
-def _titles(row: Row) -> tuple[str, str]:
+def _titles(row: CombinationRow) -> tuple[str, str]:
     """Return the names of method and mode of a row."""
     return COMPARED_METHODS[row.combination.method][0], MODES[row.combination.periodic]
 
 
-Profiler = Callable[[Line], Profile]
+Profiler = Callable[[FacetLine], Profile]
 """Makes the profile of a line along the span."""
 
 
-def result_of(line: Line) -> Result:
+def result_of(line: FacetLine) -> Result:
     """Return the result of a line; it has one, or it would not be drawn."""
     assert line.row.result is not None
     return line.row.result
@@ -97,7 +97,7 @@ def profiler(case: Case, mesh: Mesh, span: Span | None = None) -> Profiler | Non
         return None
     where = span or ("r" if turns else "z")
 
-    def profile(line: Line) -> Profile:
+    def profile(line: FacetLine) -> Profile:
         values = result_of(line).quality.values
         if where == "r":
             made = along_radius(mesh, values, axis, origin, label=line.label)

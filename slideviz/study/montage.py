@@ -15,12 +15,12 @@ from slideviz.plots.bar import color_bar
 from slideviz.plots.cells import color_scale
 from slideviz.plots.style import PRINT
 from slideviz.plots.written import SMALLEST, empty_figure, fitted, trim
-from slideviz.session.state import Frame
-from slideviz.study.combinations import COMPARED_METHODS, MODES, Result, Row
+from slideviz.session.state import StepFrame
+from slideviz.study.combinations import COMPARED_METHODS, MODES, CombinationRow, Result
 from slideviz.study.plots import WIDTH
 from slideviz.study.wanted import TITLES, reasons, words_for
 
-Place = tuple[int, int]
+GridPlace = tuple[int, int]
 
 DPI = 300
 NOT_KEPT = "not drawn: too many large meshes; compare fewer methods or steps at once"
@@ -32,7 +32,7 @@ _HIGHEST = 40.0
 """Inches that a montage has room for while it is laid out."""
 
 
-def montage(rows: Sequence[Row], base: Mesh) -> Any:
+def montage(rows: Sequence[CombinationRow], base: Mesh) -> Any:
     """Return the pictures of rows as a figure: a row for each method, a column for each mode.
 
     Of many methods and few modes it is the other way round, so that the montage is not too long.
@@ -40,7 +40,7 @@ def montage(rows: Sequence[Row], base: Mesh) -> Any:
 
     Parameters
     ----------
-    rows : sequence of Row
+    rows : sequence of CombinationRow
         Of one number of steps. Where a row has no result or no mesh, its place says so.
     base : Mesh
         The undeformed mesh.
@@ -70,7 +70,7 @@ def montage(rows: Sequence[Row], base: Mesh) -> Any:
     # Those of long montages are smaller.
     wide = (WIDTH - _NAME) / max(len(names[1]), 2 if len(names[0]) < 3 else 3)
     side = int(wide * DPI * _OVERSAMPLED)
-    drawn = pictures_alike([Frame(*one) for one in kept.values()], base, side)
+    drawn = pictures_alike([StepFrame(*one) for one in kept.values()], base, side)
     images = dict(zip(kept, drawn, strict=True))
     shown = {at: images[id(row.result)] for at, row in places.items() if id(row.result) in images}
     words, notes = _words(places, rows, shown)
@@ -84,7 +84,9 @@ def montage(rows: Sequence[Row], base: Mesh) -> Any:
     return figure
 
 
-def _axis(rows: Sequence[Row], done: Sequence[Row], what: str) -> dict[str, tuple[int, str]]:
+def _axis(
+    rows: Sequence[CombinationRow], done: Sequence[CombinationRow], what: str
+) -> dict[str, tuple[int, str]]:
     """Return place and name of each method, or mode, of which there is a result.
 
     The name is empty where no other was asked for.
@@ -102,8 +104,10 @@ def _axis(rows: Sequence[Row], done: Sequence[Row], what: str) -> dict[str, tupl
 
 
 def _words(
-    places: Mapping[Place, Row], rows: Sequence[Row], shown: Mapping[Place, Pixels]
-) -> tuple[dict[Place, str], list[str]]:
+    places: Mapping[GridPlace, CombinationRow],
+    rows: Sequence[CombinationRow],
+    shown: Mapping[GridPlace, Pixels],
+) -> tuple[dict[GridPlace, str], list[str]]:
     """Return what stands in places without a picture, and the notes at the foot."""
     problems = {row.combination: row.problem for row in rows if row.result is None}
     every = [row.combination for row in rows]
@@ -125,7 +129,7 @@ def _words(
 
 
 def _facets(
-    names: Sequence[Sequence[str]], shown: Mapping[Place, Pixels], wide: float
+    names: Sequence[Sequence[str]], shown: Mapping[GridPlace, Pixels], wide: float
 ) -> tuple[Any, Any]:
     """Return a figure with axes for each row and column, their names, and the pictures in them."""
     across = _drawn(list(shown.values()), 1)
@@ -165,7 +169,7 @@ def _drawn(images: Sequence[Pixels], axis: int) -> slice:
     return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, len(some))
 
 
-def _fill(axes: Any, words: str, row: Row, wide: float) -> None:
+def _fill(axes: Any, words: str, row: CombinationRow, wide: float) -> None:
     """Write the numbers below a facet, and into it why there is no picture."""
     style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": SMALLEST, "color": "0.35"}
     axes.text(0.5, 0.5, fitted(words, wide, SMALLEST)[0], transform=axes.transAxes, **style)

@@ -15,8 +15,8 @@ from slideviz.plots.spanwise import spanwise
 from slideviz.plots.style import PRINT
 from slideviz.plots.ticks import rounded_out
 from slideviz.plots.written import empty_figure, write_figure
-from slideviz.study.combinations import Row
-from slideviz.study.facets import Facet, Line, Profiler, facets, result_of
+from slideviz.study.combinations import CombinationRow
+from slideviz.study.facets import Facet, FacetLine, Profiler, facets, result_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,12 +33,12 @@ _LAST = ("minimum", "mean")
 _QUIET = replace(PRINT, legend=False)
 
 
-def figures(rows: Sequence[Row], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
+def figures(rows: Sequence[CombinationRow], span: Profiler | None) -> Iterator[tuple[str, Figure]]:
     """Yield the names and figures of a comparison.
 
     Parameters
     ----------
-    rows : sequence of Row
+    rows : sequence of CombinationRow
         Rows without a result are left out.
     span : callable or None
         What makes the profile of a row along the span; see `profiler`.
@@ -86,10 +86,10 @@ def save_figure(
     return paths
 
 
-_Draw = Callable[["Axes", Sequence[Line]], None]
+_Draw = Callable[["Axes", Sequence[FacetLine]], None]
 
 
-def _outcomes(lines: Sequence[Line]) -> list[plots.Outcome]:
+def _outcomes(lines: Sequence[FacetLine]) -> list[plots.Outcome]:
     found = []
     for line in lines:
         result = result_of(line)
@@ -109,25 +109,25 @@ def _outcomes(lines: Sequence[Line]) -> list[plots.Outcome]:
     return found
 
 
-def _minimum(axes: Axes, lines: Sequence[Line]) -> None:
+def _minimum(axes: Axes, lines: Sequence[FacetLine]) -> None:
     plots.against_steps(axes, _outcomes(lines), "minimum", _QUIET)
 
 
-def _mean(axes: Axes, lines: Sequence[Line]) -> None:
+def _mean(axes: Axes, lines: Sequence[FacetLine]) -> None:
     plots.against_steps(axes, _outcomes(lines), "mean", _QUIET)
 
 
-def _seconds(axes: Axes, lines: Sequence[Line]) -> None:
+def _seconds(axes: Axes, lines: Sequence[FacetLine]) -> None:
     plots.against_steps(axes, _outcomes(lines), "seconds", _QUIET)
 
 
-def _histogram(every: Sequence[Line]) -> _Draw:
+def _histogram(every: Sequence[FacetLine]) -> _Draw:
     """Return what draws some of the lines, with the intervals that suit all."""
     good = [_values(line)[~_inverted(line)] for line in every]
     values = np.concatenate([*good, [1.0]])
     edges = np.linspace(*rounded_out(float(values.min()), float(values.max())), _BINS + 1)
 
-    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+    def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         runs = [
             plots.QualityRun(line.label, _values(line), _inverted(line), line.series)
             for line in lines
@@ -138,17 +138,17 @@ def _histogram(every: Sequence[Line]) -> _Draw:
     return draw
 
 
-def _inverted(line: Line) -> np.ndarray:
+def _inverted(line: FacetLine) -> np.ndarray:
     found = result_of(line).quality
     return np.asarray(found.status[found.counted] == INVERTED)
 
 
-def _values(line: Line) -> np.ndarray:
+def _values(line: FacetLine) -> np.ndarray:
     found = result_of(line).quality
     return found.values[found.counted]
 
 
-def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
+def _by_step(axes: Axes, lines: Sequence[FacetLine]) -> None:
     runs = []
     for line in lines:
         result = result_of(line)
@@ -157,7 +157,7 @@ def _by_step(axes: Axes, lines: Sequence[Line]) -> None:
     plots.quality_by_step(axes, runs, _QUIET)
 
 
-def _convergence(axes: Axes, lines: Sequence[Line]) -> None:
+def _convergence(axes: Axes, lines: Sequence[FacetLine]) -> None:
     runs = []
     for line in lines:
         if not result_of(line).history:
@@ -177,7 +177,7 @@ def _convergence(axes: Axes, lines: Sequence[Line]) -> None:
 
 
 def _span(make: Profiler, what: Literal["minimum", "mean"]) -> _Draw:
-    def draw(axes: Axes, lines: Sequence[Line]) -> None:
+    def draw(axes: Axes, lines: Sequence[FacetLine]) -> None:
         spanwise(axes, [make(line) for line in lines], what, style=_QUIET)
 
     return draw

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
-from slideviz.study.combinations import Result, Row
+from slideviz.study.combinations import CombinationRow, Result
 
 Value = str | int | float
 
 
 @dataclass(frozen=True)
-class Column:
+class StudyColumn:
     """A column of the table.
 
     Attributes
@@ -34,30 +34,34 @@ class Column:
     form: str = ""
 
 
-COLUMNS: Mapping[str, Column] = {
-    "steps_made": Column("steps made, which STEPS= auto chooses", lambda r: r.steps, "steps", "d"),
-    "min": Column("lowest quality", lambda r: r.quality.min, "min", ".6f"),
-    "mean": Column("mean quality", lambda r: r.quality.mean, "mean", ".6f"),
-    "inverted": Column("inverted cells", lambda r: r.quality.inverted, "inverted", "d"),
-    "unproven": Column("cells neither proved valid nor inverted", lambda r: r.quality.unproven),
-    "control_nodes": Column(
+COLUMNS: Mapping[str, StudyColumn] = {
+    "steps_made": StudyColumn(
+        "steps made, which STEPS= auto chooses", lambda r: r.steps, "steps", "d"
+    ),
+    "min": StudyColumn("lowest quality", lambda r: r.quality.min, "min", ".6f"),
+    "mean": StudyColumn("mean quality", lambda r: r.quality.mean, "mean", ".6f"),
+    "inverted": StudyColumn("inverted cells", lambda r: r.quality.inverted, "inverted", "d"),
+    "unproven": StudyColumn(
+        "cells neither proved valid nor inverted", lambda r: r.quality.unproven
+    ),
+    "control_nodes": StudyColumn(
         "control nodes in the last step", lambda r: r.control_nodes, "control nodes", "d"
     ),
-    "max_error": Column(
+    "max_error": StudyColumn(
         "largest error of a boundary node before it is corrected, of all steps, in the mesh's "
         "length unit",
         lambda r: r.max_error,
         "max error",
         ".1e",
     ),
-    "condition": Column("largest condition number of a system", lambda r: r.condition),
-    "seconds": Column(
+    "condition": StudyColumn("largest condition number of a system", lambda r: r.condition),
+    "seconds": StudyColumn(
         "time of the deformation by the clock, classification included",
         lambda r: r.seconds,
         "seconds",
         ".3f",
     ),
-    "processor_seconds": Column(
+    "processor_seconds": StudyColumn(
         "the same, of all processors together", lambda r: r.processor_seconds
     ),
 }
@@ -66,7 +70,7 @@ COLUMNS: Mapping[str, Column] = {
 KEY_COLUMNS = ("method", "periodic", "steps")
 
 
-def csv_text(rows: Sequence[Row]) -> str:
+def csv_text(rows: Sequence[CombinationRow]) -> str:
     """Return the table as CSV; numbers with all their digits, nothing where there is no result."""
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -81,7 +85,7 @@ def csv_text(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def history_text(rows: Sequence[Row]) -> str:
+def history_text(rows: Sequence[CombinationRow]) -> str:
     """Return the convergence of the greedy selections as CSV, a line for each cycle."""
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -113,7 +117,7 @@ def terminal_head() -> str:
     return "  ".join([f"{'method':<7} {'periodic':<8}", *shown])
 
 
-def terminal_line(row: Row, given: list[str] | None = None) -> str:
+def terminal_line(row: CombinationRow, given: list[str] | None = None) -> str:
     """Return a row for a terminal; the reason where there is no result.
 
     ``given`` has the reasons given so far, and gets those given here: each is written once, and
@@ -141,5 +145,5 @@ def _reason(problem: str, given: list[str] | None) -> str:
     return f"[{len(given)}]: {' '.join(problem.split())}"
 
 
-def _cell(text: str, column: Column) -> str:
+def _cell(text: str, column: StudyColumn) -> str:
     return text.rjust(max(len(column.head), 8 if column.form.endswith("f") else 5))

@@ -15,7 +15,7 @@ from slideviz.design import sweep as sweeping
 from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
 from slideviz.design.sweep_designs import read_designs
 from slideviz.design.sweep_lock import FolderLock
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.design.sweep_worker import Answer, Packed, Task, hold, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
@@ -346,7 +346,7 @@ class Losing(Executor):
             self._losses.remove(task.design)
             future.set_exception(BrokenExecutor("killed"))
         else:
-            future.set_result(Answer("worker 1", Row(task.design, min=0.5)))
+            future.set_result(Answer("worker 1", DesignRow(task.design, min=0.5)))
         return future
 
 

@@ -31,14 +31,14 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes, jobs_export
 from slideviz.session.formats import MESH_FORMATS, formats_for, holds_quality, left_out
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
 
 PLAIN = PictureOptions((400, 300), legend=False)
 
 
 def session_of(mesh):
-    return changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def session(square):
     found = changes.start_run(session_of(square))
     for scale in (1.02, 1.05):
         moved = square.with_points(square.points * [scale, 1.0])
-        found = changes.add_frames(found, [Frame(moved, quality(moved, square))])
+        found = changes.add_frames(found, [StepFrame(moved, quality(moved, square))])
     return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew")
 
 
@@ -112,7 +112,7 @@ def test_a_preview_is_the_picture_made_small(renderer):
 def test_two_runs_have_the_same_room_and_the_same_scale(renderer, session, square):
     more = changes.start_run(session)
     moved = square.with_points(square.points * [1.0, 0.5])
-    more = changes.add_frames(more, [Frame(moved, quality(moved, square))])
+    more = changes.add_frames(more, [StepFrame(moved, quality(moved, square))])
     renderer.session = changes.show_beside(changes.show_run(more, 1), 2)
     left, right = panes(PictureOptions((801, 300)), 9)
     assert left.size[0] + 9 + right.size[0] == 801
@@ -401,7 +401,7 @@ def test_the_table_tells_inverted_cells_and_every_type(square, tmp_path):
     points[inner[len(inner) // 2]] += 10.0
     bad = square.with_points(points)
     said = []
-    frame = Frame(bad, quality(bad, square))
+    frame = StepFrame(bad, quality(bad, square))
     path = jobs_export.save_quality(tmp_path / "q.csv", frame, said.append, lambda: False)
     lines = path.read_text().splitlines()
     assert len(lines) == 1 + len(bad.cells)

@@ -24,19 +24,19 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
 from slideviz.scene.stage import Stage
 from slideviz.session.opening import of_runs
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 SMALL = (320, 200)
 
 
 def leaning(mesh, steps=3, by=0.9):
     """The mesh and steps that lean it to the right, ever further."""
-    frames = [Frame(mesh, quality(mesh, reference=mesh))]
+    frames = [StepFrame(mesh, quality(mesh, reference=mesh))]
     for k in range(1, steps + 1):
         points = mesh.points.copy()
         points[:, 0] += by * k / steps * points[:, 1]
         moved = mesh.with_points(points)
-        frames.append(Frame(moved, quality(moved, reference=mesh)))
+        frames.append(StepFrame(moved, quality(moved, reference=mesh)))
     return tuple(frames)
 
 
@@ -231,7 +231,7 @@ def test_a_film_of_before_stays_until_the_new_one_is_done(tmp_path, frames, name
 
 
 def test_what_fails_while_drawing_leaves_nothing(tmp_path, frames, square):
-    broken = Frame(square.with_points(square.points), quality(square))
+    broken = StepFrame(square.with_points(square.points), quality(square))
     object.__setattr__(broken, "quality", None)
     with pytest.raises(AttributeError):
         shoot((*frames[:2], broken, frames[2]), tmp_path / "a.mp4", Reel(SMALL))

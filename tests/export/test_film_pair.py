@@ -17,7 +17,7 @@ from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
 from slideviz.scene.color_legend import STRIP
 from slideviz.session.opening import of_runs
-from slideviz.session.state import Frame, Run, round_above
+from slideviz.session.state import Run, StepFrame, round_above
 
 SIZE = (800, 400)
 USUAL = Reel(SIZE)
@@ -35,7 +35,7 @@ def runs(made):
     def run(number, name, **changes):
         case = made.case.change(**changes)
         meshes = [step.mesh for step in deform(case, made.mesh)]
-        frames = [Frame(mesh, quality(mesh, reference=made.mesh)) for mesh in meshes]
+        frames = [StepFrame(mesh, quality(mesh, reference=made.mesh)) for mesh in meshes]
         return Run(number, case, tuple(frames), "done", name=name)
 
     held = {"sliding": "none", "periodic": "none"}
@@ -45,7 +45,7 @@ def runs(made):
 @pytest.fixture(scope="module")
 def shoot(made):
     def film_of(runs, file, reel=USUAL, colour_by="size-skew", **options):
-        session = of_runs(Frame(made.mesh, quality(made.mesh)), runs, colour_by)
+        session = of_runs(StepFrame(made.mesh, quality(made.mesh)), runs, colour_by)
         return list(film(session, file, reel, **options))[-1].done
 
     return film_of
@@ -110,7 +110,7 @@ def test_the_range_of_displacements_holds_both_runs(made, runs, tmp_path, monkey
     monkeypatch.setattr(OffscreenRenderer, "drawing", spy)
     first = made.mesh
     far = first.with_points(first.points + np.array([3.0, 0.0]))
-    frames = (Frame(far, quality(far, reference=first)),)
+    frames = (StepFrame(far, quality(far, reference=first)),)
     moved = Run(2, runs[0].case, frames, "done", name="far")
     for pair in ((runs[0], moved), (moved, runs[0])):
         ranges.clear()

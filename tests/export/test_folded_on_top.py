@@ -18,7 +18,7 @@ from slideviz.plots.section_picture import SectionStyle, Shown, draw_section
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.scenes import square_mesh
 
 PLAIN = PictureOptions((400, 300), legend=False, edges=0.0)
@@ -40,8 +40,8 @@ def folded(base):
 
 
 def session_of(base, folded, **view):
-    found = changes.start_run(changes.open_mesh(Frame(base, quality(base)), None))
-    found = changes.add_frames(found, [Frame(folded, quality(folded, base))])
+    found = changes.start_run(changes.open_mesh(StepFrame(base, quality(base)), None))
+    found = changes.add_frames(found, [StepFrame(folded, quality(folded, base))])
     return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew", **view)
 
 

@@ -28,7 +28,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes, section_start
 from slideviz.session.passages import find_period, moved
 from slideviz.session.section_cuts import KEPT, Cuts
-from slideviz.session.state import Frame, Session
+from slideviz.session.state import Session, StepFrame
 
 MIDDLE = Section("plane", (0.0, 0.0, 0.46), (0.0, 0.0, 1.0))
 
@@ -46,7 +46,7 @@ def stator():
 
 
 def opened(scene, mesh, case=None, **view):
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), case)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
     session = changes.set_view(session, **view)
     scene.open(session, find_surfaces(mesh))
     return session
@@ -55,7 +55,7 @@ def opened(scene, mesh, case=None, **view):
 def stepped(session, points):
     """Return the session at a step with the nodes at these points."""
     mesh = session.mesh.with_points(points)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     return changes.add_frames(changes.start_run(session), [frame])
 
 
@@ -400,7 +400,7 @@ def test_cuts_are_remembered_for_the_frame_only(cube):
 
 def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
     mesh = square.with_points(square.points * (3.0, 1.0))
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
     plane = section_start.first_section("plane", session)
     assert plane.direction == (1.0, 0.0, 0.0)
     assert plane.shape.position(plane) == 6.0
@@ -409,7 +409,7 @@ def test_a_first_plane_cuts_the_longest_extent_in_the_middle(square):
 
 def test_a_first_cylinder_has_the_axis_of_the_period(stator):
     mesh = stator.mesh
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), stator.case)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), stator.case)
     pair = find_period(mesh, stator.case)
     cylinder = section_start.first_section("cylinder", session, pair)
     assert np.cross(cylinder.direction, (0, 0, 1)) == pytest.approx(0.0)
@@ -576,7 +576,7 @@ def test_a_fold_is_seen_in_the_flat_view(scene, flat_plotter, cube):
 
 
 def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
-    session = changes.open_mesh(Frame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
+    session = changes.open_mesh(StepFrame(stator.mesh, quality(stator.mesh)), None, (), stator.case)
     session = changes.set_view(session, passages=1, colour_by="skew", colour_range=(0.2, 0.9))
     section = Section("cylinder", radius=0.27)
     told = []
@@ -597,13 +597,13 @@ def test_a_section_is_saved_as_the_view_shows_it(stator, tmp_path):
 def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run_it_is_of(
     cube, tmp_path, monkeypatch
 ):
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     section = Section("plane", (0.5, 0.5, 0.52))
     assert state_words(session) == "undeformed"
     moved = cube.with_points(cube.points * (1.0, 1.0, 1.2))
     session = changes.set_case(session, sliding="ds")
     for _ in range(2):
-        frames = [Frame(moved, quality(moved, cube))] * 3
+        frames = [StepFrame(moved, quality(moved, cube))] * 3
         session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.set_view(
         session, colour_by="size", colour_range=(0.2, 0.9), colour_map="cividis"
@@ -634,7 +634,7 @@ def test_the_picture_of_a_section_has_the_colours_of_the_view_and_says_which_run
 
 def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, monkeypatch):
     mesh = bent(cube)
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
     session = changes.set_view(session, colour_by="size-skew")
     some, kept = halved(session)
     drawn = []
@@ -655,7 +655,7 @@ def test_the_picture_of_a_section_has_the_cells_of_the_range(cube, tmp_path, mon
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_sections_of_a_drawing_have_the_cells_of_the_range(square, whole):
-    session = changes.open_mesh(Frame(square, quality(square)), None)
+    session = changes.open_mesh(StepFrame(square, quality(square)), None)
     session = changes.set_view(
         session, colour_by="size-skew", sections=(replace(LINE, whole=whole),)
     )

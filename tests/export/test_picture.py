@@ -13,7 +13,7 @@ from slideviz.scene.moved import Detail, half_of, tiny_motion
 from slideviz.scene.scene import Scene
 from slideviz.session.changes import set_view
 from slideviz.session.opening import of_runs
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 def pixels(path):
@@ -24,9 +24,9 @@ def pixels(path):
 def shown(mesh, base=None):
     """A session that shows a mesh, deformed or not."""
     if base is None:
-        return of_runs(Frame(mesh, quality(mesh)))
-    frame = Frame(mesh, quality(mesh, base))
-    return of_runs(Frame(base, quality(base)), [Run(1, Case(), (frame,), "done")])
+        return of_runs(StepFrame(mesh, quality(mesh)))
+    frame = StepFrame(mesh, quality(mesh, base))
+    return of_runs(StepFrame(base, quality(base)), [Run(1, Case(), (frame,), "done")])
 
 
 def has(image, rgb, within=10):
@@ -143,7 +143,7 @@ def test_a_part_of_a_3d_mesh_is_drawn_with_its_outside_and_follows_the_steps(cub
 
 def test_pictures_to_compare_have_one_camera_and_no_legend(square):
     wide, high = (square.with_points(square.points * scale) for scale in ([2.0, 1.0], [1.0, 2.0]))
-    images = pictures_alike([Frame(mesh, quality(mesh)) for mesh in (wide, high)], square, 200)
+    images = pictures_alike([StepFrame(mesh, quality(mesh)) for mesh in (wide, high)], square, 200)
     boxes = [np.ptp(np.argwhere(image.min(axis=2) < 250), axis=0) for image in images]
     assert boxes[0] == pytest.approx(boxes[1][::-1], abs=2)
     assert boxes[0][1] == pytest.approx(2 * boxes[0][0], abs=4)

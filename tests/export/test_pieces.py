@@ -12,7 +12,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.session import changes, pieces
 from slideviz.session.pieces import Beside, appearing, here, portions, whole
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 PLAIN = PictureOptions((300, 200))
 
@@ -107,10 +107,10 @@ def test_what_appears_part_by_part_is_all_there_in_the_end(plotter, monkeypatch,
 
 @pytest.fixture
 def session(square):
-    found = changes.open_mesh(Frame(square, quality(square)), None)
+    found = changes.open_mesh(StepFrame(square, quality(square)), None)
     found = changes.start_run(found)
     moved = square.with_points(square.points * [1.2, 1.0])
-    found = changes.add_frames(found, [Frame(moved, quality(moved, square))])
+    found = changes.add_frames(found, [StepFrame(moved, quality(moved, square))])
     return changes.set_view(changes.end_run(found, "done"), colour_by="size-skew")
 
 

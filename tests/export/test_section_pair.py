@@ -14,7 +14,7 @@ from slideviz.plots import section_picture
 from slideviz.plots.section_layout import arranged
 from slideviz.sections.model import Section
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.builders import cube, passage, square
 from tests.slow import one_of_each_fast
 
@@ -24,12 +24,12 @@ LEVEL = Section("plane", (0.5, 0.5, 0.4))
 
 def compared(mesh):
     """A session with two runs side by side, one of which deforms more."""
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
     for sliding, part in (("ps", 0.1), ("ds", 0.2)):
         session = changes.start_run(changes.set_case(session, sliding=sliding))
         push = part * np.prod(np.sin(np.pi * mesh.points), axis=1)
         moved = mesh.with_points(mesh.points + np.eye(mesh.dim)[0] * push[:, None])
-        frames = [Frame(moved, quality(moved, mesh))]
+        frames = [StepFrame(moved, quality(moved, mesh))]
         session = changes.end_run(changes.add_frames(session, frames), "done")
     session = changes.set_view(session, colour_by="size-skew", colour_range=(0.2, 0.9))
     return changes.show_beside(changes.show_run(session, 2), 1)

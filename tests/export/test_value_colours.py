@@ -15,7 +15,7 @@ from slideviz.scene.scene import Scene
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.section_cuts import Cuts
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def folded(session):
     points = session.mesh.points.copy()
     points[12] += (1.6, 0.4)
     mesh = session.mesh.with_points(points)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     assert frame.quality.inverted
     session = changes.add_frames(changes.start_run(session), [frame])
     return changes.set_view(session, colour_by="size-skew", edges=False, legend=False)
@@ -62,7 +62,7 @@ def test_cells_below_the_range_have_its_lowest_colour_and_inverted_ones_are_red(
 
 
 def test_so_it_is_in_the_flat_view(plotter, cube):
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = above_all(changes.set_view(session, colour_by="size-skew", edges=False))
     scene = FlatScene(plotter, Cuts())
     scene.update(session, Section("plane", (0.5, 0.5, 0.52)))

@@ -18,7 +18,7 @@ from slideviz.scene.boxes import NAMES
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
-from slideviz.session.state import Frame, ViewState
+from slideviz.session.state import StepFrame, ViewState
 
 CORNERS = plane_corners(np.array([[-0.1, -0.2], [1.1, -0.2], [1.1, 0.3], [-0.1, 0.3]]))
 FLAT, SPLINES = regular_box("BOX", CORNERS, (3, 1, 1), None), (4, 2, 2)
@@ -39,7 +39,7 @@ def scene():
 
 def session_of(mesh, *motions):
     case = sv.Case(roles={"y_low": "moving"}, motions=motions)
-    return open_mesh(Frame(mesh, quality(mesh)), None, (), case)
+    return open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
 
 
 def test_info_lists_boxes(boxed, tmp_path, capsys):

@@ -10,10 +10,10 @@ from qtpy.QtTest import QTest
 
 import slideviz as sv
 from slideviz.design import sweep as sweeping
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.gui.panels.designs import DesignsPanel
 from slideviz.gui.widgets import plot_canvas
-from slideviz.gui.widgets.plot_image import Paper, Place, picture
+from slideviz.gui.widgets.plot_image import AxesPlace, PlotFormat, picture
 from slideviz.plots.style import PRINT
 from slideviz.samples.table import write_sample
 from slideviz.session import changes
@@ -153,7 +153,9 @@ def test_what_is_said_is_seen_whole_and_begins_with_the_reason(window, passage, 
     why = f"the cells around the tip of the blade turn over in step 1. {'Make more steps. ' * 8}"
     name = window.store.session.mesh.name
     panel.mesh = window.store.session.mesh
-    panel.table = panel.table.with_results([Row(1, problem=f"{name}: {why}"), Row(2, inverted=3)])
+    panel.table = panel.table.with_results(
+        [DesignRow(1, problem=f"{name}: {why}"), DesignRow(2, inverted=3)]
+    )
     panel._ended("", wrong=False)
     assert panel.said.text().startswith("1 failed: the cells around")
     assert panel.said.text().endswith("2 designs done; 1 with inverted cells")
@@ -367,7 +369,7 @@ def test_a_design_is_shown_whole_and_without_the_ghost_of_the_motion_panel(
 
 def test_a_legend_that_grows_takes_room_from_the_axes():
     drawn = []
-    place = Place()
+    place = AxesPlace()
     for words in (["1", "2"], ["1", "2", "many words of a design"]):
 
         def draw(figure, _style, words=words):
@@ -376,7 +378,7 @@ def test_a_legend_that_grows_takes_room_from_the_axes():
                 axes.plot([0, 1], [0, 1], label=word)
             axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
-        made = picture(draw, Paper(420, 260, 1.0, PRINT), place)
+        made = picture(draw, PlotFormat(420, 260, 1.0, PRINT), place)
         place = made.place
         box = made.figure.axes[0].get_legend().get_window_extent()
         drawn.append(box.x1 <= made.figure.bbox.x1)

@@ -12,7 +12,7 @@ from slideviz.gui.dialogs.motion_table import TableDialog
 from slideviz.gui.panels.motion_form import control_point
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.session import changes
-from slideviz.session.motion_table import Rows
+from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import Ghosts
 from slideviz.session.run_messages import run_requirements
 from slideviz.terms import SHOWN
@@ -157,7 +157,7 @@ def test_a_file_with_mistakes_is_told_as_it_is_chosen(blade, tmp_path, qtbot):
 @pytest.fixture
 def dialog(blade, qtbot):
     session = blade.session
-    made = TableDialog(blade.window, Rows.on(session.mesh, session.case, "airfoil"))
+    made = TableDialog(blade.window, TableRows.on(session.mesh, session.case, "airfoil"))
     qtbot.addWidget(made)
     return made
 

@@ -236,7 +236,9 @@ def test_every_thread_stands_back_before_it_works(window, qtbot, monkeypatch):
     runner.start(lambda report, stopped: order.append("job"))
     qtbot.waitUntil(lambda: not runner.busy)
     plot_image.draw_beside(
-        lambda *_: order.append("plot"), plot_image.Paper(50, 50, 1.0, PRINT), plot_image.Place()
+        lambda *_: order.append("plot"),
+        plot_image.PlotFormat(50, 50, 1.0, PRINT),
+        plot_image.AxesPlace(),
     ).result()
     assert order == ["back", "job", "back", "plot"]
 

@@ -88,7 +88,7 @@ def test_the_film_moves(tmp_path):
 
 
 def test_all_pictures_of_a_folder(tmp_path, qapp, monkeypatch):
-    start = shots_states.State("start", lambda window, place: None)
+    start = shots_states.ShotState("start", lambda window, place: None)
     monkeypatch.setattr(shots_states, "STATES", (start,))
     paths = shots.shots(tmp_path / "new" / "folder")
     assert [path.name for path in paths] == ["start.png", "passage.gif"]

@@ -11,7 +11,7 @@ from slideviz.gui.viewport.player import result_parts
 from slideviz.gui.widgets import theme
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.builders import square
 
 
@@ -47,7 +47,7 @@ def test_words_about_inverted_cells_can_be_read(themed, name):
     points = mesh.points.copy()
     points[mesh.points.prod(axis=1).argmax()] = -3.0
     session = changes.open_mesh(
-        Frame(mesh.with_points(points), quality(mesh.with_points(points))), None
+        StepFrame(mesh.with_points(points), quality(mesh.with_points(points))), None
     )
     assert session.frame.quality.inverted
     assert theme.alarm() in result_parts(session)[0][0]

@@ -20,7 +20,7 @@ from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.inspect import cell_info, worst_cells
 from slideviz.session.locate import nearest_boundary
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.session.store import Store
 
 
@@ -28,7 +28,7 @@ def shaken(mesh, size, seed):
     rng = np.random.default_rng(seed)
     points = mesh.points + size * mesh.extent * rng.uniform(-1, 1, mesh.points.shape)
     moved = mesh.with_points(points)
-    return Frame(moved, quality(moved, mesh))
+    return StepFrame(moved, quality(moved, mesh))
 
 
 def with_runs(session):
@@ -42,7 +42,7 @@ def with_runs(session):
 
 def session_with_runs():
     mesh = sample("square", size=12).mesh
-    return with_runs(changes.open_mesh(Frame(mesh, quality(mesh)), None))
+    return with_runs(changes.open_mesh(StepFrame(mesh, quality(mesh)), None))
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from slideviz.session.motions import found_text
 from slideviz.session.opening import guess_by_name, open_mesh
 from slideviz.session.run_messages import in_window_words
 from slideviz.session.runs_table import best
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_guess_for_a_match_goes_with_the_role_of_the_other_side(square):
         replace(m, name={"left": "x_m", "right": "x_p"}.get(m.name, m.name)) for m in square.markers
     )
     mesh = replace(square, markers=markers)
-    session = open_mesh(Frame(mesh, quality(mesh)), None, find_pairs(mesh))
+    session = open_mesh(StepFrame(mesh, quality(mesh)), None, find_pairs(mesh))
     assert session.role("x_m") == session.guesses["x_m"].role == "periodic"
     kept = changes.set_role(session, ("x_p",), "periodic")
     assert "x_m" in kept.guesses
@@ -118,7 +118,7 @@ def test_a_machine_in_a_name_says_less_than_the_rest_of_it(name, role):
 def test_the_best_minimum_is_that_of_a_run_that_ended(session):
     def run(number, low, end):
         quality = replace(session.first.quality, values=np.full(16, low))
-        return Run(number, session.case, (Frame(session.mesh, quality),), end)
+        return Run(number, session.case, (StepFrame(session.mesh, quality),), end)
 
     runs = [run(1, 0.5, "done"), run(2, 0.4, "done"), run(3, 0.9, ""), run(4, 0.8, "cancelled")]
     assert best(runs) == {1}

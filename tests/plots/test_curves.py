@@ -11,7 +11,7 @@ from slideviz.mesh.quality import quality
 from slideviz.plots import curves
 from slideviz.plots.spanwise import along, along_radius
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 def run_of(session, sizes, history=()):
@@ -21,7 +21,7 @@ def run_of(session, sizes, history=()):
         points = session.mesh.points + size * rng.uniform(-1, 1, session.mesh.points.shape)
         mesh = session.mesh.with_points(points)
         step = SimpleNamespace(index=index + 1, history=history, seconds={}, tolerance=0.02)
-        frames.append(Frame(mesh, quality(mesh, session.mesh), step))
+        frames.append(StepFrame(mesh, quality(mesh, session.mesh), step))
     session = changes.add_frames(changes.start_run(session), frames)
     return changes.end_run(session, "done")
 
@@ -106,7 +106,7 @@ def test_a_mesh_without_extent_that_way_is_refused(two_runs):
 def test_the_span_is_the_radius_where_a_mesh_repeats_about_an_axis(session, cube):
     assert curves.natural(session) == "y"
     assert "z" not in curves.coordinates(session)
-    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     assert curves.natural(solid) in ("x", "y", "z")
     assert list(curves.coordinates(solid)) == ["r", "z", "y", "x"]
     turned = replace(solid, pairs=(SimpleNamespace(kind="rotational"),))

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.plots.designs import (
     against_designs,
     design_curves,
@@ -19,10 +19,10 @@ from slideviz.session.design_table import DesignTable
 def table():
     made = DesignTable().crossed("m.angle", ["2", "1", "3"]).crossed("m.y", ["0", "0.5"])
     rows = [
-        Row(n, min=0.1 * n, mean=0.1 * n + 0.2, inverted=int(n == 4), control_nodes=n)
+        DesignRow(n, min=0.1 * n, mean=0.1 * n + 0.2, inverted=int(n == 4), control_nodes=n)
         for n in range(1, 6)
     ]
-    return made.with_results([*rows, Row(6, problem="no")])
+    return made.with_results([*rows, DesignRow(6, problem="no")])
 
 
 def test_curves_are_ascending_and_leave_out_what_failed(table):
@@ -39,7 +39,7 @@ def test_curves_are_ascending_and_leave_out_what_failed(table):
 
 def test_words_stand_in_their_order():
     table = DesignTable().crossed("SLIDING_MODE", ["ps", "none", "ds"])
-    table = table.with_results(Row(n, min=0.5, mean=0.6) for n in (1, 2, 3))
+    table = table.with_results(DesignRow(n, min=0.5, mean=0.6) for n in (1, 2, 3))
     (curve,) = design_curves(table, "SLIDING_MODE", "quality")
     assert curve.words == ("ps", "none", "ds")
     assert curve.places.tolist() == [0.0, 1.0, 2.0]
@@ -88,7 +88,7 @@ def test_the_nearest_point_is_found(table):
 @pytest.mark.parametrize(("lines", "above"), [(3, True), (12, False)])
 def test_the_legend_is_above_unless_it_would_be_too_high(lines, above):
     table = DesignTable().crossed("a", [str(k) for k in range(lines)]).crossed("m.angle", ["1"])
-    table = table.with_results(Row(n, min=0.5, mean=0.6) for n in range(1, lines + 1))
+    table = table.with_results(DesignRow(n, min=0.5, mean=0.6) for n in range(1, lines + 1))
     figure = Figure((2.8, 2.5), layout="constrained")
     axes = figure.add_subplot()
     against_designs(axes, design_curves(table, "m.angle", "quality"), "m.angle")
@@ -101,7 +101,7 @@ def test_the_legend_is_above_unless_it_would_be_too_high(lines, above):
 
 def test_many_curves_are_points_of_one_look():
     table = DesignTable().crossed("a", [str(k) for k in range(20)]).crossed("m.angle", ["1", "2"])
-    table = table.with_results(Row(n, min=0.5, mean=0.6) for n in range(1, 41))
+    table = table.with_results(DesignRow(n, min=0.5, mean=0.6) for n in range(1, 41))
     axes, curves = drawn(table)
     assert len(curves) == 20
     assert {line.get_linestyle() for line in axes.lines if "curve" in str(line.get_gid())} == {

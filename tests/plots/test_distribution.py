@@ -12,7 +12,7 @@ from slideviz.plots.draw import ON_DARK, PRINT
 from slideviz.plots.histogram import BAND, draw_distribution
 from slideviz.plots.series import Bars, Distribution, Outline
 from slideviz.plots.session_histogram import BINS, distribution
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def frames(square):
     found = []
     for size in (0.0, 0.25, 0.9):
         mesh = square.with_points(square.points + size * rng.uniform(-1, 1, square.points.shape))
-        found.append(Frame(mesh, quality(mesh, square)))
+        found.append(StepFrame(mesh, quality(mesh, square)))
     return found
 
 

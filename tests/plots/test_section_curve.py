@@ -27,7 +27,7 @@ from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.section_cuts import Cuts
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.builders import cube, square
 
 EYE = {0: np.eye(4)}
@@ -161,8 +161,8 @@ def test_what_is_looked_at_is_solid_and_the_limits_hold_all():
 @pytest.fixture
 def session(mesh):
     base = square(8)
-    session = changes.open_mesh(Frame(base, quality(base)), None)
-    frames = [Frame(mesh, quality(mesh, base))]
+    session = changes.open_mesh(StepFrame(base, quality(base)), None)
+    frames = [StepFrame(mesh, quality(mesh, base))]
     return changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
 
 

@@ -8,22 +8,22 @@ from matplotlib.figure import Figure
 from slideviz.case.model import Case, Rotate, Translate
 from slideviz.mesh.quality import quality
 from slideviz.plots.draw import ON_LIGHT
-from slideviz.plots.session_histogram import MOST, Counts, compared, draw_histogram
+from slideviz.plots.session_histogram import MOST, FrameCounts, compared, draw_histogram
 from slideviz.session import changes
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture(scope="module")
 def many(square):
     """Seven runs of two motions by turns, the last of which is shown."""
-    session = changes.open_mesh(Frame(square, quality(square)), None)
+    session = changes.open_mesh(StepFrame(square, quality(square)), None)
     roles = {"bottom": "moving"}
     motions = (Rotate("bottom", 1.0), Translate("bottom", (0.1, 0.0)))
     runs = tuple(
         Run(
             number,
             Case(roles=roles, motions=(motions[number % 2],)),
-            (Frame(square, quality(square)),),
+            (StepFrame(square, quality(square)),),
             "done",
         )
         for number in range(1, 8)
@@ -56,7 +56,7 @@ def test_few_runs_are_all_compared_and_unfinished_ones_not(many):
 def legend(session, **view):
     figure = Figure()
     session = changes.set_view(session, **view)
-    draw_histogram(Counts(), session, figure, ON_LIGHT, log=True, whole=False)
+    draw_histogram(FrameCounts(), session, figure, ON_LIGHT, log=True, whole=False)
     return figure.axes[0].get_legend()
 
 

@@ -13,8 +13,7 @@ from slideviz.rbf.classify import _Around, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct, correction_of
-from slideviz.rbf.problem import Problem
-from slideviz.rbf.problem import Reduction as Settings
+from slideviz.rbf.problem import GreedySettings, Problem
 from slideviz.rbf.selection import TIE, favour
 from slideviz.samples.table import sample
 from tests import builders
@@ -105,7 +104,7 @@ def problem_of(points, same_as=None, shift=(0.0, 0.0)):
         cartesian=lambda coords: coords,
         coords=points,
         shift=np.array(shift),
-        reduction=Settings(1.0, gamma=4.0),
+        reduction=GreedySettings(1.0, gamma=4.0),
     )
 
 

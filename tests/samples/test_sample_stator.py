@@ -12,7 +12,7 @@ from slideviz.case.motion import displacements
 from slideviz.errors import CaseError
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.periodic import pair_up
-from slideviz.samples.blade import Section, Shares, blade_nodes, counts
+from slideviz.samples.blade import BladeSection, Shares, blade_nodes, counts
 from slideviz.samples.passage import make_grid, smoothed, straight_points
 from slideviz.samples.refined import refined
 from slideviz.samples.stator import stator_mesh
@@ -159,7 +159,7 @@ def test_plain_interpolation_cannot_follow(tmp_path):
 
 def test_refined_grid_keeps_the_places_of_the_coarse_one():
     shares = Shares(nose=0.5, tail=0.15)
-    section = Section(pitch=0.9)
+    section = BladeSection(pitch=0.9)
     coarse, fine = (make_grid(counts(size, shares)) for size in (18, 36))
     start = smoothed(coarse, straight_points(coarse, section))
     found = refined(coarse, start, fine, section)

@@ -8,7 +8,7 @@ from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def scene():
 
 def test_a_boundary_that_stays_in_its_surface_is_drawn_whole(scene, cube):
     names = cube.marker_names
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, names, "fixed")
     scene.open(session, find_surfaces(cube))
     scene.look_from("iso")
@@ -61,7 +61,7 @@ def side_of(cube, normal):
 
 def test_a_boundary_that_slides_in_its_surface_keeps_its_colour_within_the_rim(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     session = changes.set_view(session, edges=False, legend=False, triad=False)
     scene.open(session, find_surfaces(cube))
@@ -83,7 +83,7 @@ def test_a_boundary_that_slides_in_its_surface_keeps_its_colour_within_the_rim(s
 
 def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     scene.open(session, find_surfaces(cube))
     before = image(scene)
@@ -91,7 +91,7 @@ def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
     scene.update(session)
     assert np.array_equal(image(scene), before)
     moved = cube.with_points(cube.points * (1.0, 1.0, 1.5))
-    session = changes.add_frames(changes.start_run(session), [Frame(moved, quality(moved))])
+    session = changes.add_frames(changes.start_run(session), [StepFrame(moved, quality(moved))])
     scene.update(session)
     assert scene.plotter.actors[f"undeformed:{top}"].visibility
     scene.update(changes.show_frame(session, 0))
@@ -100,13 +100,13 @@ def test_the_undeformed_mesh_has_no_ghost_of_itself(scene, cube):
 
 def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     scene.open(session, find_surfaces(cube))
     scene.set_motion_ghosts({top: slid(cube, top)})
     ghost = scene.plotter.actors[f"motion:{top}"]
     assert ghost.visibility
-    frames = [Frame(cube, quality(cube))]
+    frames = [StepFrame(cube, quality(cube))]
     session = changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
     session = changes.show_beside(session, changes.UNDEFORMED)
     for state in (changes.seen_beside(session), changes.show_frame(session, 0)):
@@ -122,7 +122,7 @@ def test_beside_a_run_the_undeformed_mesh_has_no_motion_ghost(scene, cube):
 def moving_top(cube, scene):
     """A session whose upper side moves, opened in the scene and seen from above."""
     top = side_of(cube, (0, 0, 1))
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, (top,), "moving")
     session = changes.set_view(session, edges=False, legend=False, triad=False)
     scene.open(session, find_surfaces(cube))
@@ -130,7 +130,7 @@ def moving_top(cube, scene):
 
 
 def ran_to(session, *meshes):
-    frames = [Frame(mesh, quality(mesh)) for mesh in meshes]
+    frames = [StepFrame(mesh, quality(mesh)) for mesh in meshes]
     return changes.end_run(changes.add_frames(changes.start_run(session), frames), "done")
 
 

@@ -10,7 +10,7 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def stator():
 
 def opened(plotter, made):
     scene = Scene(plotter)
-    session = changes.open_mesh(Frame(made.mesh, quality(made.mesh)), None, (), made.case)
+    session = changes.open_mesh(StepFrame(made.mesh, quality(made.mesh)), None, (), made.case)
     surfaces = find_surfaces(made.mesh)
     scene.open(session, surfaces)
     return scene, session, {surface.name: surface for surface in surfaces}
@@ -50,7 +50,7 @@ def test_a_marked_cell_moves_after_garbage_was_collected(plotter, stator):
     gc.collect()
     mesh = stator.mesh.with_points(stator.mesh.points + 0.01)
     run = changes.end_run(
-        changes.add_frames(changes.start_run(marked), [Frame(mesh, quality(mesh))]), "done"
+        changes.add_frames(changes.start_run(marked), [StepFrame(mesh, quality(mesh))]), "done"
     )
     scene.update(run)
     corners = mesh.points[mesh.cells.connectivity[17 * 8 : 18 * 8]]

@@ -24,7 +24,7 @@ from slideviz.scene.pick import to_display
 from slideviz.scene.threshold import ThresholdLayer
 from slideviz.session import changes
 from slideviz.session.inspect import middles
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES, ROLES
 
 LEFT = np.array([-0.004, 0.0])
@@ -46,7 +46,7 @@ def stator():
 
 
 def opened(scene, one, **view):
-    session = changes.open_mesh(Frame(one.mesh, quality(one.mesh)), None, (), one.case)
+    session = changes.open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
     session = changes.set_view(session, **view)
     scene.open(session, find_surfaces(one.mesh))
     return session
@@ -75,7 +75,7 @@ def has(colours, wanted, within=45, least=1):
 def deformed(session, shift):
     """Return the session at a step in which all points have moved by ``shift``."""
     mesh = session.mesh.with_points(session.mesh.points + shift)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     return changes.add_frames(changes.start_run(session), [frame])
 
 
@@ -131,7 +131,7 @@ def test_the_legend_names_the_points(scene, row):
 
 
 def test_neighbours_of_a_row_are_drawn_one_pitch_away(scene, row):
-    pitch = Period().of(changes.open_mesh(Frame(row.mesh, quality(row.mesh)), None)).vector
+    pitch = Period().of(changes.open_mesh(StepFrame(row.mesh, quality(row.mesh)), None)).vector
     nodes = row.mesh.marker("BLADE").nodes
     at = row.mesh.points[nodes[len(nodes) // 3]]
     session = opened(scene, row, passages=1, edges=False, triad=False)
@@ -252,7 +252,7 @@ def test_a_mesh_that_does_not_repeat_has_no_neighbours(scene, session):
 
 
 def test_periodic_boundaries_that_do_not_match_have_no_neighbours(row):
-    session = changes.open_mesh(Frame(row.mesh, quality(row.mesh)), None, (), row.case)
+    session = changes.open_mesh(StepFrame(row.mesh, quality(row.mesh)), None, (), row.case)
     assert Period().of(session) is not None
     wrong = changes.set_role(session, ("INFLOW", "BLADE"), "periodic")
     assert Period().of(wrong) is None
@@ -319,7 +319,7 @@ def boxed():
     low, high = mesh.bounds
     corners = low + CORNERS * (high - low)
     mesh = with_boxes(mesh, [regular_box("B", corners, (2, 2, 1), None)])
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
     name = mesh.marker_names[0]
     session = changes.set_role(changes.set_view(session, ffd=True), [name], "moving")
     return session, changes.add_motion(session, Ffd(name, "B", (1, 1, 1), (0.0, 0.0, 0.5)))
@@ -342,19 +342,21 @@ def test_of_a_box_only_what_moves_is_drawn_again(scene, boxed):
 
 
 def test_the_displacement_has_no_colours_before_a_run(scene, passage):
-    frame = Frame(passage.mesh, quality(passage.mesh))
+    frame = StepFrame(passage.mesh, quality(passage.mesh))
     session = changes.open_mesh(frame, None, (), passage.case)
     scene.open(session, find_surfaces(passage.mesh))
     session = changes.set_view(session, colour_by="displacement")
     scene.update(session)
     assert not scene._cells.actor.mapper.scalar_visibility
-    moved = Frame(passage.mesh.with_points(passage.mesh.points + 0.1), frame.quality)
+    moved = StepFrame(passage.mesh.with_points(passage.mesh.points + 0.1), frame.quality)
     scene.update(changes.add_frames(changes.start_run(session), [moved]))
     assert scene._cells.actor.mapper.scalar_visibility
 
 
 def test_some_boundaries_fill_the_view(scene, passage):
-    session = changes.open_mesh(Frame(passage.mesh, quality(passage.mesh)), None, (), passage.case)
+    session = changes.open_mesh(
+        StepFrame(passage.mesh, quality(passage.mesh)), None, (), passage.case
+    )
     scene.open(session, find_surfaces(passage.mesh))
     whole = scene.plotter.camera.parallel_scale
     scene.fit(("inflow",))

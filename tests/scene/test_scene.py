@@ -12,7 +12,7 @@ from slideviz.scene.mesh import GLASS
 from slideviz.scene.pick import to_display
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import ROLES
 
 
@@ -53,7 +53,7 @@ def test_quality_is_coloured_from_0_to_1_whatever_the_values(scene, session):
     points = session.mesh.points.copy()
     points[12] += 0.45
     mesh = session.mesh.with_points(points)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     session = changes.set_view(opened(scene, session), colour_by="size-skew", edges=False)
     session = changes.add_frames(changes.start_run(session), [frame])
     scene.update(session)
@@ -68,7 +68,7 @@ def test_an_inverted_cell_has_its_own_colour(scene, session):
     points = session.mesh.points.copy()
     points[12] += 3.0
     mesh = session.mesh.with_points(points)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     assert frame.quality.inverted
     session = changes.set_view(opened(scene, session), colour_by="skew", edges=False)
     scene.update(session)
@@ -91,7 +91,7 @@ def test_a_sliver_is_found_by_a_ring_of_the_same_size_at_any_zoom(scene, session
     points = session.mesh.points.copy()
     points[12] = points[6] + [0.5, -0.02]  # of 16 cells, one is hardly inverted
     mesh = session.mesh.with_points(points)
-    frame = Frame(mesh, quality(mesh, session.mesh))
+    frame = StepFrame(mesh, quality(mesh, session.mesh))
     assert frame.quality.inverted
     session = changes.set_view(opened(scene, session), edges=False)
     scene.update(session)
@@ -120,7 +120,7 @@ def test_steps_move_the_points_in_place(scene, session):
     shape = scene.drawn["top"].shape
     mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
     session = changes.add_frames(
-        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+        changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
     scene.update(session)
     assert scene.drawn["top"].shape is shape
@@ -149,7 +149,7 @@ def test_a_click_finds_the_nearest_boundary_of_a_2d_mesh(scene, session):
 
 
 def test_a_click_finds_the_front_boundary_of_a_3d_mesh(scene, cube):
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, session)
     for side, name in (("+x", "RIGHT"), ("-x", "LEFT"), ("+y", "UPPER"), ("-z", "FRONT")):
         scene.look_from(side)
@@ -189,7 +189,7 @@ def test_the_undeformed_ghost_stays_where_the_boundary_was(scene, session):
     session = opened(scene, changes.set_role(session, ("top",), "moving"))
     mesh = session.mesh.with_points(session.mesh.points * [1.0, 0.5])
     session = changes.add_frames(
-        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+        changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
     scene.update(session)
     plain = pixel(scene, (2.0, 4.0, 0.0))
@@ -225,7 +225,7 @@ def test_zooming_keeps_the_point_under_the_mouse(scene, session):
 def test_perspective_is_for_3d_only(scene, session, cube):
     opened(scene, changes.set_view(session, perspective=True))
     assert scene.plotter.camera.parallel_projection
-    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, solid)
     assert scene.plotter.camera.parallel_projection
     scene.update(changes.set_view(solid, perspective=True))
@@ -271,7 +271,7 @@ def test_the_title_of_the_bar_keeps_away_from_the_edge_in_a_view_of_any_size(sce
 
 def test_another_mesh_replaces_all_actors(scene, session, cube):
     opened(scene, session)
-    opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
     assert set(scene.drawn) == set(cube.marker_names)
     assert "marker:left" not in scene.plotter.actors
     scene.clear()
@@ -289,7 +289,7 @@ def test_a_3d_mesh_without_boundaries_shows_its_outside(scene, cube):
     from dataclasses import replace
 
     bare = replace(cube, markers=())
-    scene.open(changes.open_mesh(Frame(bare, quality(bare)), None), find_surfaces(bare))
+    scene.open(changes.open_mesh(StepFrame(bare, quality(bare)), None), find_surfaces(bare))
     picture = image(scene)
     assert np.abs(picture[150, 160] - picture[-3, 3]).max() > 10
 
@@ -347,7 +347,7 @@ def legend_actors(plotter):
 
 @pytest.mark.parametrize("by", ["role", "size-skew"])
 def test_in_a_view_of_another_size_the_same_legend_is_where_a_new_one_would_be(cube, by):
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_view(session, colour_by=by, points="types")
     pictures = []
     for first, last in (((300, 260), (500, 420)), ((500, 420), (500, 420))):
@@ -384,7 +384,7 @@ def test_the_displacement_is_coloured_from_0_to_the_largest_of_all_runs(scene, s
         points = session.mesh.points.copy()
         points[session.mesh.points[:, 1] > 3.5, 1] += shift
         mesh = session.mesh.with_points(points)
-        frame = Frame(mesh, quality(mesh, session.mesh))
+        frame = StepFrame(mesh, quality(mesh, session.mesh))
         session = changes.add_frames(changes.start_run(session), [frame])
     assert session.colour_range == (0.0, 1.0)
     session = changes.set_view(session, colour_by="displacement", edges=False)
@@ -411,7 +411,7 @@ def test_a_camera_comes_back(scene, session):
 
 @pytest.mark.parametrize("perspective", [False, True])
 def test_a_view_that_was_kept_is_not_cut_in_a_narrower_one(scene, session, cube, perspective):
-    solid = changes.open_mesh(Frame(cube, quality(cube)), None)
+    solid = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     opened(scene, changes.set_view(solid, perspective=True) if perspective else session)
     view, width = scene.camera.view, scene.plotter.window_size[0]
     scene.plotter.window_size = [260, scene.plotter.window_size[1]]
@@ -430,7 +430,7 @@ def culling(scene):
 
 
 def test_faces_that_look_away_are_left_out_and_nobody_sees_it(scene, cube):
-    session = opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    session = opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
     for side in ("iso", "+x", "-z"):
         scene.look_from(side)
         assert culling(scene) == {"back"}
@@ -450,7 +450,7 @@ def test_faces_that_look_away_are_left_out_and_nobody_sees_it(scene, cube):
     ],
 )
 def test_where_the_inside_can_be_seen_all_faces_are_drawn(scene, cube, view):
-    session = opened(scene, changes.open_mesh(Frame(cube, quality(cube)), None))
+    session = opened(scene, changes.open_mesh(StepFrame(cube, quality(cube)), None))
     assert culling(scene) == {"back"}
     scene.update(changes.set_view(session, **view))
     assert culling(scene) == {"none"}
@@ -464,14 +464,14 @@ def test_boundaries_with_a_hole_show_their_inside(scene, cube):
     for gone in ("FRONT", "BLOCK"):
         left = replace(cube, markers=tuple(m for m in cube.markers if m.name != gone))
         assert is_closed(find_surfaces(left)) == (gone == "BLOCK"), gone
-    opened(scene, changes.open_mesh(Frame(left, quality(left)), None))
+    opened(scene, changes.open_mesh(StepFrame(left, quality(left)), None))
     holed = replace(cube, markers=tuple(m for m in cube.markers if m.name != "FRONT"))
-    opened(scene, changes.open_mesh(Frame(holed, quality(holed)), None))
+    opened(scene, changes.open_mesh(StepFrame(holed, quality(holed)), None))
     assert culling(scene) == {"none"}
 
 
 def test_a_moving_boundary_inside_is_seen_and_clicked_through_those_around_it(scene, cube):
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     session = changes.set_role(session, ("BLOCK",), "fixed")
     opened(scene, session)
     scene.look_from("+x")
@@ -515,7 +515,7 @@ def test_what_highlights_a_boundary_is_made_when_it_is_selected_and_moves_with_i
     band = scene.plotter.actors["selected:top"]
     assert band.visibility
     mesh = session.mesh.with_points(session.mesh.points + np.array([0.0, 1.0]))
-    moved = changes.add_frames(changes.start_run(chosen), [Frame(mesh, quality(mesh))])
+    moved = changes.add_frames(changes.start_run(chosen), [StepFrame(mesh, quality(mesh))])
     scene.update(changes.show_frame(moved, 1))
     assert np.asarray(band.mapper.dataset.points)[:, 1].min() == 5.0
     scene.update(changes.select(moved, ()))

@@ -19,7 +19,7 @@ from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
 from slideviz.session.inspect import nodes_of
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def scene():
 @pytest.fixture(scope="module")
 def bent(cube):
     """A session of the cube with one step that shakes every node inside, at it, by quality."""
-    session = changes.open_mesh(Frame(cube, quality(cube)), None)
+    session = changes.open_mesh(StepFrame(cube, quality(cube)), None)
     return stepped(session, 0.02)
 
 
@@ -44,7 +44,7 @@ def stepped(session, *sizes):
     frames = []
     for size in sizes:
         moved = mesh.with_points(mesh.points + size * mesh.extent * shake)
-        frames.append(Frame(moved, quality(moved, mesh)))
+        frames.append(StepFrame(moved, quality(moved, mesh)))
     session = changes.add_frames(changes.start_run(session), frames)
     return changes.set_view(session, colour_by="size-skew", motion_ghost=False)
 
@@ -135,7 +135,7 @@ def test_the_range_is_that_of_what_the_view_is_coloured_by(scene, bent):
 
 
 def test_chosen_cells_follow_the_step(scene, cube):
-    session = stepped(changes.open_mesh(Frame(cube, quality(cube)), None), 0.01, 0.02)
+    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.01, 0.02)
     session = opened(scene, changes.set_view(session, threshold=(0.0, 0.8)))
     for frame in (2, 1, 2):
         session = changes.show_frame(session, frame)
@@ -152,7 +152,7 @@ def test_chosen_cells_follow_the_step(scene, cube):
 
 
 def test_inverted_cells_alone_can_be_chosen(scene, cube):
-    session = stepped(changes.open_mesh(Frame(cube, quality(cube)), None), 0.12)
+    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
     assert session.frame.quality.inverted
     session = opened(scene, changes.set_view(session, threshold=ONLY_INVERTED))
     assert len(scene._threshold.cells) == session.frame.quality.inverted
@@ -164,7 +164,7 @@ def test_rings_are_at_all_inverted_cells_or_at_those_that_sections_cut(scene, cu
         actor = scene.plotter.actors.get("points:inverted")
         return 0 if actor is None else actor.mapper.dataset.n_points
 
-    session = stepped(changes.open_mesh(Frame(cube, quality(cube)), None), 0.12)
+    session = stepped(changes.open_mesh(StepFrame(cube, quality(cube)), None), 0.12)
     session = opened(scene, session)
     inverted = session.frame.quality.inverted
     assert rings() == inverted
@@ -190,7 +190,7 @@ def test_2d_the_other_cells_vanish(scene, session):
     points[12] += 0.4
     mesh = session.mesh.with_points(points)
     session = changes.add_frames(
-        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+        changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
     session = opened(scene, changes.set_view(session, colour_by="size-skew", edges=True))
     whole = image(scene)
@@ -246,7 +246,7 @@ def test_a_marked_cell_is_outlined_and_followed(scene, session):
     points[12] += 0.4
     mesh = session.mesh.with_points(points)
     session = changes.add_frames(
-        changes.start_run(session), [Frame(mesh, quality(mesh, session.mesh))]
+        changes.start_run(session), [StepFrame(mesh, quality(mesh, session.mesh))]
     )
     session = opened(scene, session)
     assert count(image(scene), SELECTED_COLOUR) == 0

@@ -23,7 +23,7 @@ from slideviz.sections.model import Section
 from slideviz.session import changes
 from slideviz.session.passages import keeps, passages
 from slideviz.session.section_start import first_section, span, turned
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.builders import cube, grid, ring, square
 from tests.sections.test_section import KINDS, areas, shaken
 
@@ -244,7 +244,7 @@ def test_an_angle_that_makes_no_cone_is_told(angle, words):
 
 
 def session_of(mesh):
-    return changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 @pytest.mark.parametrize("extent", [(0.5, 1.0, 1.0), (0.25, 0.325, 0.1), (0.0, 1.0, 1.0)])

@@ -11,14 +11,16 @@ from slideviz.deformation.solver import deform
 from slideviz.mesh.model import Cells, Marker, Mesh
 from slideviz.mesh.quality import INVERTED, quality
 from slideviz.session.run_messages import ended, exact_cost, help_for, inverted_words
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture(scope="module")
 def run(passage):
     """One of two steps."""
     case = passage.case.change(sliding="none", periodic="none", steps=2)
-    frames = [Frame(s.mesh, quality(s.mesh, passage.mesh), s) for s in deform(case, passage.mesh)]
+    frames = [
+        StepFrame(s.mesh, quality(s.mesh, passage.mesh), s) for s in deform(case, passage.mesh)
+    ]
     return Run(1, case, tuple(frames), "done")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import slideviz as sv
 from slideviz.design import sweep as sweeping
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.session import design_table
@@ -67,7 +67,7 @@ def test_numbers_are_combined(monkeypatch):
 
 def test_results_stay_with_their_designs():
     table = DesignTable().crossed("a", ["1", "2", "3"])
-    table = table.with_results(Row(n, min=n / 10) for n in (1, 2, 3))
+    table = table.with_results(DesignRow(n, min=n / 10) for n in (1, 2, 3))
     assert set(table.with_cell(1, 0, " 9 ").results) == {1, 3}
     assert table.with_cell(1, 0, " 9 ").rows[1] == ("9",)
     left = table.without([0])
@@ -112,7 +112,7 @@ def test_files(passage, tmp_path):
     file.write_text("airfoil.translate.y,STEPS\n0.1234567890123456,2\n-1e-9,\n")
     table = read_table(passage.case, file)
     assert table.rows == (("0.1234567890123456", "2"), ("-1e-09", ""))
-    table = table.with_results([Row(2, min=0.25, mean=0.5, steps=5)])
+    table = table.with_results([DesignRow(2, min=0.25, mean=0.5, steps=5)])
     write_results(tmp_path / "out.csv", table)
     with (tmp_path / "out.csv").open(newline="") as found:
         first, second = csv.DictReader(found)
@@ -123,10 +123,10 @@ def test_files(passage, tmp_path):
 def test_only_what_has_no_result_is_run(passage, monkeypatch):
     made = staticmethod(lambda _cls, *_: ThreadPoolExecutor(1))  # processes take seconds to start
     monkeypatch.setattr(sweeping, "Processes", type("Thread", (), {"__new__": made}))
-    table = DesignTable().crossed("STEPS", ["1", "2", "3"]).with_results([Row(2, min=0.5)])
+    table = DesignTable().crossed("STEPS", ["1", "2", "3"]).with_results([DesignRow(2, min=0.5)])
     told = []
     run_designs(passage.case, passage.mesh, table, told.append, lambda: False)
-    rows = [one for one in told if isinstance(one, Row)]
+    rows = [one for one in told if isinstance(one, DesignRow)]
     assert sorted((row.design, row.steps) for row in rows) == [(1, 1), (3, 3)]
     news = [one for one in told if isinstance(one, Doing)]
     assert news[-1].fraction == 1.0
@@ -146,7 +146,7 @@ def test_it_can_be_stopped(passage):
 
 def test_another_table_keeps_the_results_of_the_same_designs():
     old = DesignTable(("a", "b"), (("1", "x"), ("2", "x"))).with_results(
-        Row(number, {}, seconds=float(number)) for number in (1, 2)
+        DesignRow(number, {}, seconds=float(number)) for number in (1, 2)
     )
     other = DesignTable(("b", "a"), (("y", "1"), ("x", "2"))).keeping(old)
     assert {number: (row.design, row.seconds) for number, row in other.results.items()} == {

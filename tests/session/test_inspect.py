@@ -10,7 +10,7 @@ from slideviz.mesh.model import Cells, Mesh
 from slideviz.mesh.quality import quality
 from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range
 from slideviz.session import inspect
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 def frame_of(mesh, move):
@@ -18,7 +18,7 @@ def frame_of(mesh, move):
     for node, shift in move.items():
         points[node] += shift
     moved = mesh.with_points(points)
-    return Frame(moved, quality(moved, mesh))
+    return StepFrame(moved, quality(moved, mesh))
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_a_cell_tells_its_qualities_and_corner_jacobians(frames):
 def test_the_jacobians_of_a_cell_numbered_the_other_way_round_are_positive(square):
     nodes = square.cells.connectivity.reshape(-1, 4)[:, ::-1]
     other = Mesh(square.points, Cells.from_blocks([(9, nodes)]))
-    info = inspect.cell_info(Frame(other, quality(other)), 3)
+    info = inspect.cell_info(StepFrame(other, quality(other)), 3)
     assert info.jacobians == pytest.approx([1.0] * 4)
 
 

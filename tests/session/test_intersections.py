@@ -7,7 +7,7 @@ from slideviz.case.model import Case, FromFile, Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.intersections import find_intersection, intersection_key, set_intersection
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 def look(case, mesh, stopped=False):
@@ -98,7 +98,7 @@ def test_what_goes_through_itself_is_told_and_may_run(passage, tmp_path):
     text, folding = find_intersection(case, mesh, lambda _: None, lambda: False)
     assert text == ""
     assert folding.startswith("airfoil goes through itself near (")
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), case)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), case)
     told = set_intersection(session, (text, folding), intersection_key(session))
     assert told.folding == folding
     assert not changes.run_requirements(told)

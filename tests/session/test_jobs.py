@@ -7,7 +7,7 @@ from slideviz.errors import Cancelled, CaseError, MeshError
 from slideviz.samples.table import write_sample
 from slideviz.session import jobs
 from slideviz.session.motions import Ghosts
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 
 
 def never():
@@ -47,7 +47,7 @@ def test_computing_reports_every_step_with_its_quality(tmp_path):
     case = Case.read(tmp_path / "passage.cfg").change(steps=3)
     mesh, heard = read(case.mesh_file), []
     jobs.compute(case, mesh, heard.append, never)
-    frames = [item for item in heard if isinstance(item, Frame)]
+    frames = [item for item in heard if isinstance(item, StepFrame)]
     assert [frame.step.index for frame in frames] == [1, 2, 3]
     assert frames[-1].quality.min < 1.0
     fractions = [item.fraction for item in heard if isinstance(item, jobs.Doing)]
@@ -60,7 +60,7 @@ def test_automatic_steps_tell_what_is_tried_and_claim_no_fraction(tmp_path):
     case = Case.read(tmp_path / "passage.cfg").change(steps=0)
     heard = []
     jobs.compute(case, read(case.mesh_file), heard.append, never)
-    frames = [item for item in heard if isinstance(item, Frame)]
+    frames = [item for item in heard if isinstance(item, StepFrame)]
     assert len(frames) == frames[-1].step.total
     texts = [item.text for item in heard if isinstance(item, jobs.Doing)]
     assert any(text.startswith("Trying 1 step: step 1, ") for text in texts)
@@ -75,7 +75,7 @@ def test_computing_stops_when_asked_and_keeps_what_was_reported(tmp_path):
     frames = []
 
     def report(item):
-        if isinstance(item, Frame):
+        if isinstance(item, StepFrame):
             frames.append(item)
 
     with pytest.raises(Cancelled, match="as you asked"):

@@ -7,20 +7,20 @@ from slideviz.case.displacement import read_displacements
 from slideviz.case.model import Case
 from slideviz.errors import CaseError
 from slideviz.session import motion_table
-from slideviz.session.motion_table import Rows, table_text, write_table
+from slideviz.session.motion_table import TableRows, table_text, write_table
 
 CASE = Case(roles={"bottom": "moving", "left": "moving", "top": "sliding"})
 
 
 @pytest.fixture
 def rows(square):
-    return Rows.on(square, CASE, "bottom")
+    return TableRows.on(square, CASE, "bottom")
 
 
 def test_it_is_about_the_nodes_of_a_boundary_or_of_all_that_move(square, rows):
     assert rows.nodes.tolist() == [0, 1, 2, 3, 4]
     assert rows.of == "bottom"
-    both = Rows.on(square, CASE, "")
+    both = TableRows.on(square, CASE, "")
     assert both.of == "bottom, left"
     assert both.nodes.tolist() == [0, 1, 2, 3, 4, 5, 10, 15, 20]
 
@@ -42,7 +42,7 @@ def test_it_says_what_is_wrong_and_where(rows):
 
 def test_3d_tables_have_another_column(cube):
     name = cube.marker_names[0]
-    rows = Rows.on(cube, Case(roles={name: "moving"}), name)
+    rows = TableRows.on(cube, Case(roles={name: "moving"}), name)
     assert rows.heading == "node dx dy dz"
     assert rows.check(f"{rows.nodes[0]} 0 0 2").startswith(f"1 of {len(rows.nodes)} nodes")
 

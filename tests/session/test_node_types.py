@@ -12,12 +12,12 @@ from slideviz.mesh.surfaces import find_surfaces
 from slideviz.samples.table import sample
 from slideviz.session import changes
 from slideviz.session.node_types import NOTHING, NodeTypes
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from slideviz.terms import NODE_TYPES
 
 
 def session_of(one, **view):
-    session = changes.open_mesh(Frame(one.mesh, quality(one.mesh)), None, (), one.case)
+    session = changes.open_mesh(StepFrame(one.mesh, quality(one.mesh)), None, (), one.case)
     return changes.set_view(session, **view)
 
 
@@ -58,7 +58,7 @@ def test_types_follow_the_roles_and_those_of_steps_stay_as_they_ran(passage):
     assert len(named(types.of(fixed))["sliding_edge"]) < len(before["sliding_edge"])
     step = next(deform(session.case, passage.mesh))
     ran = changes.add_frames(
-        changes.start_run(session), [Frame(step.mesh, quality(step.mesh), step)]
+        changes.start_run(session), [StepFrame(step.mesh, quality(step.mesh), step)]
     )
     changed = changes.set_role(ran, walls, "fixed")
     assert named(types.of(changed)) == before
@@ -90,7 +90,7 @@ def test_control_nodes_are_those_that_the_step_interpolated_with(passage):
     assert NodeTypes().of(session) is NOTHING
     steps = list(deform(case, passage.mesh))
     session = changes.add_frames(
-        session, [Frame(step.mesh, quality(step.mesh), step) for step in steps]
+        session, [StepFrame(step.mesh, quality(step.mesh), step) for step in steps]
     )
     boundary = np.unique(np.concatenate([marker.nodes for marker in passage.mesh.markers]))
     for index, step in enumerate(steps, start=1):
@@ -117,7 +117,7 @@ def test_the_boundary_is_found_once_for_a_mesh(passage, monkeypatch):
     mesh, found = replace(passage.mesh, name="another"), []
     real = kept.find_boundary
     monkeypatch.setattr(kept, "find_boundary", lambda m: found.append(m) or real(m))
-    session = changes.open_mesh(Frame(mesh, quality(mesh)), None, (), passage.case)
+    session = changes.open_mesh(StepFrame(mesh, quality(mesh)), None, (), passage.case)
     find_surfaces(mesh)
     NodeTypes().of(changes.set_view(session, points="types"))
     for _ in range(2):

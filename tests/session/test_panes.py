@@ -8,13 +8,13 @@ from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes import UNDEFORMED
 from slideviz.session.panes import choices, close_pane, panes, show_in
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture(scope="module")
 def session(passage):
     """Run 1 of two steps, run 2 of four, which is shown at its second."""
-    frame = Frame(passage.mesh, quality(passage.mesh))
+    frame = StepFrame(passage.mesh, quality(passage.mesh))
     made = changes.open_mesh(frame, None, (), passage.case)
     runs = tuple(
         Run(number, passage.case, (frame,) * steps, "done") for number, steps in ((1, 2), (2, 4))

@@ -20,7 +20,7 @@ from slideviz.session.runs_words import (
     seconds_words,
     steps_words,
 )
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 
 
 @pytest.fixture(scope="module")
@@ -30,11 +30,11 @@ def runs(passage):
     second = passage.case.change(
         sliding="ds", periodic="fixed", steps=1, reduction=Reduction(tolerance=1e-2)
     )
-    session = changes.open_mesh(Frame(passage.mesh, quality(passage.mesh)), None, (), first)
+    session = changes.open_mesh(StepFrame(passage.mesh, quality(passage.mesh)), None, (), first)
     for case in (first, second):
         session = changes.start_run(changes.set_case(session, **_settings(case)))
         for step in deform(case, passage.mesh):
-            frame = Frame(step.mesh, quality(step.mesh, passage.mesh), step)
+            frame = StepFrame(step.mesh, quality(step.mesh, passage.mesh), step)
             session = changes.add_frames(session, [frame])
         session = changes.end_run(session, "done")
     return session.runs

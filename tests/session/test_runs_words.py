@@ -13,7 +13,7 @@ from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.panes import choices
 from slideviz.session.runs_words import brief, run_words
-from slideviz.session.state import Frame, Run, Session
+from slideviz.session.state import Run, Session, StepFrame
 
 BASE = Case(roles={"blade": "moving", "in": "sliding"}, motions=(Rotate("blade", 5.0),), steps=3)
 
@@ -145,7 +145,7 @@ def test_a_run_can_have_a_name_of_its_own():
 
 
 def test_the_names_of_views_tell_runs_apart(square):
-    session = changes.open_mesh(Frame(square, quality(square)), None)
+    session = changes.open_mesh(StepFrame(square, quality(square)), None)
     frames = (session.first,)
     runs = (
         Run(1, BASE, frames, "done"),

@@ -9,7 +9,7 @@ from slideviz.mesh.quality import quality
 from slideviz.sections.round_number import round_middle
 from slideviz.session import changes
 from slideviz.session.section_start import first_section
-from slideviz.session.state import Frame
+from slideviz.session.state import StepFrame
 from tests.builders import grid, ring
 
 
@@ -42,7 +42,7 @@ def test_the_middle_is_round_and_between_layers(values, wanted):
 
 
 def session_of(mesh):
-    return changes.open_mesh(Frame(mesh, quality(mesh)), None)
+    return changes.open_mesh(StepFrame(mesh, quality(mesh)), None)
 
 
 def test_sections_start_in_the_middle_of_the_step_that_is_shown():
@@ -61,7 +61,7 @@ def test_sections_start_in_the_middle_of_the_step_that_is_shown():
     # The mesh is twice as large at the step that is shown.
     later = mesh.with_points(2.0 * mesh.points)
     run = changes.start_run(session)
-    run = changes.add_frames(run, [Frame(later, quality(later))])
+    run = changes.add_frames(run, [StepFrame(later, quality(later))])
     shown = changes.set_view(run, frame=1)
     assert shown.frame.mesh is later
     assert first_section("cylinder", shown).radius == pytest.approx(0.575, abs=0.04)

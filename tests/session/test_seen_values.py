@@ -5,7 +5,7 @@ import pytest
 
 from slideviz.mesh.quality import quality
 from slideviz.samples.table import sample
-from slideviz.session.results import Frame, cell_displacement, furthest
+from slideviz.session.results import StepFrame, cell_displacement, furthest
 
 
 @pytest.fixture(scope="module", params=["square", "hexahedron", "cylindrical"])
@@ -28,7 +28,7 @@ def test_displacement_is_the_mean_over_the_nodes(pair):
 @pytest.mark.parametrize("what", ["size-skew", "size", "skew", "displacement"])
 def test_some_cells_have_the_values_they_have_among_all(pair, what):
     mesh, moved = pair
-    frame = Frame(moved, quality(moved, mesh))
+    frame = StepFrame(moved, quality(moved, mesh))
     some = np.array([len(mesh.cells) - 1, 0, 3, 3])
     np.testing.assert_array_equal(
         frame.shown_values(what, mesh, some), frame.shown_values(what, mesh)[some]

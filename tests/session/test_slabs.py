@@ -11,7 +11,7 @@ from slideviz.samples.table import sample
 from slideviz.sections.cut import Cutter
 from slideviz.sections.model import Section
 from slideviz.session import slabs
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.slabs import Groups, keep_slab, read_slab, slab_of
 
 
@@ -62,7 +62,7 @@ def sections(mesh):
 
 def framed(path, moved):
     skin = read_skin(path, None)
-    return Frame(skin, quality(skin), file=moved)
+    return StepFrame(skin, quality(skin), file=moved)
 
 
 @pytest.mark.parametrize("group", [1, 7, 4096])
@@ -88,7 +88,7 @@ def test_the_same_cells_and_polygons_as_in_memory(files, kind, group, monkeypatc
 def test_the_same_values_as_in_memory(files, what):
     mesh, moved, path, file = files
     slab = read_slab(framed(path, file), sections(mesh)[1], lambda _: None, lambda: None)
-    whole = Frame(moved, quality(moved, mesh))
+    whole = StepFrame(moved, quality(moved, mesh))
     np.testing.assert_allclose(
         slab.shown_values(what), whole.shown_values(what, mesh)[slab.mesh.part.cells], rtol=1e-12
     )

@@ -7,7 +7,7 @@ from slideviz.case.model import Case, FromFile, Rotate, Scale, Translate
 from slideviz.case.motion import displacements
 from slideviz.case.motion_words import describe, motion_labels
 from slideviz.session import changes
-from slideviz.session.motion_table import Rows
+from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import Ghosts
 
 PAIR = ("bottom", "left")
@@ -63,7 +63,7 @@ def test_who_has_a_motion_is_not_asked_for_one(session):
 
 def test_the_table_lists_the_nodes_of_all_of_them(square):
     case = Case(roles=roles("bottom", "left", "top"))
-    rows = Rows.on(square, case, PAIR)
+    rows = TableRows.on(square, case, PAIR)
     assert rows.of == "bottom, left"
     every = np.concatenate([square.marker(name).nodes for name in PAIR])
     assert rows.nodes.tolist() == np.unique(every).tolist()

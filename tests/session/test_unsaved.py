@@ -7,14 +7,14 @@ import pytest
 
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
-from slideviz.session.state import Frame, Run
+from slideviz.session.state import Run, StepFrame
 from slideviz.session.unsaved import Unsaved, title_of
 
 
 @pytest.fixture(scope="module")
 def session(passage):
     """Runs 1 and 2 of the case as it was opened; the second is shown."""
-    frame = Frame(passage.mesh, quality(passage.mesh))
+    frame = StepFrame(passage.mesh, quality(passage.mesh))
     opened = changes.open_mesh(frame, None, (), passage.case)
     runs = tuple(Run(number, opened.case, (frame,), "done") for number in (1, 2))
     return replace(opened, runs=runs, shown=2, saved=opened.case)

@@ -9,7 +9,7 @@ from slideviz.mesh.quality import INVERTED, quality
 from slideviz.sections.model import Section
 from slideviz.sections.threshold import ONLY_INVERTED
 from slideviz.session import changes
-from slideviz.session.state import Frame, Session, essence
+from slideviz.session.state import Session, StepFrame, essence
 from slideviz.session.store import Store
 
 
@@ -17,7 +17,7 @@ def moved(session, by=0.25):
     points = session.mesh.points.copy()
     points[12] += by
     mesh = session.mesh.with_points(points)
-    return Frame(mesh, quality(mesh, session.mesh))
+    return StepFrame(mesh, quality(mesh, session.mesh))
 
 
 def test_a_mesh_opens_with_guessed_roles_for_every_boundary(session):
@@ -28,7 +28,7 @@ def test_a_mesh_opens_with_guessed_roles_for_every_boundary(session):
 
 def test_a_case_opens_with_its_roles_and_no_guesses(square):
     case = Case(roles={"left": "sliding"})
-    session = changes.open_mesh(Frame(square, quality(square)), Path("a.su2"), (), case)
+    session = changes.open_mesh(StepFrame(square, quality(square)), Path("a.su2"), (), case)
     assert session.role("left") == "sliding"
     assert session.role("top") == "fixed"
     assert not session.guesses
@@ -215,7 +215,7 @@ def test_fresh_view_keeps_the_taste_but_not_the_boundaries(session):
 
 
 def test_a_mesh_opens_with_automatic_data_reduction_unless_its_case_says_otherwise(square):
-    first = Frame(square, quality(square))
+    first = StepFrame(square, quality(square))
     session = changes.open_mesh(first, None)
     assert session.case.reduction == AUTO
     assert not session.unsaved_case
@@ -233,7 +233,7 @@ def test_store_tells_nobody_when_nothing_changed(session):
 
 
 def test_the_undeformed_mesh_can_be_shown_beside_a_run(session):
-    frame = Frame(session.mesh.with_points(session.mesh.points * 2.0), session.first.quality)
+    frame = StepFrame(session.mesh.with_points(session.mesh.points * 2.0), session.first.quality)
     ran = changes.add_frames(changes.start_run(session), [frame, frame])
     both = changes.show_beside(ran, changes.UNDEFORMED)
     assert both.view.beside == changes.UNDEFORMED
@@ -310,10 +310,13 @@ def test_the_section_that_is_chosen_and_its_handle_are_undone_with_the_rest(sess
 def test_a_mesh_opens_with_the_section_chosen_that_lies_flat(square):
     sections = (("plane", (1.0, 0, 0, 0.5, 0, 0), False, flat, True) for flat in (False, True))
     case = Case(view={"VIEW_SECTIONS": tuple(sections)})
-    session = changes.open_mesh(Frame(square, quality(square)), None, (), case)
+    session = changes.open_mesh(StepFrame(square, quality(square)), None, (), case)
     assert (session.view.section_index, session.view.handle) == (1, False)
     case = Case(view={"VIEW_SECTIONS": (("plane", (1.0, 0, 0, 0.5, 0, 0), False, False, True),)})
-    assert changes.open_mesh(Frame(square, quality(square)), None, (), case).view.section_index == 0
+    assert (
+        changes.open_mesh(StepFrame(square, quality(square)), None, (), case).view.section_index
+        == 0
+    )
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from slideviz.case.model import Translate
 from slideviz.mesh.quality import quality
 from slideviz.session import changes
 from slideviz.session.changes_view import UNDO_WORDS
-from slideviz.session.state import Frame, Session, ViewState
+from slideviz.session.state import Session, StepFrame, ViewState
 from slideviz.session.store import TOGETHER_S, Memento, Store
 from slideviz.session.undoable import undo_words
 from slideviz.terms import COLOUR_BY, ROLES, SHOWN
@@ -107,7 +107,7 @@ def test_saving_is_not_undone(store, clock, tmp_path):
 
 def test_another_mesh_cannot_be_undone(store, cube):
     store.change(changes.set_case, steps=4)
-    store.put(changes.open_mesh(Frame(cube, quality(cube)), None))
+    store.put(changes.open_mesh(StepFrame(cube, quality(cube)), None))
     assert not store.can_undo
 
 
@@ -242,7 +242,7 @@ def test_only_the_last_two_removed_runs_are_kept(store, clock):
 def test_another_mesh_forgets_removed_runs(store, cube):
     run_once(store)
     store.change(changes.remove_run, 1)
-    store.put(changes.open_mesh(Frame(cube, quality(cube)), None))
+    store.put(changes.open_mesh(StepFrame(cube, quality(cube)), None))
     assert not store.session.removed
     assert not store.can_undo
 

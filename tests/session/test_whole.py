@@ -9,7 +9,7 @@ from slideviz.mesh.skin import read_skin
 from slideviz.samples.table import sample
 from slideviz.session.inspect import WORST, cell_info, worst_cells
 from slideviz.session.large import frame_of
-from slideviz.session.results import Frame
+from slideviz.session.results import StepFrame
 from slideviz.session.whole import PartQuality, Tallying, measure_all, tally_of
 
 
@@ -69,7 +69,7 @@ def test_the_worst_cells_are_those_of_the_mesh_in_memory(folded):
     now = skin.with_points(moved.points[skin.part.points])
     first = frame_of(skin, skin, folder / "mesh.su2b", tally_of(quality(mesh)), "knupp")
     frame = frame_of(now, skin, folder / "moved.su2b", tally_of(found), "knupp")
-    there = worst_cells([Frame(mesh, quality(mesh)), Frame(moved, found)], 1, "size-skew")
+    there = worst_cells([StepFrame(mesh, quality(mesh)), StepFrame(moved, found)], 1, "size-skew")
     here = worst_cells([first, frame], 1, "skew")
     np.testing.assert_array_equal(here.known_as, there.cells)
     np.testing.assert_array_equal(here.values, there.values)
@@ -80,7 +80,7 @@ def test_the_worst_cells_are_those_of_the_mesh_in_memory(folded):
     assert here.measure == "size-skew"
     for at, cell in zip(here.cells, there.cells, strict=True):
         assert frame.has(int(at))
-        one, other = cell_info(frame, int(at)), cell_info(Frame(moved, found), int(cell))
+        one, other = cell_info(frame, int(at)), cell_info(StepFrame(moved, found), int(cell))
         assert one.cell == other.cell
         assert one.state == other.state
         assert one.size_skew == other.size_skew

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QDialog, QDialogButtonBox, QHBoxLayout, QLabel, QWidg
 
 from slideviz.export.film import filming, posing
 from slideviz.export.offscreen_renderer import OffscreenRenderer
-from slideviz.export.reel import Drawn
+from slideviz.export.reel import FilmProgress
 from slideviz.gui.dialogs.film_form import FilmForm
 from slideviz.gui.responsiveness.piece_runner import PieceRunner, raise_again
 from slideviz.gui.responsiveness.settings import PREVIEW_MS
@@ -123,7 +123,7 @@ class FilmDialog(QDialog):
         self._runner.start(filming(self.renderer, options, file, reel, overwrite=True))
         self._show_filming(True)
 
-    def _came(self, drawn: Drawn) -> None:
+    def _came(self, drawn: FilmProgress) -> None:
         self.bar.setRange(0, drawn.total)
         self.bar.setValue(drawn.done)
         self.words.setText(f"Image {drawn.done} of {drawn.total} of {self._file.name}")

@@ -12,7 +12,7 @@ from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.widgets import questions
 from slideviz.gui.widgets.build import dialog_buttons, in_column, set_style
 from slideviz.gui.widgets.labels import fixed_font
-from slideviz.session.motion_table import Rows, table_text, write_table
+from slideviz.session.motion_table import TableRows, table_text, write_table
 
 FILTERS = "Displacements (*.txt)"
 ABOUT = (
@@ -28,13 +28,13 @@ class TableDialog(QDialog):
     Parameters
     ----------
     parent : QWidget or None
-    rows : Rows
+    rows : TableRows
         What it may list.
     text : str
         The table to begin with.
     """
 
-    def __init__(self, parent: QWidget | None, rows: Rows, text: str = "") -> None:
+    def __init__(self, parent: QWidget | None, rows: TableRows, text: str = "") -> None:
         super().__init__(parent)
         self.rows = rows
         self.setWindowTitle(f"Displacements of {rows.of}")
@@ -92,13 +92,13 @@ class TableDialog(QDialog):
             super().accept()
 
 
-def ask_table(parent: QWidget, rows: Rows, path: Path, default: Path) -> Path | None:
+def ask_table(parent: QWidget, rows: TableRows, path: Path, default: Path) -> Path | None:
     """Return the displacement file that a table was saved in, or None.
 
     Parameters
     ----------
     parent : QWidget
-    rows : Rows
+    rows : TableRows
         What the table may list.
     path : Path
         The file that it begins with, if there is one.

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
 from slideviz.design.sweep_designs import read_designs
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.gui.panels.designs_job import DesignsJob
 from slideviz.gui.panels.designs_plot import DesignPlot
@@ -282,7 +282,7 @@ class DesignsPanel(Panel):
         self.job.start(self.case, self.mesh, table)
         self._sync()
 
-    def _came(self, rows: list[Row]) -> None:
+    def _came(self, rows: list[DesignRow]) -> None:
         if self.mesh is self.store.session.mesh:
             self._put(self.table.with_results(rows))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from qtpy.QtCore import QObject, Signal
 
 from slideviz.case.model import Case
-from slideviz.design.sweep_row import Row
+from slideviz.design.sweep_row import DesignRow
 from slideviz.gui.responsiveness.settings import ROWS_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner
@@ -39,7 +39,7 @@ class DesignsJob(QObject):
     def __init__(self, ended: Callable[[str, bool], None], parent: QObject) -> None:
         super().__init__(parent)
         self._news, self._fraction = "", 0.0
-        self._arrived: list[Row] = []
+        self._arrived: list[DesignRow] = []
         self._ended = ended
         self.runner = JobRunner(self)
         self._soon = later(self, self._take, ROWS_MS)
@@ -58,7 +58,7 @@ class DesignsJob(QObject):
         if not self._soon.isActive():
             self._soon.start()
 
-    def _kept(self, rows: list[Row]) -> None:
+    def _kept(self, rows: list[DesignRow]) -> None:
         self._arrived += rows
         if not self._soon.isActive():
             self._soon.start()

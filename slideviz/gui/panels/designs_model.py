@@ -10,7 +10,7 @@ from typing import Any
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 from qtpy.QtGui import QBrush, QColor
 
-from slideviz.design.sweep_row import NUMBERS, Row
+from slideviz.design.sweep_row import NUMBERS, DesignRow
 from slideviz.gui.widgets.labels import wrapped
 from slideviz.gui.widgets.theme import alarm
 from slideviz.session.design_table import DesignTable
@@ -106,7 +106,7 @@ class DesignsModel(QAbstractTableModel):
         return None
 
     @staticmethod
-    def _text(row: Row, name: str) -> str:
+    def _text(row: DesignRow, name: str) -> str:
         if row.problem:
             return "failed" if name == "min" else "–"
         return format(getattr(row, name), RESULTS[name][1])

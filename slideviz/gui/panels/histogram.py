@@ -21,14 +21,14 @@ from slideviz.gui.widgets.plot_canvas import PlotArea, PlotCanvas, ask_and_write
 from slideviz.gui.widgets.plot_image import Draw
 from slideviz.gui.widgets.theme import alarm
 from slideviz.plots.session_histogram import (
-    Counts,
+    FrameCounts,
     draw_histogram,
     first_value,
     shown_measure,
 )
 from slideviz.sections.threshold import ONLY_INVERTED, cells_in_range, range_words
 from slideviz.session import changes
-from slideviz.session.state import IN_FILE, Frame, Session
+from slideviz.session.state import IN_FILE, Session, StepFrame
 from slideviz.session.store import Store
 
 END_PX = 6
@@ -135,9 +135,9 @@ class HistogramPanel(Panel):
 
     def __init__(self, store: Store) -> None:
         super().__init__(store)
-        self._counts = Counts()
+        self._counts = FrameCounts()
         self._wanted: Range | None = None
-        self._described: Frame | None = None
+        self._described: StepFrame | None = None
         self.canvas = BrushCanvas(self.drawing)
         self.area = PlotArea(self.canvas)
         self.canvas.brushed.connect(self._brushed)
@@ -186,7 +186,7 @@ class HistogramPanel(Panel):
         if not self._soon.isActive():
             self.canvas.show_band(session.view.threshold)
         if session.frame is None:
-            self._counts = Counts()
+            self._counts = FrameCounts()
             self.range_text.hide()
             self.area.say("Open a mesh first: here is how many of its cells have which quality.")
             return

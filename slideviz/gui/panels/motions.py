@@ -27,7 +27,7 @@ from slideviz.gui.widgets.panel import Panel
 from slideviz.gui.widgets.services import folder_of, main_window
 from slideviz.mesh.model import Mesh
 from slideviz.session import changes
-from slideviz.session.motion_table import Rows
+from slideviz.session.motion_table import TableRows
 from slideviz.session.motions import box_names, centroid, machine_axis, new_target, targets
 from slideviz.session.run_messages import Requirement
 from slideviz.session.state import Session
@@ -252,7 +252,7 @@ class MotionPanel(Panel):
         folder = beside.parent if beside is not None else folder_of(self)
         default = folder / f"displacement_{'_'.join(named(marker)) or 'all'}.txt"
         try:
-            rows = Rows.on(mesh, case, marker)
+            rows = TableRows.on(mesh, case, marker)
             return ask_table(self.window(), rows, path, default)
         except SlidevizError as error:
             main_window(self).banner.tell_error(error)

@@ -25,12 +25,12 @@ from slideviz.mesh.model import FloatArray
 from slideviz.scene.axis_handle import drag, dragged_size, frame_of
 from slideviz.scene.marked_cell import IN_FRONT
 from slideviz.scene.pick import to_display
-from slideviz.sections.around_axis import Patch, Place, shape_of
+from slideviz.sections.around_axis import Patch, PlaceOnSection, shape_of
 from slideviz.sections.handles import rounded
 from slideviz.sections.model import Section
 
 
-class RoundHandle(MouseHandle[tuple[Section, Place]]):
+class RoundHandle(MouseHandle[tuple[Section, PlaceOnSection]]):
     """A ball on a section about an axis, by which the mouse changes the size of the section.
 
     It lies on what is cut of the mesh, where that is seen, and in front of everything.
@@ -44,7 +44,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
     def __init__(self, view: View3D, *others: Callable[..., Any]) -> None:
         super().__init__(view, *others)
         self._patch: Patch | None = None
-        self.place: Place | None = None
+        self.place: PlaceOnSection | None = None
         self._drawn = HandleActors(view)
 
     def watched(self) -> tuple[vtkObject, str]:
@@ -80,7 +80,7 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
             # It went from below the mouse, which stayed.
             self._point_at(None)
 
-    def _in_reach(self, patch: Patch) -> Place:
+    def _in_reach(self, patch: Patch) -> PlaceOnSection:
         """Return where the ball lies: in the middle, or beside it in a detail of the view."""
         assert self.section is not None
         places = np.concatenate([np.array([patch.middle]), patch.places])
@@ -108,13 +108,15 @@ class RoundHandle(MouseHandle[tuple[Section, Place]]):
         reach = REACH_PX * self.view.devicePixelRatioF()
         return "ball" if np.linalg.norm(at - self.place_of(where)) <= reach else None
 
-    def grasp(self) -> tuple[Section, Place]:
+    def grasp(self) -> tuple[Section, PlaceOnSection]:
         """Return the section, and the place of the ball."""
         assert self.section is not None
         assert self.place is not None
         return self.section, self.place
 
-    def pulled(self, grasp: tuple[Section, Place], start: FloatArray, end: FloatArray) -> Section:
+    def pulled(
+        self, grasp: tuple[Section, PlaceOnSection], start: FloatArray, end: FloatArray
+    ) -> Section:
         """Return the section with another size."""
         section, place = grasp
         size = dragged_size(self.seen, section, place, start=start, now=end)

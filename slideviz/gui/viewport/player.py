@@ -66,7 +66,7 @@ class Player(QWidget):
         self.step_text = QLabel()
         row.addSpacing(6)
         row.addWidget(self.step_text)
-        self.result = Results()
+        self.result = ResultsLabel()
         row.addWidget(self.result, 4)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._tick)
@@ -208,7 +208,7 @@ SEPARATOR = "&nbsp;· "
 """Between the numbers of a step."""
 
 
-class Results(QLabel):
+class ResultsLabel(QLabel):
     """The label with the numbers of a step, the most important first.
 
     In little room words and numbers are shorter; where even that is too long, the last are left

@@ -27,7 +27,7 @@ Draw = Callable[[Figure, Style], None]
 
 
 @dataclass(frozen=True)
-class Paper:
+class PlotFormat:
     """The size and style of a plot: pixels, pixels per unit of Qt, style."""
 
     width: int
@@ -37,7 +37,7 @@ class Paper:
 
 
 @dataclass(frozen=True)
-class Place:
+class AxesPlace:
     """The place of the axes (left, bottom, width, height), valid while ``key`` is the same."""
 
     key: tuple[object, ...] = ()
@@ -53,18 +53,18 @@ class Picture:
     figure : Figure
     pixels : (height, width, 4) uint8
         Red, green, blue, opacity.
-    place : Place
+    place : AxesPlace
     seconds : float
         How long it took.
     """
 
     figure: Figure = field(default_factory=Figure)
     pixels: np.ndarray = field(default_factory=lambda: np.zeros((1, 1, 4), np.uint8))
-    place: Place = Place()
+    place: AxesPlace = AxesPlace()
     seconds: float = 0.0
 
 
-def picture(draw_on: Draw, paper: Paper, place: Place) -> Picture:
+def picture(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Picture:
     """Return a plot, its axes at the place of the one before if they need no other."""
     began = time.monotonic()
     dpi = DPI * paper.ratio
@@ -78,7 +78,7 @@ def picture(draw_on: Draw, paper: Paper, place: Place) -> Picture:
     return Picture(figure, np.asarray(canvas.buffer_rgba()), place, time.monotonic() - began)
 
 
-def _arrange(figure: Figure, place: Place) -> Place:
+def _arrange(figure: Figure, place: AxesPlace) -> AxesPlace:
     """Place the axes where they were, if nothing that takes room has another size.
 
     To find their place anew takes as long as to draw all of it.
@@ -93,7 +93,7 @@ def _arrange(figure: Figure, place: Place) -> Place:
         engine = figure.get_layout_engine()
         assert engine is not None
         engine.execute(figure)
-        place = Place(key, axes.get_position().bounds)
+        place = AxesPlace(key, axes.get_position().bounds)
     figure.set_layout_engine("none")
     axes.set_position(place.bounds)
     return place
@@ -107,7 +107,7 @@ def _beside(axes: Axes) -> list[str]:
     return [text.get_text() for text in (legend.get_title(), *legend.get_texts())]
 
 
-def draw_beside(draw_on: Draw, paper: Paper, place: Place) -> Future[Picture]:
+def draw_beside(draw_on: Draw, paper: PlotFormat, place: AxesPlace) -> Future[Picture]:
     """Return the future of a plot that is drawn in a thread."""
     coming: Future[Picture] = Future()
 

@@ -51,7 +51,7 @@ class _Block:
     count: int
 
 
-class Series:
+class StepSeries:
     """A VTKHDF file of the steps of a mesh, which grows by `add`."""
 
     def __init__(self, draft: Hdf5Draft, blocks: Sequence[_Block], is_series: bool) -> None:
@@ -125,7 +125,7 @@ class Series:
 
 
 @contextmanager
-def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[Series]:
+def vtkhdf_series(path: Path, mesh: Mesh, replaces: Path | None = None) -> Iterator[StepSeries]:
     """Return a file that steps of a mesh are added to; it is there when the block ends well.
 
     Raises
@@ -152,7 +152,9 @@ def write_vtkhdf(
 
 
 @contextmanager
-def _collection(path: Path, mesh: Mesh, replaces: Path | None, is_series: bool) -> Iterator[Series]:
+def _collection(
+    path: Path, mesh: Mesh, replaces: Path | None, is_series: bool
+) -> Iterator[StepSeries]:
     with hdf5_write(path, replaces) as draft:
         # ParaView shows the assembly in the order in which it was made.
         root = draft.tree.create_group("VTKHDF", track_order=True)
@@ -167,7 +169,7 @@ def _collection(path: Path, mesh: Mesh, replaces: Path | None, is_series: bool) 
             name = _free(_clean(marker.name), taken)
             taken.add(name)
             blocks.append(_add_block(root, tree, name, marker.cells, marker.nodes))
-        series = Series(draft, blocks, is_series)
+        series = StepSeries(draft, blocks, is_series)
         yield series
         series.end()
 

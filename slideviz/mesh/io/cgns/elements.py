@@ -34,7 +34,7 @@ _MIXED = _NAMES.index("MIXED")
 
 
 @dataclass(frozen=True, eq=False)
-class Elements:
+class CgnsElements:
     """Elements of an unstructured zone with their numbers in it, from 1, rising: (m,)."""
 
     cells: Cells
@@ -42,9 +42,9 @@ class Elements:
     section: NDArray[np.int64]
     """Which of the sections each is in, (m,)."""
 
-    def where(self, mask: NDArray[np.bool_]) -> Elements:
+    def where(self, mask: NDArray[np.bool_]) -> CgnsElements:
         """Return those of a mask (m,)."""
-        return Elements(self.cells.take(mask), self.numbers[mask], self.section[mask])
+        return CgnsElements(self.cells.take(mask), self.numbers[mask], self.section[mask])
 
 
 def grid_cells(shape: Sequence[int], points: FloatArray) -> Cells:
@@ -85,7 +85,7 @@ def grid_nodes(along: Sequence[IntArray], shape: Sequence[int]) -> IntArray:
     return found
 
 
-def read_sections(zone: Node, n_points: int) -> tuple[Elements, list[Node]]:
+def read_sections(zone: Node, n_points: int) -> tuple[CgnsElements, list[Node]]:
     """Return the elements of an unstructured zone in the order of their numbers, and its sections.
 
     Raises
@@ -111,7 +111,7 @@ def read_sections(zone: Node, n_points: int) -> tuple[Elements, list[Node]]:
     )
     numbers = [np.arange(start, start + len(part)) for start, part, _ in parts]
     section = np.repeat(np.arange(len(parts)), [len(part) for _, part, _ in parts])
-    return Elements(cells, np.concatenate(numbers), section), [node for *_, node in parts]
+    return CgnsElements(cells, np.concatenate(numbers), section), [node for *_, node in parts]
 
 
 def _section(node: Node, n_points: int) -> tuple[int, Cells]:

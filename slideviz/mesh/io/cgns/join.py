@@ -14,7 +14,7 @@ import numpy as np
 
 from slideviz.mesh.io.cgns.elements import grid_nodes
 from slideviz.mesh.io.cgns.tree import Node
-from slideviz.mesh.io.cgns.zone import Zone, faces_by_number, facets_of
+from slideviz.mesh.io.cgns.zone import CgnsZone, faces_by_number, facets_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
 from slideviz.mesh.topology import components
 
@@ -48,7 +48,7 @@ class Interface:
     period: tuple[float, ...] = ()
     why: str = ""
 
-    def gap(self, zones: Sequence[Zone]) -> float:
+    def gap(self, zones: Sequence[CgnsZone]) -> float:
         """Return the largest distance between nodes that are one."""
         assert self.pairs is not None
         here, there = self.pairs
@@ -67,7 +67,7 @@ class Joined:
     """The connected part that each zone is in."""
 
 
-def join(zones: Sequence[Zone]) -> Joined:
+def join(zones: Sequence[CgnsZone]) -> Joined:
     """Return the zones of a base as one mesh.
 
     A node that several zones have is where the first of them has it.
@@ -108,7 +108,7 @@ def _numbered(labels: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _interfaces(
-    zones: Sequence[Zone], zone: int, names: dict[str, int], tolerance: float
+    zones: Sequence[CgnsZone], zone: int, names: dict[str, int], tolerance: float
 ) -> list[Interface]:
     """Return the interfaces of a zone."""
     found = []
@@ -125,7 +125,7 @@ def _interfaces(
 
 
 def _interface(
-    zones: Sequence[Zone], node: Node, zone: int, donor: int, tolerance: float
+    zones: Sequence[CgnsZone], node: Node, zone: int, donor: int, tolerance: float
 ) -> Interface:
     period = _period(node)
     if period:
@@ -165,7 +165,7 @@ def _period(node: Node) -> tuple[float, ...]:
     return tuple(numbers) if any(moves) else ()
 
 
-def _blocks_meet(zone: Zone, donor: Zone, node: Node) -> tuple[IntArray, IntArray]:
+def _blocks_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, IntArray]:
     """Return the nodes of two structured zones that meet in a range of each.
 
     SIDS, "1-to-1 Interface Connectivity": index2 = T (index1 - begin1) + begin2, where the column
@@ -200,7 +200,7 @@ def _blocks_meet(zone: Zone, donor: Zone, node: Node) -> tuple[IntArray, IntArra
     return here, there
 
 
-def _lists_meet(zone: Zone, donor: Zone, node: Node) -> tuple[IntArray, IntArray]:
+def _lists_meet(zone: CgnsZone, donor: CgnsZone, node: Node) -> tuple[IntArray, IntArray]:
     """Return the nodes of two zones that lists of vertices, or of faces, say to be one."""
     other = node.needed("IndexArray_t", "PointListDonor")
     where = node.word("GridLocation_t", "Vertex", "GridLocation")
@@ -218,7 +218,7 @@ def _lists_meet(zone: Zone, donor: Zone, node: Node) -> tuple[IntArray, IntArray
     return here, there
 
 
-def _vertices(zone: Zone, node: Node) -> IntArray:
+def _vertices(zone: CgnsZone, node: Node) -> IntArray:
     """Return the vertices of an interface, in their order."""
     given = node.child("IndexArray_t", "PointList")
     if given is not None:
@@ -229,7 +229,9 @@ def _vertices(zone: Zone, node: Node) -> IntArray:
     return grid_nodes([np.arange(a - 1, b) for a, b in zip(low, high, strict=True)], zone.shape)
 
 
-def _nearest(zone: Zone, faces: Cells, donor: Zone, others: Cells) -> tuple[IntArray, IntArray]:
+def _nearest(
+    zone: CgnsZone, faces: Cells, donor: CgnsZone, others: Cells
+) -> tuple[IntArray, IntArray]:
     """Return the nodes of faces, and for each the nearest node of other faces."""
     from scipy.spatial import KDTree
 

@@ -18,7 +18,7 @@ from slideviz.mesh.cached_boundary import outer_facets, smooth_parts
 from slideviz.mesh.check import check_mesh, path_error, printable
 from slideviz.mesh.io.cgns.join import Interface, Joined, join
 from slideviz.mesh.io.cgns.tree import Node, cgns_file
-from slideviz.mesh.io.cgns.zone import Zone, conditions, facets_of, read_zone, region_of
+from slideviz.mesh.io.cgns.zone import CgnsZone, conditions, facets_of, read_zone, region_of
 from slideviz.mesh.io.meshio.bridge import flattened, require_own
 from slideviz.mesh.io.meshio.markers import in_node_sets
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
@@ -89,7 +89,7 @@ def _base(root: Node) -> Node:
     )
 
 
-def _mesh(path: Path, base: Node, zones: Sequence[Zone], joined: Joined) -> Mesh:
+def _mesh(path: Path, base: Node, zones: Sequence[CgnsZone], joined: Joined) -> Mesh:
     cells = _renumbered([zone.cells for zone in zones], joined.numbers)
     dim = zones[0].dim
     points = (
@@ -113,7 +113,7 @@ def _renumbered(parts: Sequence[Cells], numbers: Sequence[IntArray]) -> Cells:
 
 
 def _markers(
-    mesh: Mesh, base: Node, zones: Sequence[Zone], joined: Joined
+    mesh: Mesh, base: Node, zones: Sequence[CgnsZone], joined: Joined
 ) -> tuple[tuple[Marker, ...], tuple[str, ...]]:
     """Return the boundaries, and what is odd about them."""
     groups: dict[str, list[Cells]] = {}
@@ -150,7 +150,7 @@ def _markers(
     return tuple(markers), tuple(remarks)
 
 
-def _of_conditions(zone: Zone, nodes: Sequence[Node]) -> list[tuple[Node, Cells]]:
+def _of_conditions(zone: CgnsZone, nodes: Sequence[Node]) -> list[tuple[Node, Cells]]:
     """Return the facets of each boundary condition of a zone.
 
     Of those given by vertices, the smallest gets a facet that is in several.
@@ -171,7 +171,7 @@ def _family(base: Node, node: Node) -> str:
 
 
 def _add_open(
-    groups: dict[str, list[Cells]], remarks: list[str], zones: Sequence[Zone], joined: Joined
+    groups: dict[str, list[Cells]], remarks: list[str], zones: Sequence[CgnsZone], joined: Joined
 ) -> None:
     """Add the facets of open interfaces that are in no boundary condition."""
     known = _together([part for parts in groups.values() for part in parts])

@@ -11,7 +11,7 @@ import numpy as np
 from slideviz.mesh.cached_boundary import outer_facets
 from slideviz.mesh.elements import DIMS
 from slideviz.mesh.io.cgns.elements import (
-    Elements,
+    CgnsElements,
     grid_cells,
     grid_nodes,
     read_sections,
@@ -28,7 +28,7 @@ _LABELS = ("IndexRange_t", "IndexArray_t")
 
 
 @dataclass(frozen=True, eq=False)
-class Zone:
+class CgnsZone:
     """A zone: its vertices, its cells, and where its coordinates are in the file.
 
     Attributes
@@ -41,7 +41,7 @@ class Zone:
         Vertices, i running fastest; p is the number of coordinates.
     cells : Cells
         Its cells.
-    sides : Elements or None
+    sides : CgnsElements or None
         The elements of one dimension less, of an unstructured zone.
     sections : tuple of Node
         Its sections of elements.
@@ -53,7 +53,7 @@ class Zone:
     shape: tuple[int, ...]
     points: FloatArray
     cells: Cells
-    sides: Elements | None
+    sides: CgnsElements | None
     sections: tuple[Node, ...]
     datasets: tuple[str, ...]
 
@@ -78,7 +78,7 @@ class Zone:
         return np.asarray((indices - 1) @ np.cumprod([1, *self.shape[:-1]]), np.int64)
 
 
-def read_zone(node: Node, dim: int, physical: int) -> Zone:
+def read_zone(node: Node, dim: int, physical: int) -> CgnsZone:
     """Return a zone of a base whose cells have dimension ``dim``, with ``physical`` coordinates.
 
     Raises
@@ -101,13 +101,13 @@ def read_zone(node: Node, dim: int, physical: int) -> Zone:
     points, datasets = _points(node, shape, physical)
     if kind == "Structured":
         flat = points[:, :dim]
-        return Zone(node, shape, points, grid_cells(shape, flat), None, (), datasets)
+        return CgnsZone(node, shape, points, grid_cells(shape, flat), None, (), datasets)
     elements, sections = read_sections(node, len(points))
     dims = DIMS[elements.cells.types]
     if not (dims == dim).any():
         raise node.fault(f"has no cells of dimension {dim}; export the mesh with its volume cells")
     cells = elements.cells.take(dims == dim)
-    return Zone(
+    return CgnsZone(
         node, shape, points, cells, elements.where(dims == dim - 1), tuple(sections), datasets
     )
 
@@ -148,7 +148,7 @@ def _points(zone: Node, shape: tuple[int, ...], count: int) -> tuple[FloatArray,
     return np.stack(columns, axis=1), tuple(datasets)
 
 
-def region_of(zone: Zone, node: Node) -> Cells | IntArray:
+def region_of(zone: CgnsZone, node: Node) -> Cells | IntArray:
     """Return what a boundary condition or an interface is on: its facets, or its vertices.
 
     Parameters
@@ -192,7 +192,7 @@ def region_of(zone: Zone, node: Node) -> Cells | IntArray:
     return _range_faces(zone, given, where, np.sort(indices, axis=0))
 
 
-def facets_of(zone: Zone, node: Node) -> Cells:
+def facets_of(zone: CgnsZone, node: Node) -> Cells:
     """Return the facets of a boundary condition or interface, in the zone's numbers."""
     region = region_of(zone, node)
     if isinstance(region, Cells):
@@ -200,7 +200,7 @@ def facets_of(zone: Zone, node: Node) -> Cells:
     return Cells.from_blocks(in_node_sets(len(zone.points), zone.outer, {0: region})[0])
 
 
-def faces_by_number(zone: Zone, node: Node, numbers: IntArray) -> Cells:
+def faces_by_number(zone: CgnsZone, node: Node, numbers: IntArray) -> Cells:
     """Return the facets with these numbers of elements, or of a range of them.
 
     Raises
@@ -227,7 +227,7 @@ def faces_by_number(zone: Zone, node: Node, numbers: IntArray) -> Cells:
     return zone.sides.cells.take(np.isin(zone.sides.numbers, numbers))
 
 
-def _range_faces(zone: Zone, node: Node, where: str, corners: IntArray) -> Cells:
+def _range_faces(zone: CgnsZone, node: Node, where: str, corners: IntArray) -> Cells:
     """Return the faces of a range of indices from 1, (2, d), of a structured zone."""
     low, high = corners
     flat = np.flatnonzero(low == high)
@@ -261,7 +261,7 @@ def _range_faces(zone: Zone, node: Node, where: str, corners: IntArray) -> Cells
     return _faces(zone, axis, grid_nodes(along, zone.shape))
 
 
-def _listed_faces(zone: Zone, node: Node, where: str, indices: IntArray) -> Cells:
+def _listed_faces(zone: CgnsZone, node: Node, where: str, indices: IntArray) -> Cells:
     """Return faces of a structured zone that are listed one by one."""
     if where not in _BY_DIRECTION:
         raise node.fault(
@@ -274,14 +274,14 @@ def _listed_faces(zone: Zone, node: Node, where: str, indices: IntArray) -> Cell
     return _faces(zone, axis, zone.nodes_at(node, indices))
 
 
-def _faces(zone: Zone, axis: int, first: IntArray) -> Cells:
+def _faces(zone: CgnsZone, axis: int, first: IntArray) -> Cells:
     """Return the faces across an axis, from the vertex of each with the lowest indices."""
     steps = np.delete(np.cumprod([1, *zone.shape[:-1]]), axis)
     corners = [0, steps[0]] if zone.dim == 2 else [0, steps[0], steps.sum(), steps[1]]
     return Cells.from_blocks([(3 if zone.dim == 2 else 9, first[:, None] + np.array(corners))])
 
 
-def conditions(zone: Zone) -> Iterator[Node]:
+def conditions(zone: CgnsZone) -> Iterator[Node]:
     """Yield the boundary conditions of a zone."""
     for group in zone.node.children("ZoneBC_t"):
         yield from group.children("BC_t")

@@ -19,7 +19,7 @@ import numpy as np
 from slideviz.mesh.check import check_mesh, first_fault, path_error, printable
 from slideviz.mesh.elements import ELEMENTS
 from slideviz.mesh.io.meshio.calls import formats_of, load, meshio_errors
-from slideviz.mesh.io.meshio.markers import Block, find_markers
+from slideviz.mesh.io.meshio.markers import MeshioBlock, find_markers
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.model import Cells, FloatArray, Mesh
 
@@ -95,7 +95,7 @@ def _mesh(path: Path, data: meshio.Mesh) -> Mesh:
     return mesh
 
 
-def _block(path: Path, name: str, nodes: object, index: int) -> Block:
+def _block(path: Path, name: str, nodes: object, index: int) -> MeshioBlock:
     """Return a block of cells of one type that slideviz knows."""
     if name not in MESHIO_TYPES:
         kind = "has many sides" if name.startswith(("poly", "pixel")) else "is of high order"
@@ -112,7 +112,7 @@ def _block(path: Path, name: str, nodes: object, index: int) -> Block:
             f"the nodes of its {ELEMENTS[vtk].name} cells cannot be understood; export "
             "the mesh again",
         )
-    return Block(index, vtk, table.astype(np.int64))
+    return MeshioBlock(index, vtk, table.astype(np.int64))
 
 
 def _points(path: Path, data: meshio.Mesh, cells: Cells) -> FloatArray:

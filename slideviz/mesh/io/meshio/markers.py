@@ -36,7 +36,7 @@ _ZERO_IS_NONE = ("marker", "gmsh:physical", "cell_tags")
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class MeshioBlock:
     """Elements of one type: where in meshio's list, VTK identifier, nodes (m, n)."""
 
     index: int
@@ -44,7 +44,7 @@ class Block:
     nodes: IntArray
 
 
-def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> tuple[Marker, ...]:
+def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> tuple[Marker, ...]:
     """Return the boundaries of a mesh.
 
     Looked for, in this order: named sets of boundary elements, numbers on boundary elements
@@ -57,7 +57,7 @@ def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> tuple
         Points and cells.
     data : meshio.Mesh
         What meshio read.
-    sides : sequence of Block
+    sides : sequence of MeshioBlock
         Its elements of one dimension less than the mesh.
     """
     groups = _by_cell_sets(data, sides) or _by_tags(mesh, data, sides)
@@ -67,7 +67,7 @@ def find_markers(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> tuple
     return _by_point_sets(mesh, data, facets) or smooth_parts(mesh, facets)
 
 
-def _by_cell_sets(data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
+def _by_cell_sets(data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
     """Return the elements in each named set of cells."""
     groups: Groups = {}
     for name, members in data.cell_sets.items():
@@ -81,7 +81,7 @@ def _by_cell_sets(data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
     return groups
 
 
-def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
+def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[MeshioBlock]) -> Groups:
     """Return the elements with each number of the first cell data that has any."""
     others = [key for key in data.cell_data if key not in _TAGS]
     for key in [*_TAGS, *others]:
@@ -102,7 +102,7 @@ def _by_tags(mesh: Mesh, data: meshio.Mesh, sides: Sequence[Block]) -> Groups:
     return {}
 
 
-def _numbers(data: meshio.Mesh, key: str, sides: Sequence[Block]) -> list[NDArray] | None:
+def _numbers(data: meshio.Mesh, key: str, sides: Sequence[MeshioBlock]) -> list[NDArray] | None:
     """Return the whole numbers on each block of boundary elements, or None."""
     if not sides or key not in data.cell_data:
         return None

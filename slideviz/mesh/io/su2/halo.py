@@ -15,13 +15,13 @@ import numpy as np
 
 from slideviz.mesh.halo import FITS, Halo, RigidMotion, fit_motion, make_halo
 from slideviz.mesh.io.su2.lines import Lines
-from slideviz.mesh.io.su2.zone import SendRows, Zone
+from slideviz.mesh.io.su2.zone import SendRows, TextZone
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 
 HaloAndRemarks = tuple[Halo | None, tuple[str, ...]]
 
 
-def find_halo(lines: Lines, zone: Zone, mesh: Mesh) -> HaloAndRemarks:
+def find_halo(lines: Lines, zone: TextZone, mesh: Mesh) -> HaloAndRemarks:
     """Return the halo that a zone's markers describe, if they do, and what is odd about it."""
     if not zone.sends:
         return None, ()
@@ -112,7 +112,7 @@ def _table(lines: Lines, parts: Sequence[SendRows], count: int) -> IntArray | No
     return table[:, 1:] if table[:, 1].max() < count else None
 
 
-def _transforms(lines: Lines, zone: Zone) -> dict[int, FloatArray]:
+def _transforms(lines: Lines, zone: TextZone) -> dict[int, FloatArray]:
     """Return centre, angles and translation, (3, 3), by PERIODIC_INDEX."""
     found = {}
     for section in zone.kept:

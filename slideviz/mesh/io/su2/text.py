@@ -9,7 +9,7 @@ from slideviz.mesh.io.source import open_source
 from slideviz.mesh.io.su2.lines import Lines, number_of
 from slideviz.mesh.io.su2.scan import Progress, scan
 from slideviz.mesh.io.su2.sections import boxes_elsewhere, find_bounds, find_sections, is_ffd
-from slideviz.mesh.io.su2.zone import Zone, find_zone
+from slideviz.mesh.io.su2.zone import TextZone, find_zone
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +17,7 @@ class Text:
     """One zone of an SU2 text file: its lines, where its parts are, and the boxes of others."""
 
     lines: Lines
-    zone: Zone
+    zone: TextZone
     boxes_elsewhere: dict[str, int]
 
     @property

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.io.su2.lines import ROWS, Lines, Rows, number_of, show
-from slideviz.mesh.io.su2.sections import KNOWN, Bounds, Section, count_of, is_ffd, misspelt
+from slideviz.mesh.io.su2.sections import KNOWN, Bounds, TextSection, count_of, is_ffd, misspelt
 
 SEND_RECEIVE = "SEND_RECEIVE"
 _NAME_IT = "; name the marker"
@@ -25,7 +25,7 @@ class SectionRows:
         self.lines = lines
         self.text_lines = lines.firsts[:-1][lines.kinds != ROWS]
 
-    def none(self, section: Section) -> None:
+    def none(self, section: TextSection) -> None:
         """Raise when a section that should have no numbers has some.
 
         Raises
@@ -41,7 +41,7 @@ class SectionRows:
                 "belong; remove the line or restore the keyword before it",
             )
 
-    def counted(self, section: Section, what: str) -> Rows:
+    def counted(self, section: TextSection, what: str) -> Rows:
         """Return the rows of numbers of a section.
 
         Parameters
@@ -102,7 +102,7 @@ class SendRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Zone:
+class TextZone:
     """Where the parts of one zone stand.
 
     Attributes
@@ -117,7 +117,7 @@ class Zone:
         The boundaries.
     sends : tuple of SendRows
         The ``SEND_RECEIVE`` markers, which tie the nodes of a halo.
-    kept : tuple of Section
+    kept : tuple of TextSection
         The unknown sections.
     """
 
@@ -127,7 +127,7 @@ class Zone:
     points: Rows
     markers: tuple[MarkerRows, ...]
     sends: tuple[SendRows, ...]
-    kept: tuple[Section, ...]
+    kept: tuple[TextSection, ...]
 
     @property
     def ffd_at(self) -> tuple[range, ...]:
@@ -136,7 +136,7 @@ class Zone:
         return tuple(range(part.line, part.stop) for part in boxes)
 
 
-def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
+def find_zone(lines: Lines, sections: list[TextSection], bounds: Bounds) -> TextZone:
     """Return where the parts of a zone stand.
 
     Raises
@@ -155,13 +155,13 @@ def find_zone(lines: Lines, sections: list[Section], bounds: Bounds) -> Zone:
 class _Walk:
     """A walk through the sections of one zone, which notes where its parts stand."""
 
-    def __init__(self, lines: Lines, sections: list[Section], bounds: Bounds) -> None:
+    def __init__(self, lines: Lines, sections: list[TextSection], bounds: Bounds) -> None:
         self.lines = lines
         self.sections = sections
         self.bounds = bounds
         self.rows = SectionRows(lines)
 
-    def zone(self) -> Zone:
+    def zone(self) -> TextZone:
         """Return where the parts stand."""
         heads = {key: self._only(key) for key in ("NDIME", "NELEM", "NPOIN", "NMARK")}
         dim = count_of(self.lines, heads["NDIME"])
@@ -180,7 +180,7 @@ class _Walk:
         self.rows.none(heads["NMARK"])
         markers, sends, kept = self._walk()
         self._check_markers(heads["NMARK"], markers, len(sends))
-        return Zone(
+        return TextZone(
             bounds=self.bounds,
             dim=dim,
             elements=elements,
@@ -190,7 +190,7 @@ class _Walk:
             kept=kept,
         )
 
-    def _only(self, key: str) -> Section:
+    def _only(self, key: str) -> TextSection:
         """Return the section of that key, which must stand once."""
         found = [section for section in self.sections if section.key == key]
         if not found:
@@ -211,7 +211,7 @@ class _Walk:
 
     def _walk(
         self,
-    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[Section, ...]]:
+    ) -> tuple[tuple[MarkerRows, ...], tuple[SendRows, ...], tuple[TextSection, ...]]:
         """Return the boundaries, the SEND_RECEIVE markers and the unknown sections."""
         markers, sends, kept = [], [], []
         at = 0
@@ -236,7 +236,9 @@ class _Walk:
                 kept.append(section)
         return tuple(markers), tuple(sends), tuple(kept)
 
-    def _marker_head(self, tag: Section, at: int, sends: bool) -> tuple[Section, bytes, int]:
+    def _marker_head(
+        self, tag: TextSection, at: int, sends: bool
+    ) -> tuple[TextSection, bytes, int]:
         """Return the MARKER_ELEMS section of a marker, SEND_TO, and the place after them."""
         self.rows.none(tag)
         following = self.sections[at] if at < len(self.sections) else None
@@ -251,11 +253,11 @@ class _Walk:
             # The elements stand after this line, which belongs to the marker.
             self.rows.none(following)
             head = self.sections[at]
-            following = Section(following.key, following.value, head.line, head.stop)
+            following = TextSection(following.key, following.value, head.line, head.stop)
             at, domain = at + 1, head.value
         return following, domain, at
 
-    def _name(self, section: Section) -> str:
+    def _name(self, section: TextSection) -> str:
         try:
             name = section.value.decode()
         except UnicodeDecodeError:
@@ -269,7 +271,9 @@ class _Walk:
             )
         return SEND_RECEIVE if name.upper() == SEND_RECEIVE else name
 
-    def _check_markers(self, head: Section, markers: tuple[MarkerRows, ...], sends: int) -> None:
+    def _check_markers(
+        self, head: TextSection, markers: tuple[MarkerRows, ...], sends: int
+    ) -> None:
         """Raise when names repeat or the count is wrong."""
         seen: dict[str, int] = {}
         for marker in markers:

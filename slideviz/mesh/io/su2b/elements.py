@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slideviz.mesh.elements import DIMS, ELEMENTS, SIZES
-from slideviz.mesh.io.su2b.layout import Elements, Source, ZonePlace
+from slideviz.mesh.io.su2b.layout import BinaryFile, ElementTable, ZonePlace
 from slideviz.mesh.model import IntArray
 
 BLOCK = 1 << 18
@@ -21,7 +21,7 @@ BLOCK = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class ElementBlock:
     """Some elements as they stand in a file: types (k,), nodes one after the other, indices (k,).
 
     ``first`` is the number of the first, and ``ids`` empty where elements have no index.
@@ -34,8 +34,8 @@ class Block:
 
 
 def element_blocks(
-    source: Source, place: ZonePlace, table: Elements, dim: int, size: int = BLOCK
-) -> Iterator[Block]:
+    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, size: int = BLOCK
+) -> Iterator[ElementBlock]:
     """Yield the elements of a table, of dimension ``dim``, so many at a time.
 
     Raises
@@ -50,8 +50,8 @@ def element_blocks(
 
 
 def element_block(
-    source: Source, place: ZonePlace, table: Elements, dim: int, first: int, size: int
-) -> Block:
+    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, first: int, size: int
+) -> ElementBlock:
     """Return the elements of a table from the ``first`` on, at most ``size``.
 
     Raises
@@ -83,7 +83,7 @@ def element_block(
     return block
 
 
-def require_used(source: Source, table: Elements, used: int) -> None:
+def require_used(source: BinaryFile, table: ElementTable, used: int) -> None:
     """Raise where the elements of a table use ``used`` numbers, and its list has more."""
     if used != table.length:
         raise source.error(
@@ -94,8 +94,8 @@ def require_used(source: Source, table: Elements, used: int) -> None:
 
 
 def elements_between(
-    source: Source, place: ZonePlace, table: Elements, dim: int, first: int, count: int
-) -> Block:
+    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, first: int, count: int
+) -> ElementBlock:
     """Return ``count`` elements of a table from the place ``first`` on.
 
     Raises
@@ -117,7 +117,7 @@ def elements_between(
 
 
 def element_at(
-    source: Source, place: ZonePlace, table: Elements, at: int
+    source: BinaryFile, place: ZonePlace, table: ElementTable, at: int
 ) -> tuple[int, IntArray, int]:
     """Return type, nodes (k,) and index of the element at a place of a table of cells."""
     block = elements_between(source, place, table, place.dim, at, 1)
@@ -130,8 +130,13 @@ def _whole_numbers(values: NDArray) -> IntArray:
 
 
 def _taken_apart(
-    source: Source, table: Elements, first: int, begin: int, numbers: IntArray, offsets: IntArray
-) -> Block:
+    source: BinaryFile,
+    table: ElementTable,
+    first: int,
+    begin: int,
+    numbers: IntArray,
+    offsets: IntArray,
+) -> ElementBlock:
     """Return the types, nodes and indices in a part of a list, ``offsets`` counted from there."""
     types = numbers[offsets[:-1]]
     known = (types > 0) & (types < 256)
@@ -163,11 +168,11 @@ def _taken_apart(
         if table.numbered:
             keep[offsets[1:] - 1] = False
         nodes = numbers[keep]
-    return Block(first, types.astype(np.uint8), nodes, ids)
+    return ElementBlock(first, types.astype(np.uint8), nodes, ids)
 
 
 def _check_nodes(
-    source: Source, place: ZonePlace, block: Block, begin: int, offsets: IntArray
+    source: BinaryFile, place: ZonePlace, block: ElementBlock, begin: int, offsets: IntArray
 ) -> None:
     """Raise for the first node of a block that does not exist."""
     wrong = block.nodes.view(np.uint64) >= place.n_points
@@ -185,7 +190,9 @@ def _check_nodes(
     )
 
 
-def _check_dim(source: Source, block: Block, dim: int, begin: int, offsets: IntArray) -> None:
+def _check_dim(
+    source: BinaryFile, block: ElementBlock, dim: int, begin: int, offsets: IntArray
+) -> None:
     """Raise for the first element of a block that has another dimension."""
     wrong = DIMS[block.types] != dim
     if wrong.any():

@@ -32,7 +32,7 @@ MAGIC = {
 
 
 @dataclass(frozen=True)
-class Elements:
+class ElementTable:
     """A table of elements: how many, the first byte of its offsets and of its list.
 
     ``length`` is the number of entries in the list; ``numbered`` tells whether each element ends
@@ -52,7 +52,7 @@ class MarkerPlace:
 
     name: str
     raw: bytes
-    elements: Elements
+    elements: ElementTable
 
 
 @dataclass(frozen=True)
@@ -66,13 +66,13 @@ class ZonePlace:
     begin: int
     end: int
     dim: int
-    cells: Elements
+    cells: ElementTable
     n_points: int
     points: int
     markers: tuple[MarkerPlace, ...]
 
 
-class Source:
+class BinaryFile:
     """An open ``.su2b`` file: reads arrays, and says where a mistake is.
 
     Attributes
@@ -105,7 +105,7 @@ class Source:
         if self.zones < 1:
             raise self.error(_INT, f"the number of zones is {self.zones}, but at least 1 is needed")
 
-    def of(self, file: BinaryIO) -> Source:
+    def of(self, file: BinaryIO) -> BinaryFile:
         """Return the same for another file of the same layout, whose head is not read."""
         other = copy(self)
         other._file, other._lock = file, Lock()
@@ -174,7 +174,7 @@ class Source:
         return int(self.array(at, 1, self.conn, what)[0])
 
 
-def find_zones(source: Source) -> tuple[ZonePlace, ...]:
+def find_zones(source: BinaryFile) -> tuple[ZonePlace, ...]:
     """Return where the zones of a file stand.
 
     Raises
@@ -196,7 +196,7 @@ def find_zones(source: Source) -> tuple[ZonePlace, ...]:
     return tuple(zones)
 
 
-def find_zone(source: Source, number: int | None) -> ZonePlace:
+def find_zone(source: BinaryFile, number: int | None) -> ZonePlace:
     """Return where the zone of that number stands, the first where it is None.
 
     Raises
@@ -213,7 +213,7 @@ def find_zone(source: Source, number: int | None) -> ZonePlace:
     return zones[chosen - 1]
 
 
-def _zone(source: Source, begin: int, number: int) -> ZonePlace:
+def _zone(source: BinaryFile, begin: int, number: int) -> ZonePlace:
     given = source.whole(begin, f"the number of zone {number}")
     if given != number:
         raise source.error(
@@ -242,7 +242,7 @@ def _zone(source: Source, begin: int, number: int) -> ZonePlace:
     return ZonePlace(number, begin, at, dim, cells, n_points, points, tuple(markers.values()))
 
 
-def _marker(source: Source, at: int, dim: int) -> MarkerPlace:
+def _marker(source: BinaryFile, at: int, dim: int) -> MarkerPlace:
     raw = source.array(at, NAME_BYTES, np.uint8, "the name of a marker").tobytes()
     text, end, _ = raw.partition(b"\0")
     try:
@@ -265,7 +265,9 @@ def _marker(source: Source, at: int, dim: int) -> MarkerPlace:
     return MarkerPlace(name, raw, elements)
 
 
-def _elements(source: Source, at: int, what: str, fewest: int, *, numbered: bool) -> Elements:
+def _elements(
+    source: BinaryFile, at: int, what: str, fewest: int, *, numbered: bool
+) -> ElementTable:
     """Return where a table of elements stands, whose smallest ones have ``fewest`` numbers."""
     count = source.count(at, f"the number of {what}")
     offsets = at + source.width
@@ -279,4 +281,4 @@ def _elements(source: Source, at: int, what: str, fewest: int, *, numbered: bool
             f"{count} {what} have a list of {length} numbers, but each needs at least {fewest}; "
             "the file is damaged, so write the mesh again",
         )
-    return Elements(count, offsets, entries, length, numbered)
+    return ElementTable(count, offsets, entries, length, numbered)

@@ -15,7 +15,7 @@ import numpy as np
 from slideviz.mesh.check import first_fault, printable
 from slideviz.mesh.io.su2.scan import Progress
 from slideviz.mesh.io.su2b.elements import BLOCK, element_blocks
-from slideviz.mesh.io.su2b.layout import MAGIC, Elements, Source, ZonePlace, find_zone
+from slideviz.mesh.io.su2b.layout import MAGIC, BinaryFile, ElementTable, ZonePlace, find_zone
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Marker, Mesh, Origin, frozen_array
 
 
@@ -67,7 +67,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
         It cannot be read.
     """
     with path.open("rb") as file:
-        source = Source(path, file)
+        source = BinaryFile(path, file)
         place = find_zone(source, zone)
         whole = place.cells.count + place.n_points + sum(m.elements.count for m in place.markers)
         done = 0
@@ -109,7 +109,7 @@ def read_su2b(path: Path, zone: int | None, progress: Progress) -> Mesh:
 
 
 def point_blocks(
-    source: Source, place: ZonePlace, size: int = BLOCK
+    source: BinaryFile, place: ZonePlace, size: int = BLOCK
 ) -> Iterator[tuple[int, FloatArray]]:
     """Yield the number of a point and the coordinates (k, d) of it and those that follow.
 
@@ -122,7 +122,7 @@ def point_blocks(
         yield first, point_block(source, place, first, size)
 
 
-def point_block(source: Source, place: ZonePlace, first: int, size: int) -> FloatArray:
+def point_block(source: BinaryFile, place: ZonePlace, first: int, size: int) -> FloatArray:
     """Return the coordinates (k, d) of the points from the ``first`` on, at most ``size``.
 
     Raises
@@ -155,7 +155,7 @@ def point_block(source: Source, place: ZonePlace, first: int, size: int) -> Floa
 
 
 def read_elements(
-    source: Source, place: ZonePlace, table: Elements, dim: int, tick: Callable[[int], None]
+    source: BinaryFile, place: ZonePlace, table: ElementTable, dim: int, tick: Callable[[int], None]
 ) -> tuple[Cells, IntArray | None]:
     """Return the elements of a table, and which of them stands at each place of the file.
 
@@ -187,7 +187,7 @@ def read_elements(
     return sorted_back(cells, order), frozen_array(order, np.int64)
 
 
-def _check_order(source: Source, table: Elements, cells: Cells, order: IntArray) -> None:
+def _check_order(source: BinaryFile, table: ElementTable, cells: Cells, order: IntArray) -> None:
     """Raise for the first element whose index is not below their number, or stands twice."""
     inside = order.view(np.uint64) < len(order)
     first = np.full(len(order), len(order))

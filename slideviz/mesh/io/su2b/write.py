@@ -32,7 +32,7 @@ LARGEST_4 = 2**32 - 1
 
 
 @dataclass(frozen=True, eq=False)
-class Zone:
+class ZoneContent:
     """What a zone of a file is written from.
 
     Attributes
@@ -178,7 +178,7 @@ def file_head(zones: int, form: BinaryForm | None = None) -> Iterator[bytes]:
     yield np.array([width, zones], f"{sign}i4").tobytes()
 
 
-def zone_blocks(zone: Zone, number: int, form: BinaryForm | None = None) -> Iterator[bytes]:
+def zone_blocks(zone: ZoneContent, number: int, form: BinaryForm | None = None) -> Iterator[bytes]:
     """Yield one zone of a file, in the width and byte order of ``form``."""
     width, sign = (8, "<") if form is None else (form.width, form.byte_order)
     conn = np.dtype(f"{sign}u{width}")
@@ -257,7 +257,7 @@ def _by_type(cells: Cells) -> IntArray | None:
     return None if (np.diff(ranks) >= 0).all() else np.argsort(ranks, kind="stable")
 
 
-def _zone(mesh: Mesh, order: IntArray | None) -> Zone:
+def _zone(mesh: Mesh, order: IntArray | None) -> ZoneContent:
     """Return what the zone of a mesh is written from."""
     cells = mesh.cells
 
@@ -271,7 +271,7 @@ def _zone(mesh: Mesh, order: IntArray | None) -> Zone:
     def types(i: int, j: int) -> NDArray[np.uint8]:
         return cells.types[i:j] if order is None else cells.types[order[i:j]]
 
-    return Zone(
+    return ZoneContent(
         dim=mesh.dim,
         n_cells=len(cells),
         n_points=len(mesh.points),
