@@ -14,7 +14,7 @@ from slideviz.ffd.box import plane_corners, regular_box
 from slideviz.ffd.section import with_boxes
 from slideviz.mesh.quality import quality
 from slideviz.mesh.surfaces import find_surfaces
-from slideviz.scene.boxes import NAMES
+from slideviz.scene.boxes import BASE, LABELS, MOVED
 from slideviz.scene.scene import Scene
 from slideviz.session import changes
 from slideviz.session.opening import open_mesh
@@ -72,23 +72,23 @@ def test_info_tells_what_is_wrong_with_boxes_and_the_rest(boxed, tmp_path, capsy
 def test_lattices_are_drawn_where_they_are_wanted(boxed, scene):
     session = session_of(boxed)
     scene.open(session, find_surfaces(boxed))
-    assert not set(NAMES) & set(scene.plotter.actors)
+    assert not {BASE, MOVED, LABELS} & set(scene.plotter.actors)
     session = changes.set_view(session, ffd=True)
     scene.update(session)
-    shape = scene.plotter.actors[NAMES[0]].mapper.dataset
+    shape = scene.plotter.actors[BASE].mapper.dataset
     assert (shape.n_points, shape.n_lines) == (4 * 2 + 6 * 3, 4 + 2 * 3 + 2 * 6 + 3 * 5)
-    assert NAMES[1] not in scene.plotter.actors
+    assert MOVED not in scene.plotter.actors
     # A motion takes one of the control points along, and only of its box is another drawn.
     scene.update(changes.add_motion(session, PUSH))
-    moved = scene.plotter.actors[NAMES[1]].mapper.dataset
+    moved = scene.plotter.actors[MOVED].mapper.dataset
     shift = np.asarray(moved.points)[:, :2] - FLAT.points[:, :, 0, :2].reshape(-1, 2)
     assert moved.n_points == 8
     assert np.flatnonzero(shift.any(axis=1)).tolist() == [5]
     assert shift[5] == pytest.approx([0.0, 0.5])
     scene.set_scheme(DARK)
-    assert scene.plotter.actors[NAMES[0]].prop.color.hex_rgb != "#000000"
+    assert scene.plotter.actors[BASE].prop.color.hex_rgb != "#000000"
     scene.update(changes.set_view(session, ffd=False))
-    assert not set(NAMES) & set(scene.plotter.actors)
+    assert not {BASE, MOVED, LABELS} & set(scene.plotter.actors)
 
 
 def test_solid_boxes_are_drawn_in_space(scene):
@@ -98,7 +98,7 @@ def test_solid_boxes_are_drawn_in_space(scene):
     )
     boxed = with_boxes(mesh, [regular_box("CUBE", corners, (2, 1, 1), None)])
     scene.open(changes.set_view(session_of(boxed), ffd=True), find_surfaces(boxed))
-    shape = scene.plotter.actors[NAMES[0]].mapper.dataset
+    shape = scene.plotter.actors[BASE].mapper.dataset
     assert (shape.n_points, shape.n_lines) == (12, 8 + 6 + 6)
 
 
