@@ -113,7 +113,7 @@ def test_a_reason_is_written_once(rows):
     first, second = [row for row in rows if row.result is None]
     assert "not possible [1]: PERIODIC_MODE= moving" in terminal_line(first, told)
     assert terminal_line(second, told).endswith("not possible [1]")
-    other = comparing.Row(second.combination, problem="out of memory")
+    other = comparing.CombinationRow(second.combination, problem="out of memory")
     assert terminal_line(other, told).endswith("not possible [2]: out of memory")
 
 
