@@ -134,7 +134,15 @@ def _directions(features: FloatArray, directions: FloatArray | None) -> FloatArr
 
 
 def padded_rows(values: FloatArray, rows: int) -> FloatArray:
-    """Return the array (k, n) with zero rows added up to ``rows``, contiguous."""
-    out = np.zeros((rows, values.shape[1]))
+    """Return the array (k, n) with zero rows added up to ``rows``, contiguous.
+
+    One that is so already is not copied: the loops only read. They are compiled for arrays that
+    can be written.
+    """
+    flags = values.flags
+    if values.shape[0] == rows and flags.c_contiguous and flags.writeable and values.dtype == float:
+        return values
+    out = np.empty((rows, values.shape[1]))
     out[: len(values)] = values
+    out[len(values) :] = 0.0
     return out
