@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from slideviz.case.model import Case
+from slideviz.mesh.fans import Fans, fan_normals
 from slideviz.mesh.halo import without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import Pair, pair_up
-from slideviz.mesh.topology import Boundary, Fans, fan_normals
+from slideviz.mesh.topology import Boundary
 from slideviz.rbf.classify import Classes, classify, fan_roles
 from slideviz.rbf.frames import Frame, make_frame
 from slideviz.rbf.images import find_images

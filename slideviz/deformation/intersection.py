@@ -12,11 +12,12 @@ from slideviz.mesh.axis_frame import axis_basis, in_axis_frame
 from slideviz.mesh.cached_boundary import boundary_of, shell_of
 from slideviz.mesh.caching import njit
 from slideviz.mesh.crossing import Crossing, first_crossing, self_crossing, swept_crossing
+from slideviz.mesh.fans import components
 from slideviz.mesh.jacobians import cross3, dot3
 from slideviz.mesh.model import Cells, FloatArray, IntArray, Mesh
 from slideviz.mesh.periodic import pair_up
 from slideviz.mesh.threads import PART, in_parts
-from slideviz.mesh.topology import components, facet_vectors, unit
+from slideviz.mesh.topology import facet_vectors, unit
 
 MOST = 30_000
 """Facets that are compared with each other while somebody waits: three seconds."""

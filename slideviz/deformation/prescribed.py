@@ -12,9 +12,10 @@ from slideviz.case.motion import ROUNDING, same
 from slideviz.deformation.classes import find_classes
 from slideviz.deformation.intersection import intersection_message, jump_message
 from slideviz.errors import CaseError, DeformError
+from slideviz.mesh.fans import Fans, fan_normals
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE, Pair
-from slideviz.mesh.topology import Boundary, Fans, fan_normals
+from slideviz.mesh.topology import Boundary
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import on_axis
 from slideviz.rbf.classify import Classes

@@ -19,11 +19,12 @@ from slideviz.deformation.reduction import find_reduction, loose_warnings
 from slideviz.errors import MeshError
 from slideviz.mesh.cached_boundary import boundary_of
 from slideviz.mesh.check import check_size, within
+from slideviz.mesh.fans import Fans, components, fan_normals, find_fans
 from slideviz.mesh.halo import Halo, without_halo
 from slideviz.mesh.model import FloatArray, IntArray, Mesh
 from slideviz.mesh.nearest import crowded
 from slideviz.mesh.periodic import TOLERANCE, Pair
-from slideviz.mesh.topology import Boundary, Fans, components, fan_normals, find_fans
+from slideviz.mesh.topology import Boundary
 from slideviz.rbf.axis import corners as corners_of
 from slideviz.rbf.axis import hold_on_axis, on_axis
 from slideviz.rbf.classify import Classes, directions

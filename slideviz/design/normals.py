@@ -110,7 +110,7 @@ def _mapped(matrix: FloatArray, x: Array, d: int) -> Array:
 
 
 def _fan_normals(setup: Setup, coords: Array) -> Array:
-    """Return the unit normal of each fan, as ``slideviz.mesh.topology.fan_normals``."""
+    """Return the unit normal of each fan, as ``slideviz.mesh.fans.fan_normals``."""
     boundary, fans = setup.boundary, setup.fans
     corners = _Corners(setup).of(coords)
     if boundary.dim == 2:

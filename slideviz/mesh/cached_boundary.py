@@ -7,8 +7,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from slideviz.mesh.elements import ELEMENTS
+from slideviz.mesh.fans import find_pieces
 from slideviz.mesh.model import Cells, IntArray, Marker, Mesh
-from slideviz.mesh.topology import FEATURE_ANGLE_DEG, Boundary, find_boundary, find_pieces
+from slideviz.mesh.topology import FEATURE_ANGLE_DEG, Boundary, find_boundary
 
 _MOST_PARTS = 64
 """With more than this the surface is rough, and its edges say nothing."""

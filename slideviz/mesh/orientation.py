@@ -95,7 +95,7 @@ def _consistent(cells: Cells) -> tuple[NDArray[np.int8], IntArray]:
     copies, others link unequal ones. A part then falls apart into two mirror images. Where it
     does not (a cell is its own mirror image), no numbering agrees and the file's is kept.
     """
-    from slideviz.mesh.topology import components
+    from slideviz.mesh.fans import components
 
     m = len(cells)
     first, second, agree = _neighbours(cells)

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.mesh.caching import njit
+from slideviz.mesh.fans import Fans
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import Boundary, Fans, unit
+from slideviz.mesh.topology import Boundary, unit
 
 MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface

@@ -8,8 +8,8 @@ from typing import NoReturn
 import numpy as np
 
 from slideviz.errors import NodeError
+from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.mesh.topology import components
 from slideviz.rbf.problem import Problem
 
 AGREE = 1e-7

@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 
 from slideviz.errors import NodeError
+from slideviz.mesh.fans import components
 from slideviz.mesh.model import FloatArray, IntArray, column_bounds, largest_coordinate
 from slideviz.mesh.nearest import nearest
 from slideviz.mesh.periodic import Pair
-from slideviz.mesh.topology import components
 from slideviz.rbf.classify import Classes, directions
 from slideviz.rbf.constraint_rows import refuse
 from slideviz.rbf.frames import Frame

@@ -9,8 +9,8 @@ import numpy as np
 from slideviz.case.model import Case
 from slideviz.errors import MeshError, SlidevizError
 from slideviz.mesh.cached_boundary import boundary_of
+from slideviz.mesh.fans import Fans, find_fans
 from slideviz.mesh.model import IntArray, Mesh
-from slideviz.mesh.topology import Fans, find_fans
 from slideviz.session.state import Session
 from slideviz.terms import NODE_TYPES, NodeType
 

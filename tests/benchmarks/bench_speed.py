@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.mesh.topology import find_boundary, find_fans
+from slideviz.mesh.fans import find_fans
+from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, evaluate, matrix
 from slideviz.rbf.solve import factorise

@@ -10,17 +10,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from slideviz.errors import MeshError
+from slideviz.mesh.fans import components, fan_normals, find_fans, find_pieces, smooth_joints
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.topology import (
-    components,
-    facet_vectors,
-    fan_normals,
-    find_boundary,
-    find_fans,
-    find_pieces,
-    smooth_joints,
-    unit,
-)
+from slideviz.mesh.topology import facet_vectors, find_boundary, unit
 from tests import builders
 from tests.oracles import geometry
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from slideviz.mesh.fans import fan_normals, find_fans
 from slideviz.mesh.model import Cells, Marker, Mesh
-from slideviz.mesh.topology import fan_normals, find_boundary, find_fans
+from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.classify import classify, directions, fan_roles
 from tests import builders
 from tests.oracles import geometry

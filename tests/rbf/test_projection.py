@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slideviz.mesh.topology import fan_normals, find_boundary, find_fans
+from slideviz.mesh.fans import fan_normals, find_fans
+from slideviz.mesh.topology import find_boundary
 from slideviz.rbf.classify import classify, fan_roles
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.projection import Tracks, find_tracks

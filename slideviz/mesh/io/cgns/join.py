@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from slideviz.mesh.fans import components
 from slideviz.mesh.io.cgns.elements import grid_nodes
 from slideviz.mesh.io.cgns.tree import Node
 from slideviz.mesh.io.cgns.zone import CgnsZone, faces_by_number, facets_of
 from slideviz.mesh.model import Cells, FloatArray, IntArray
-from slideviz.mesh.topology import components
 
 JOINED = 1e-6
 """Nodes of an interface may lie apart by this fraction of the extent, as rounded to R4."""

@@ -1,0 +1,195 @@
+"""Fans: the facets around a node that join smoothly, and the smooth pieces that they make.
+
+Two neighbouring facets of one marker are joined when the angle between their normals is below the
+feature angle. Around a node the joined facets form a *fan*, which has one normal; a node where
+boundaries meet, or on a feature edge, has several. Deciding this node by node, not piece by piece,
+also finds the sharp trailing edge of a profile that is one marker and closed in itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slideviz.mesh.caching import njit
+from slideviz.mesh.model import FloatArray, IntArray, frozen_array
+from slideviz.mesh.topology import (
+    FEATURE_ANGLE_DEG,
+    TINY,
+    Boundary,
+    corner_vectors,
+    facet_vectors,
+    unit,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Fans:
+    """Groups of smoothly joined facets of one marker around one node.
+
+    Attributes
+    ----------
+    facet, node, fan : (i,) int64
+        One row for each facet and node of it: which fan the facet belongs to at that node.
+    fan_node, fan_marker : (m,) int64
+        The node and the marker of each fan.
+    """
+
+    facet: IntArray
+    node: IntArray
+    fan: IntArray
+    fan_node: IntArray
+    fan_marker: IntArray
+
+
+def smooth_joints(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> NDArray[np.bool_]:
+    """Tell for each joint whether its facets are of one marker and turn by less than the angle.
+
+    Parameters
+    ----------
+    points : (n, d)
+        Cartesian coordinates of the undeformed mesh.
+    """
+    normal = unit(facet_vectors(points, boundary.facets))
+    a, b = boundary.joints.T
+    along = np.einsum("jd,jd->j", normal[a], normal[b])
+    return (along > np.cos(np.radians(feature_angle_deg))) & (
+        boundary.marker[a] == boundary.marker[b]
+    )
+
+
+def find_fans(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> Fans:
+    """Return the fans of smoothly joined facets around every boundary node."""
+    count, width = boundary.facets.shape
+    facet = np.repeat(np.arange(count), width)
+    node = boundary.facets.ravel()
+    real = np.ones(len(node), bool)
+    if width == 4:
+        real[3::4] = boundary.facets[:, 2] != boundary.facets[:, 3]
+    facet, node = facet[real], node[real]
+    row = np.full(count * width, -1, np.int64)
+    row[np.flatnonzero(real)] = np.arange(len(node))
+    smooth = smooth_joints(boundary, points, feature_angle_deg)
+    links = []
+    for shared in boundary.joint_nodes[smooth].T:
+        ends = [
+            row[side * width + (boundary.facets[side] == shared[:, None]).argmax(axis=1)]
+            for side in boundary.joints[smooth].T
+        ]
+        links.append(np.stack(ends))
+    a, b = np.concatenate(links, axis=1) if links else np.empty((2, 0), np.int64)
+    fan = components(len(node), a, b)
+    # By position, so that the fans of a node, and the normals of a fan, are added up in one order
+    # however facets are numbered.
+    corners = points[boundary.facets].swapaxes(0, 1)  # of a mean the fastest order
+    place = np.lexsort((sum(corners[1:], corners[0]) / width).T)
+    order = row.reshape(-1, width)[place].ravel()
+    order = order[order >= 0]
+    facet, node, fan = facet[order], node[order], fan[order]
+    total = int(fan.max(initial=-1)) + 1
+    first = np.empty(total, np.int64)
+    first[fan[::-1]] = np.arange(len(fan))[::-1]
+    is_first = np.zeros(len(fan), bool)
+    is_first[first] = True
+    fan = (np.cumsum(is_first) - 1)[first][fan]
+    fan_node, fan_marker = np.empty(total, np.int64), np.empty(total, np.int64)
+    fan_node[fan], fan_marker[fan] = node, boundary.marker[facet]
+    return Fans(*(frozen_array(x, np.int64) for x in (facet, node, fan, fan_node, fan_marker)))
+
+
+def fan_normals(
+    boundary: Boundary, fans: Fans, coords: FloatArray, corners: FloatArray | None = None
+) -> FloatArray:
+    """Return the unit normal of each fan, (m, d), in the frame of ``coords`` (n, d).
+
+    It is the mean of the facets' unit normals, weighted with the inverse distance from the node
+    to the facet's centre (thesis section 2.4.4).
+
+    Parameters
+    ----------
+    corners : (f, k, d), optional
+        Of the facets, where they are not ``coords[boundary.facets]`` (at an axis).
+    """
+    x = coords[boundary.facets] if corners is None else corners
+    normal = unit(corner_vectors(x))
+    width = boundary.facets.shape[1]
+    share = np.array([[1 / width] * width, [1 / 3, 1 / 3, 1 / 6, 1 / 6][:width]])
+    total = np.zeros((len(fans.fan_node), coords.shape[1]))
+    _add_normals(coords, boundary.facets, x, share, normal, fans.facet, fans.node, fans.fan, total)
+    return unit(total)
+
+
+@njit(nogil=True, cache=True)
+def _add_normals(coords, facets, x, share, normal, facet, node, fan, total):  # type: ignore[no-untyped-def]
+    """Add the weighted normals (f, d) of facets with corners ``x`` to their fans' ``total``.
+
+    ``share`` (2, k) are the weights of the corners in the centre of a facet, and of a triangle.
+    """
+    for row in range(len(facet)):
+        f, squared = facet[row], 0.0
+        triangle = facets.shape[1] == 4 and facets[f, 2] == facets[f, 3]
+        for axis in range(coords.shape[1]):
+            centre = 0.0
+            for k in range(facets.shape[1]):
+                centre += share[1 if triangle else 0, k] * x[f, k, axis]
+            off = coords[node[row], axis] - centre
+            squared += off * off
+        nearness = 1.0 / max(np.sqrt(squared), TINY)
+        for axis in range(coords.shape[1]):
+            total[fan[row], axis] += nearness * normal[f, axis]
+
+
+def find_pieces(
+    boundary: Boundary, points: FloatArray, feature_angle_deg: float = FEATURE_ANGLE_DEG
+) -> IntArray:
+    """Return the piece that each facet belongs to, (f,): smooth parts of one marker."""
+    smooth = smooth_joints(boundary, points, feature_angle_deg)
+    a, b = boundary.joints[smooth].T
+    return components(len(boundary.facets), a, b)
+
+
+def components(count: int, a: IntArray, b: IntArray) -> IntArray:
+    """Return the number of the connected part that each of ``count`` things is in, (count,).
+
+    Parameters
+    ----------
+    a, b : (m,)
+        The pairs that are connected.
+    """
+    label = np.arange(count)
+    _unite(np.asarray(a, np.int64), np.asarray(b, np.int64), label)
+    return label
+
+
+@njit(nogil=True, cache=True)
+def _unite(a, b, label):  # type: ignore[no-untyped-def]
+    """Write the number of the part of each thing into ``label`` (count,), now 0, 1, 2 and so on.
+
+    Parts are trees whose root is their first thing (R. E. Tarjan, Efficiency of a good but not
+    linear set union algorithm, 1975), and are numbered in the order of these.
+    """
+    for k in range(len(a)):
+        one, two = _root(label, a[k]), _root(label, b[k])
+        label[max(one, two)] = min(one, two)
+    count = 0
+    for i in range(len(label)):
+        if label[i] == i:
+            label[i] = count
+            count += 1
+        else:
+            label[i] = label[label[i]]  # of a thing before it, which has its number already
+
+
+@njit(nogil=True, cache=True)
+def _root(label, i):  # type: ignore[no-untyped-def]
+    """Return the root of the tree that ``i`` is in, and halve the way there."""
+    while label[i] != i:
+        label[i] = label[label[i]]
+        i = label[i]
+    return i
