@@ -10,10 +10,10 @@ from slideviz.baselines.shapes import ShapeBlock
 from slideviz.baselines.stiffness import Conditions
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.classify import RANK_TOLERANCE
 from slideviz.rbf.constraint_rows import merge
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.problem import Problem
+from slideviz.rbf.slide_rows import RANK_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,9 +41,9 @@ from slideviz.design.tape import (
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.classify import RANK_TOLERANCE
 from slideviz.rbf.frames import Frame
 from slideviz.rbf.problem import Problem
+from slideviz.rbf.slide_rows import RANK_TOLERANCE
 from slideviz.rbf.solve import enough_threads
 
 EXACT = 1e-13

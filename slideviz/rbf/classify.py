@@ -15,21 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slideviz.mesh.caching import njit
 from slideviz.mesh.fans import Fans
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, unit
+from slideviz.rbf.slide_rows import Around, nodes_with, slide_rows
 
 MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface
 for a node between them (a circular far field in two markers); the full feature angle would
 round off true corners of the domain."""
-
-RANK_TOLERANCE = 0.02
-"""Sine of the angle (about one degree) from which a further normal counts as independent."""
-
-IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
-"""Cosine of that angle: fans whose normals differ by less are in one plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,41 +112,21 @@ def classify(
     at = stands[fans.fan_node]
     effect = _effects(fan_role, at, sliding, periodic)
     total = len(stands)
-    moving = _nodes_with(at, effect == "moving", total)
-    fixed = _nodes_with(at, effect == "fixed", total) & ~moving
+    moving = nodes_with(at, effect == "moving", total)
+    fixed = nodes_with(at, effect == "fixed", total) & ~moving
     active = (effect == "slide") & ~(moving | fixed)[at]
     smooth, merge = np.cos(np.radians(feature_angle_deg * np.array([1.0, MERGE_FRACTION])))
-    around = _Around(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
-    rows, extra = _slide_rows(around, active)
+    around = Around(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
+    rows, extra = slide_rows(around, active)
     if periodic == "fixed":
         # Vertices are held: nodes that would be fixed if the periodic markers slid, too.
         watched = active | ((fan_role == "periodic") & ~(moving | fixed)[at])
-        _, held = _slide_rows(around, watched)
-        touched = _nodes_with(at, active, total)
+        _, held = slide_rows(around, watched)
+        touched = nodes_with(at, active, total)
         extra = np.concatenate([extra, held[touched[held]]])
     fixed[extra] = True
     keep = ~fixed[at[rows[:, 0]]]
     return _collect(moving[stands], fixed[stands], rows[keep], at, stands, normals.shape[1])
-
-
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """All fans: the node each counts for, its own node, role and normal, and two cosines.
-
-    Attributes
-    ----------
-    smooth, merge : float
-        Fans of one role are one surface when their normals differ by less than these angles:
-        the first for those of two periodic images, where the surface goes on beyond the
-        periodic boundary, the second for those of one node.
-    """
-
-    node: IntArray
-    own: IntArray
-    role: np.ndarray
-    normals: FloatArray
-    smooth: float
-    merge: float
 
 
 def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) -> np.ndarray:
@@ -167,139 +141,6 @@ def _effects(fan_role: np.ndarray, at: IntArray, sliding: str, periodic: str) ->
     internal = fan_role == "internal"
     effect[internal] = np.where(other[at[internal]], slide, "free")
     return effect
-
-
-def _nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:
-    """Return a mask (total,) of the nodes of the chosen fans."""
-    mask = np.zeros(total, bool)
-    mask[at[chosen]] = True
-    return mask
-
-
-def _slide_rows(around: _Around, active: np.ndarray) -> tuple[IntArray, IntArray]:
-    """Return rows (fan, cluster within its node) of active fans, and the nodes of full rank."""
-    chosen = np.flatnonzero(active)
-    if not len(chosen):
-        return np.empty((0, 2), np.int64), np.empty(0, np.int64)
-    chosen = _one_sided(around, chosen)
-    node = around.node[chosen]
-    cluster = np.zeros(len(chosen), np.int64)
-    starts = np.flatnonzero(np.r_[True, node[1:] != node[:-1]])
-    size = np.diff(np.r_[starts, len(node)])
-    several = np.flatnonzero(np.repeat(size > 1, size))
-    if not len(several):
-        return np.stack([chosen, cluster], axis=1), np.empty(0, np.int64)
-    size = size[size > 1]
-    group, local = np.repeat(np.arange(len(size)), size), chosen[several]
-    label = _clusters(around, local, size)
-    rank = _ranks(around.normals[local], group, label)
-    # Boundaries of two roles in one plane (walls before and within a passage) have one normal.
-    cluster[several] = np.where(rank[group] > 1, label, 0)
-    first = np.cumsum(size) - size
-    return np.stack([chosen, cluster], axis=1), node[several][
-        first[rank >= around.normals.shape[1]]
-    ]
-
-
-def _one_sided(around: _Around, chosen: IntArray) -> IntArray:
-    """Return the fans ordered by node, without those that are another's other side.
-
-    A periodic boundary and its image are one surface, seen from both sides: of its two opposite
-    normals that at the node which stands for both is kept.
-    """
-    image = around.own[chosen] != around.node[chosen]
-    chosen = chosen[np.lexsort([chosen, image, around.node[chosen]])]
-    node, own = around.node[chosen], around.own[chosen]
-    first = np.searchsorted(node, node)
-    rows = np.flatnonzero(own != node)
-    drop = np.zeros(len(chosen), bool)
-    # The first fan of the node, then its second and so on, beside all fans of its images.
-    while len(rows):
-        mine = first[rows] < rows
-        rows, other = rows[mine], first[rows[mine]]
-        along = np.einsum("rd,rd->r", around.normals[chosen[rows]], around.normals[chosen[other]])
-        drop[rows] |= (along < -around.merge) & (own[rows] != own[other])
-        first[rows] += 1
-    return chosen[~drop]
-
-
-def _clusters(around: _Around, local: IntArray, size: IntArray) -> IntArray:
-    """Return labels (m,) that join fans of one node and role whose normals differ by a small angle.
-
-    Also over others between them, so that the order of the fans does not matter. Fans in one
-    plane are one whatever their roles: no edge is between them. Labels are 0, 1, ... at each node.
-
-    Parameters
-    ----------
-    local : (m,)
-        The fans, those of a node together.
-    size : (g,)
-        The number of fans of each node.
-    """
-    label = np.empty(len(local), np.int64)
-    role = np.unique(around.role[local].astype(str), return_inverse=True)[1]
-    normals, own = around.normals[local], around.own[local]
-    _join(size, normals, role, own, around.smooth, around.merge, label)
-    return label
-
-
-@njit(nogil=True, cache=True)
-def _join(size, normals, role, own, smooth, merge, label):  # type: ignore[no-untyped-def]
-    """Write what `_clusters` returns into ``label`` (m,); of each fan role and own node (m,)."""
-    start = 0
-    for count in size:
-        best = np.zeros((count, count), np.bool_)
-        along = np.zeros((count, count))
-        for i in range(count):
-            for j in range(count):
-                for axis in range(normals.shape[1]):
-                    along[i, j] += normals[start + i, axis] * normals[start + j, axis]
-        mine, side = role[start : start + count], own[start : start + count]
-        # Of an image, a fan goes on in the one that is most like it, and no other.
-        for i in range(count):
-            for k in range(count):
-                most = -1
-                for j in range(count):
-                    if side[j] == side[k] and side[j] != side[i] and mine[j] == mine[i]:
-                        most = j if most < 0 or along[i, j] > along[i, most] else most
-                if most >= 0 and along[i, most] > smooth:
-                    best[i, most] = True
-        labels = label[start : start + count]
-        for i in range(count):
-            labels[i] = i
-        for i in range(count):
-            for j in range(i):
-                one = mine[i] == mine[j] and side[i] == side[j] and along[i, j] > merge
-                if one or (best[i, j] and best[j, i]) or along[i, j] > IN_PLANE:
-                    old = labels[i]
-                    for k in range(count):
-                        labels[k] = labels[j] if labels[k] == old else labels[k]
-        # Numbered without gaps. (Other than loops is not used here: loading it takes long.)
-        names = np.zeros(count, np.int64)
-        for i in range(count):
-            names[labels[i]] = 1
-        for i in range(1, count):
-            names[i] += names[i - 1]
-        for i in range(count):
-            labels[i] = names[labels[i]] - 1
-        start += count
-
-
-def _ranks(normals: FloatArray, group: IntArray, label: IntArray) -> IntArray:
-    """Return the rank of each node's clusters, (g,); opposite ones (a thin tip) count as full.
-
-    Parameters
-    ----------
-    normals, group, label : (m, d), (m,), (m,)
-        The normals of fans, the number of their node, and of their cluster there.
-    """
-    dim = normals.shape[1]
-    means = np.zeros((int(group[-1]) + 1, int(label.max()) + 1, dim))
-    np.add.at(means, (group, label), normals)
-    means = unit(means)
-    opposite = (means @ means.swapaxes(1, 2)).min(axis=(1, 2)) < -1.0 + 1e-4
-    found = np.sum(np.linalg.svd(means, compute_uv=False) > RANK_TOLERANCE, axis=1)
-    return np.where(opposite, dim, found)
 
 
 def _collect(

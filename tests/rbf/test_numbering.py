@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction, Scale, Translate
-from slideviz.rbf.classify import _Around, _clusters
 from slideviz.rbf.closest import ClosestPoints
 from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct, correction_of
 from slideviz.rbf.problem import GreedySettings, Problem
 from slideviz.rbf.selection import TIE, favour
+from slideviz.rbf.slide_rows import Around, _clusters
 from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS
@@ -157,7 +157,7 @@ def test_fans_are_joined_over_others_between_them_in_any_order():
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     roles = np.array(["sliding"] * 4, object)
     merge, one = np.cos(np.radians(10.0)), np.zeros(4, np.int64)
-    around = _Around(one, one, roles, normals, merge, merge)
+    around = Around(one, one, roles, normals, merge, merge)
     for order in permutations(range(4)):
         labels = _clusters(around, np.array(order), np.array([4]))
         assert sorted(np.bincount(labels)) == [1, 3]
