@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     )
     from slideviz.deformation.solver import Step, deform
     from slideviz.design.deformer import Deformer
-    from slideviz.design.sweep import sweep
+    from slideviz.design.sweeps.sweep import sweep
     from slideviz.errors import ConditionWarning, SlidevizError, ToleranceWarning
     from slideviz.mesh.io.convert import convert
     from slideviz.mesh.io.files import read, write
@@ -56,7 +56,7 @@ _HOME = {
     "deform": "deformation.solver",
     "quality": "mesh.quality",
     "read": "mesh.io.files",
-    "sweep": "design.sweep",
+    "sweep": "design.sweeps.sweep",
     "write": "mesh.io.files",
 }
 

@@ -12,7 +12,7 @@ import time
 import pytest
 
 from slideviz.cli import run
-from slideviz.design import sweep as sweeping
+from slideviz.design.sweeps import sweep as sweeping
 from slideviz.samples.table import write_sample
 
 

@@ -13,8 +13,8 @@ from slideviz.cli.options import add_shared, changed
 
 if TYPE_CHECKING:
     from slideviz.case.model import Case
-    from slideviz.design.su2_config import Su2Config
-    from slideviz.design.su2_surface import MovingSurface
+    from slideviz.design.su2.config import Su2Config
+    from slideviz.design.su2.surface import MovingSurface
     from slideviz.mesh.model import Mesh
 
 _OF_A_RUN = ("history", "picture", "steps_dir", "steps_file")
@@ -41,8 +41,8 @@ def read_configuration(arguments: argparse.Namespace) -> tuple[Su2Config, Mesh]:
     """Return the configuration, with the changes of ``--set``, as it fits its mesh, and that."""
     from slideviz import read
     from slideviz.cli.places import note_case
-    from slideviz.design.su2_config import read_config
-    from slideviz.design.su2_markers import on_mesh
+    from slideviz.design.su2.config import read_config
+    from slideviz.design.su2.markers import on_mesh
     from slideviz.errors import CaseError
 
     config = read_config(arguments.case)
@@ -72,7 +72,7 @@ def run_def(arguments: argparse.Namespace) -> int:
     from slideviz.cli.report import folded_cells, run_report
     from slideviz.cli.run_command import pull
     from slideviz.cli.run_outcome import CELLS, tell, write_qualities
-    from slideviz.design.su2_surface import at_rest, make_surface
+    from slideviz.design.su2.surface import at_rest, make_surface
 
     begin = time.perf_counter()
     config, mesh = read_configuration(arguments)
@@ -133,7 +133,7 @@ def _set_boxes(arguments: argparse.Namespace, config: Su2Config, mesh: Mesh, beg
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import tell_lost
     from slideviz.cli.report import print_remarks, save_json
-    from slideviz.design.su2_surface import set_boxes
+    from slideviz.design.su2.surface import set_boxes
 
     case: Case = config.case
     boxed, boxes = set_boxes(config, mesh)

@@ -12,8 +12,8 @@ from slideviz.cli.options import add_shared
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from slideviz.design.su2_config import Su2Config
-    from slideviz.design.su2_gradients import Gradients
+    from slideviz.design.su2.config import Su2Config
+    from slideviz.design.su2.gradients import Gradients
 
 
 def add_dot(calls: argparse._SubParsersAction) -> None:
@@ -30,9 +30,9 @@ def run_dot(arguments: argparse.Namespace) -> int:
     from slideviz.cli.places import OutputPath, require_places
     from slideviz.cli.progress import Bar
     from slideviz.cli.report import print_remarks, save_json
-    from slideviz.design.su2_gradients import find_gradients
-    from slideviz.design.su2_sensitivities import sensitivity_file
-    from slideviz.design.su2_surface import make_surface
+    from slideviz.design.su2.gradients import find_gradients
+    from slideviz.design.su2.sensitivities import sensitivity_file
+    from slideviz.design.su2.surface import make_surface
     from slideviz.errors import CaseError
 
     begin = time.perf_counter()

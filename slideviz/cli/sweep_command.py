@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from concurrent.futures import Executor
 
-    from slideviz.design.sweep_designs import Designs
-    from slideviz.design.sweep_row import DesignRow
+    from slideviz.design.sweeps.designs import Designs
+    from slideviz.design.sweeps.row import DesignRow
 
 _LISTED = 5
 """Designs that are named, of those with inverted cells, and reasons of those that failed."""
@@ -68,8 +68,8 @@ def sweep(arguments: argparse.Namespace) -> int:
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.places import OutputPath, make_folder, require_places
     from slideviz.cli.report import save_json
-    from slideviz.design.sweep_designs import read_designs
-    from slideviz.design.sweep_results import RESULTS
+    from slideviz.design.sweeps.designs import read_designs
+    from slideviz.design.sweeps.results import RESULTS
     from slideviz.errors import CaseError
 
     case = read_case(arguments)
@@ -116,7 +116,7 @@ def _print_columns(case: Any) -> int:
     from slideviz.case.keys import KEYS
     from slideviz.cli.exit_codes import DONE
     from slideviz.cli.report import table
-    from slideviz.design.sweep_columns import numbers_of
+    from slideviz.design.sweeps.columns import numbers_of
 
     numbers = numbers_of(case)
     if numbers:

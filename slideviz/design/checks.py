@@ -12,10 +12,10 @@ from slideviz.deformation.growth import GROWTH, HOPELESS, unsoundness
 from slideviz.deformation.reduction import AUTO_TOLERANCE
 from slideviz.deformation.setup import Setup
 from slideviz.design.doubt import largest_condition
-from slideviz.design.frozen_step import FrozenStep, StepState
-from slideviz.design.loops import farthest
-from slideviz.design.operations import flat
-from slideviz.design.tape import value
+from slideviz.design.frozen.loops import farthest
+from slideviz.design.frozen.operations import flat
+from slideviz.design.frozen.step import FrozenStep, StepState
+from slideviz.design.frozen.tape import value
 from slideviz.errors import DeformError, UnsoundError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, largest_coordinate
 from slideviz.rbf.images import FAR, largest_misfit, misfits

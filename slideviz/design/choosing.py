@@ -12,7 +12,7 @@ from slideviz.case.model import Case
 from slideviz.deformation.setup import Setup, elastic_body, idw_weights
 from slideviz.deformation.solver import Progress, all_steps, require_memory
 from slideviz.deformation.stepping import Stepping, cartesian, followed, moved_by, one_step
-from slideviz.design.frozen_step import FrozenStep
+from slideviz.design.frozen.step import FrozenStep
 from slideviz.mesh.model import FloatArray, Mesh
 from slideviz.rbf.problem import Lag, Levels, Problem, Solution, Watch
 

@@ -20,10 +20,10 @@ from slideviz.design.doubt import (
     warn_of_doubt,
     warn_of_errors,
 )
-from slideviz.design.frozen_step import FrozenStep, StepState
+from slideviz.design.frozen.loops import to_points
+from slideviz.design.frozen.step import FrozenStep, StepState
+from slideviz.design.frozen.tape import Array, Tape, Variable, value
 from slideviz.design.given import given_input
-from slideviz.design.loops import to_points
-from slideviz.design.tape import Array, Tape, Variable, value
 from slideviz.errors import (
     CaseError,
     DeformError,

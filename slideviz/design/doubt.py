@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slideviz.design.frozen_step import FrozenStep
+from slideviz.design.frozen.step import FrozenStep
 from slideviz.errors import ConditionWarning, Note, ToleranceWarning
 from slideviz.mesh.model import FloatArray
 from slideviz.rbf.refine import TRUSTED

@@ -10,8 +10,8 @@ from slideviz.case.displacement import Displacements
 from slideviz.case.motion import ROUNDING
 from slideviz.deformation.prescribed import displaced
 from slideviz.deformation.setup import Setup
-from slideviz.design.operations import difference
-from slideviz.design.tape import Array, put, take, transform, value
+from slideviz.design.frozen.operations import difference
+from slideviz.design.frozen.tape import Array, put, take, transform, value
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, IntArray, Mesh, frozen_array, largest_coordinate
 from slideviz.mesh.periodic import TOLERANCE

@@ -16,9 +16,9 @@ from slideviz.case.key import FILES, MOTION, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case
 from slideviz.case.words import is_number
-from slideviz.design.sweep_columns import numbers_of, own_values
-from slideviz.design.sweep_designs import read_designs
-from slideviz.design.sweep_row import NUMBERS, DesignRow
+from slideviz.design.sweeps.columns import numbers_of, own_values
+from slideviz.design.sweeps.designs import read_designs
+from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.mesh.io.atomic import atomic_write
 from slideviz.mesh.model import Mesh

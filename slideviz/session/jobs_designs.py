@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 
 from slideviz.case.model import Case
-from slideviz.design.sweep import sweep
+from slideviz.design.sweeps.sweep import sweep
 from slideviz.mesh.model import Mesh
 from slideviz.session.design_table import DesignTable
 from slideviz.session.jobs import Doing, Report, Stopped, require_going

@@ -12,7 +12,7 @@ import pytest
 import slideviz as sv
 from slideviz.baselines import multigrid
 from slideviz.case.model import Case, Reduction, Rotate, Translate
-from slideviz.design.frozen_interpolation import WAYS
+from slideviz.design.frozen.interpolation import WAYS
 from slideviz.errors import DeformError
 from slideviz.mesh.axis_frame import axis_basis
 from slideviz.rbf.methods import SLIDING_METHODS

@@ -9,8 +9,8 @@ import pytest
 
 import slideviz as sv
 from slideviz.cli import run
-from slideviz.design.su2_config import read_config
-from slideviz.design.su2_surface import make_surface
+from slideviz.design.su2.config import read_config
+from slideviz.design.su2.surface import make_surface
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 
@@ -343,7 +343,7 @@ def test_continuity_holds_planes_where_it_is_asked_for(here):
 
 
 def test_continuity_in_3d_finds_the_sides_that_the_surface_passes(here):
-    from slideviz.design.su2_planes import _meets
+    from slideviz.design.su2.planes import _meets
 
     side = np.array([[0.0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]])
     through = np.array([[[-1.0, 0.9, 0.9], [1.0, 0.8, 0.8]], [[-1.0, 0.1, 0.1], [1.0, 0.2, 0.1]]])
@@ -453,7 +453,7 @@ def test_what_the_mesh_does_not_have_is_told(text, message, here):
     ],
 )
 def test_boundaries_of_su2s_keys_that_the_mesh_lacks_are_passed_over(row, roles, modes, here):
-    from slideviz.design.su2_markers import on_mesh
+    from slideviz.design.su2.markers import on_mesh
 
     found = on_mesh(config(f"DV_KIND= SCALE\nDV_VALUE= 1.1\n{row}\n"), sv.read("mesh.su2"))
     assert dict(found.case.roles) == {"low": "moving", **roles}

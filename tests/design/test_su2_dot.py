@@ -422,7 +422,7 @@ def test_control_nodes_that_do_not_suffice_are_told(case, capsys):
 def test_other_warnings_of_python_go_on(recwarn):
     import warnings
 
-    from slideviz.design.su2_gradients import _heard
+    from slideviz.design.su2.gradients import _heard
 
     said = []
     warnings.simplefilter("always")

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.design import sweep as sweeping
-from slideviz.design.sweep_columns import columns_of, numbers_of, own_values
-from slideviz.design.sweep_designs import read_designs
-from slideviz.design.sweep_lock import FolderLock
-from slideviz.design.sweep_row import DesignRow
-from slideviz.design.sweep_worker import Answer, Packed, Task, hold, packed, work
+from slideviz.design.sweeps import sweep as sweeping
+from slideviz.design.sweeps.columns import columns_of, numbers_of, own_values
+from slideviz.design.sweeps.designs import read_designs
+from slideviz.design.sweeps.lock import FolderLock
+from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.worker import Answer, Packed, Task, hold, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.samples.table import sample
 
@@ -394,7 +394,7 @@ def test_a_design_has_one_thread(passage, monkeypatch):
     from numba import get_num_threads
     from threadpoolctl import threadpool_info
 
-    from slideviz.design import sweep_worker
+    from slideviz.design.sweeps import worker
 
     def threads():
         return [get_num_threads(), *(one["num_threads"] for one in threadpool_info())]
@@ -405,7 +405,7 @@ def test_a_design_has_one_thread(passage, monkeypatch):
         found.append(threads())
         return sv.deform(*values)
 
-    monkeypatch.setattr(sweep_worker, "deform", watched)
+    monkeypatch.setattr(worker, "deform", watched)
     mesh = packed(passage.mesh)
     work(Task(1, passage.case, mesh.name, packed=mesh))  # libraries are loaded by the first
     before = threads()

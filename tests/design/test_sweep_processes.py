@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 import slideviz as sv
-from slideviz.design import sweep as sweeping
-from slideviz.design.sweep_processes import Processes
-from slideviz.design.sweep_worker import packed
+from slideviz.design.sweeps import sweep as sweeping
+from slideviz.design.sweeps.processes import Processes
+from slideviz.design.sweeps.worker import packed
 from slideviz.samples.table import sample
 
 
@@ -87,8 +87,8 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import sys, time\n"
-        "from slideviz.design.sweep_processes import Processes\n"
-        "from slideviz.design.sweep_worker import Packed\n"
+        "from slideviz.design.sweeps.processes import Processes\n"
+        "from slideviz.design.sweeps.worker import Packed\n"
         "import pickle\n"
         "if __name__ == '__main__':\n"
         "    workers = Processes(1, Packed('none', pickle.dumps(None)))\n"

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slideviz.design.sweep_row import DesignRow
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.plots.designs import (
     against_designs,
     design_curves,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import slideviz as sv
-from slideviz.design import sweep as sweeping
-from slideviz.design.sweep_row import DesignRow
+from slideviz.design.sweeps import sweep as sweeping
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError
 from slideviz.samples.table import sample
 from slideviz.session import design_table

@@ -10,8 +10,8 @@ from qtpy.QtCore import QSize, Qt
 from qtpy.QtWidgets import QHBoxLayout, QSplitter
 
 from slideviz.case.model import Case
-from slideviz.design.sweep_designs import read_designs
-from slideviz.design.sweep_row import DesignRow
+from slideviz.design.sweeps.designs import read_designs
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import CaseError, SlidevizError
 from slideviz.gui.panels.designs_job import DesignsJob
 from slideviz.gui.panels.designs_plot import DesignPlot

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from qtpy.QtCore import QObject, Signal
 
 from slideviz.case.model import Case
-from slideviz.design.sweep_row import DesignRow
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.gui.responsiveness.settings import ROWS_MS
 from slideviz.gui.responsiveness.timers import later
 from slideviz.gui.responsiveness.worker import JobRunner

@@ -19,8 +19,8 @@ from slideviz.baselines.conditions import (
 from slideviz.baselines.elastic_forces import Forces
 from slideviz.baselines.multigrid import Level, conjugate_gradients, hierarchy
 from slideviz.baselines.stiffness import assemble
-from slideviz.design.operations import difference_from, each_of, points
-from slideviz.design.tape import (
+from slideviz.design.frozen.operations import difference_from, each_of, points
+from slideviz.design.frozen.tape import (
     Array,
     Variable,
     apply,

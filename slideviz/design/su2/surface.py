@@ -17,11 +17,11 @@ from slideviz.case.ffd_keys import ffd_contradictions
 from slideviz.case.model import Case, Prescribed
 from slideviz.deformation.setup import make_setup
 from slideviz.deformation.steps import Step
-from slideviz.design.su2_config import Su2Config
-from slideviz.design.su2_markers import require_markers
-from slideviz.design.su2_planes import idle_variables
-from slideviz.design.su2_positions import read_positions
-from slideviz.design.su2_variables import BOXED, DesignVariable
+from slideviz.design.su2.config import Su2Config
+from slideviz.design.su2.markers import require_markers
+from slideviz.design.su2.planes import idle_variables
+from slideviz.design.su2.positions import read_positions
+from slideviz.design.su2.variables import BOXED, DesignVariable
 from slideviz.errors import CaseError, Note, SlidevizError
 from slideviz.ffd.box import Box, Embedding
 from slideviz.ffd.section import boxes_of, with_boxes

@@ -22,10 +22,10 @@ from slideviz.case.check import effective
 from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Prescribed
-from slideviz.design.sweep_columns import Value
-from slideviz.design.sweep_designs import Designs
-from slideviz.design.sweep_lock import FolderLock
-from slideviz.design.sweep_row import NUMBERS, DesignRow
+from slideviz.design.sweeps.columns import Value
+from slideviz.design.sweeps.designs import Designs
+from slideviz.design.sweeps.lock import FolderLock
+from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
 from slideviz.ffd.section import boxes_of
 from slideviz.mesh.io.atomic import atomic_write, reason_of

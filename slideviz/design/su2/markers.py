@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from slideviz.case.check import raise_all
 from slideviz.case.words import nearest
-from slideviz.design.su2_config import ROLE_KEYS, Su2Config
+from slideviz.design.su2.config import ROLE_KEYS, Su2Config
 from slideviz.errors import CaseError
 from slideviz.mesh.model import Mesh
 

@@ -12,8 +12,8 @@ import numpy as np
 from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Progress
 from slideviz.design.deformer import Deformer
-from slideviz.design.su2_sensitivities import CLOSE, match, read_sensitivities
-from slideviz.design.su2_surface import MovingSurface
+from slideviz.design.su2.sensitivities import CLOSE, match, read_sensitivities
+from slideviz.design.su2.surface import MovingSurface
 from slideviz.errors import ConditionWarning, ToleranceWarning
 from slideviz.mesh.model import FloatArray, largest_coordinate
 

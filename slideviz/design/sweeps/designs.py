@@ -12,7 +12,7 @@ from typing import Any
 
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
-from slideviz.design.sweep_columns import NumberPlace, Value, applied, column_name, columns_of
+from slideviz.design.sweeps.columns import NumberPlace, Value, applied, column_name, columns_of
 from slideviz.errors import CaseError
 
 _SEPARATORS = (",", ";", "\t")

@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from slideviz.case.model import Case, Ffd, FromFile
-from slideviz.design.sweep_designs import Design, Table, read_designs
-from slideviz.design.sweep_processes import Processes, usable_cores
-from slideviz.design.sweep_results import SweepResults, sources_of
-from slideviz.design.sweep_row import DesignRow
-from slideviz.design.sweep_worker import Answer, Packed, Task, packed, work
+from slideviz.design.sweeps.designs import Design, Table, read_designs
+from slideviz.design.sweeps.processes import Processes, usable_cores
+from slideviz.design.sweeps.results import SweepResults, sources_of
+from slideviz.design.sweeps.row import DesignRow
+from slideviz.design.sweeps.worker import Answer, Packed, Task, packed, work
 from slideviz.errors import CaseError, DeformError
 from slideviz.mesh.io.files import read, usual_ending
 from slideviz.mesh.model import Mesh, Origin

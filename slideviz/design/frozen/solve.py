@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from slideviz.design.tape import Array, apply, value
+from slideviz.design.frozen.tape import Array, apply, value
 from slideviz.errors import DeformError
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.refine import System

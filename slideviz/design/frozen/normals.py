@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slideviz.deformation.setup import Setup
-from slideviz.design.tape import (
+from slideviz.design.frozen.tape import (
     Array,
     Variable,
     add,

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import get_context, parent_process
 from typing import Any, NamedTuple, NoReturn
 
-from slideviz.design.sweep_worker import Packed, hold
+from slideviz.design.sweeps.worker import Packed, hold
 from slideviz.mesh.io.cleanup import clean_up
 
 _THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from slideviz.baselines.idw import weighted_means
-from slideviz.design.loops import place
-from slideviz.design.tape import Array, Linear, Link, Variable, apply, value
+from slideviz.design.frozen.loops import place
+from slideviz.design.frozen.tape import Array, Linear, Link, Variable, apply, value
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.threads import in_parts
 from slideviz.rbf.evaluate import Basis, evaluate, matrix

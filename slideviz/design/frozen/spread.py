@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from slideviz.deformation.setup import Setup
-from slideviz.design.operations import points
-from slideviz.design.tape import (
+from slideviz.design.frozen.operations import points
+from slideviz.design.frozen.tape import (
     Array,
     function,
     length,

@@ -18,13 +18,13 @@ import numpy as np
 from slideviz.baselines.conditions import Body
 from slideviz.baselines.idw import Weights
 from slideviz.deformation.setup import Setup
-from slideviz.design.frozen_baselines import Elasticity, Weighting
-from slideviz.design.frozen_interpolation import Interpolation
-from slideviz.design.frozen_method import Method
-from slideviz.design.loops import keep_rest, shift
-from slideviz.design.operations import coords as coords_of
-from slideviz.design.operations import points
-from slideviz.design.tape import (
+from slideviz.design.frozen.baselines import Elasticity, Weighting
+from slideviz.design.frozen.interpolation import Interpolation
+from slideviz.design.frozen.loops import keep_rest, shift
+from slideviz.design.frozen.method import Method
+from slideviz.design.frozen.operations import coords as coords_of
+from slideviz.design.frozen.operations import points
+from slideviz.design.frozen.tape import (
     Array,
     apply,
     multiply,

@@ -14,7 +14,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.lines import Entry, Problem, entries_of, listed, read_text
 from slideviz.case.model import Case
 from slideviz.case.words import list_of, nearest, shown
-from slideviz.design.su2_variables import KINDS, DesignVariable, read_variables
+from slideviz.design.su2.variables import KINDS, DesignVariable, read_variables
 from slideviz.errors import CaseError
 from slideviz.terms import ROLES, Role
 

@@ -23,7 +23,7 @@ from slideviz import __version__
 from slideviz.case.model import Case
 from slideviz.deformation.solver import deform
 from slideviz.deformation.steps import Step
-from slideviz.design.sweep_row import DesignRow
+from slideviz.design.sweeps.row import DesignRow
 from slideviz.errors import Note, SlidevizError
 from slideviz.mesh.io.files import write
 from slideviz.mesh.model import Mesh

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from slideviz.case.lines import read_text
-from slideviz.design.su2_config import Su2Config
-from slideviz.design.su2_restart import is_number, read_restart
+from slideviz.design.su2.config import Su2Config
+from slideviz.design.su2.restart import is_number, read_restart
 from slideviz.errors import CaseError
 from slideviz.mesh.model import FloatArray, Mesh, largest_coordinate
 

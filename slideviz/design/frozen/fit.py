@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
-from slideviz.design.frozen_solve import LeastSquares, MeasuredSystem, columnwise, solved, whole
-from slideviz.design.operations import columns, radial_sum, terms
-from slideviz.design.tape import (
+from slideviz.design.frozen.operations import columns, radial_sum, terms
+from slideviz.design.frozen.solve import LeastSquares, MeasuredSystem, columnwise, solved, whole
+from slideviz.design.frozen.tape import (
     Array,
     Variable,
     dot,

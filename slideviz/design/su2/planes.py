@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from slideviz.case.words import list_of
-from slideviz.design.su2_config import CONTINUITIES, SU2_CONTINUITY, Su2Config
-from slideviz.design.su2_variables import BOXED, DesignVariable
+from slideviz.design.su2.config import CONTINUITIES, SU2_CONTINUITY, Su2Config
+from slideviz.design.su2.variables import BOXED, DesignVariable
 from slideviz.ffd.box import Box
 from slideviz.mesh.model import FloatArray, Mesh
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
 
-from slideviz.design.sweep_columns import Value
+from slideviz.design.sweeps.columns import Value
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slideviz.design.normals import sliding_normals
-from slideviz.design.operations import features
-from slideviz.design.tape import (
+from slideviz.design.frozen.normals import sliding_normals
+from slideviz.design.frozen.operations import features
+from slideviz.design.frozen.tape import (
     Array,
     Variable,
     dot,
@@ -29,7 +29,7 @@ from slideviz.rbf.constraint_rows import AGREE, refuse
 from slideviz.rbf.primitives import primitives
 
 if TYPE_CHECKING:
-    from slideviz.design.frozen_step import FrozenStep, StepState
+    from slideviz.design.frozen.step import FrozenStep, StepState
 
 ROUNDING = 1e-14
 """Part of the largest coordinate below which a distance is rounding."""

@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from slideviz.design.frozen_fit import FrozenFit, TapedRows
-from slideviz.design.frozen_method import Method, Solved
-from slideviz.design.frozen_spread import FrozenSpread, chosen_spread, shares
-from slideviz.design.loops import take_over
-from slideviz.design.tape import (
+from slideviz.design.frozen.fit import FrozenFit, TapedRows
+from slideviz.design.frozen.loops import take_over
+from slideviz.design.frozen.method import Method, Solved
+from slideviz.design.frozen.spread import FrozenSpread, chosen_spread, shares
+from slideviz.design.frozen.tape import (
     Array,
     Variable,
     dot,

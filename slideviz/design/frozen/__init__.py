@@ -1,0 +1,1 @@
+"""A step with everything discrete kept, and its derivatives on a tape."""

@@ -1,0 +1,1 @@
+"""A deformation for each row of a table of designs."""
