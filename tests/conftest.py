@@ -29,3 +29,10 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(5_000, 10, 10)
+
+
+@pytest.fixture(autouse=True)
+def _no_word_of_compiling(request, monkeypatch):
+    """What a command says does not depend on what was compiled before, but in tests of that."""
+    if "compil" not in request.node.name:
+        monkeypatch.setattr("slideviz.cli.progress.say_compiling", lambda: None)

@@ -44,15 +44,19 @@ def note_compilation(quiet: bool) -> Iterator[None]:
         def on_start(self, _: object) -> None:
             if not self.noted:
                 self.noted = True
-                words = "compiling loops that are used for the first time: some seconds, once"
-                wipe = _WIPE if sys.stderr.isatty() else ""
-                control(f"{wipe}slideviz: {words}\n")
+                say_compiling()
 
         def on_end(self, _: object) -> None:
             pass
 
     with event.install_listener("numba:compile", Listener()):
         yield
+
+
+def say_compiling() -> None:
+    """Say on stderr why the first run takes longer."""
+    words = "compiling loops that are used for the first time: some seconds, once"
+    control(f"{_WIPE if sys.stderr.isatty() else ''}slideviz: {words}\n")
 
 
 class Bar:

@@ -18,7 +18,7 @@ import numpy as np
 from slideviz.mesh.fans import Fans
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.mesh.topology import Boundary, unit
-from slideviz.rbf.slide_rows import Around, nodes_with, slide_rows
+from slideviz.rbf.slide_rows import FansAround, nodes_with, slide_rows
 
 MERGE_FRACTION = 0.25
 """Boundaries that meet at a smaller angle than this part of the feature angle are one surface
@@ -116,7 +116,7 @@ def classify(
     fixed = nodes_with(at, effect == "fixed", total) & ~moving
     active = (effect == "slide") & ~(moving | fixed)[at]
     smooth, merge = np.cos(np.radians(feature_angle_deg * np.array([1.0, MERGE_FRACTION])))
-    around = Around(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
+    around = FansAround(at, fans.fan_node, fan_role, normals, float(smooth), float(merge))
     rows, extra = slide_rows(around, active)
     if periodic == "fixed":
         # Vertices are held: nodes that would be fixed if the periodic markers slid, too.

@@ -18,7 +18,7 @@ IN_PLANE = np.sqrt(1.0 - RANK_TOLERANCE**2)
 
 
 @dataclass(frozen=True, eq=False)
-class Around:
+class FansAround:
     """All fans: the node each counts for, its own node, role and normal, and two cosines.
 
     Attributes
@@ -44,7 +44,7 @@ def nodes_with(at: IntArray, chosen: np.ndarray, total: int) -> np.ndarray:
     return mask
 
 
-def slide_rows(around: Around, active: np.ndarray) -> tuple[IntArray, IntArray]:
+def slide_rows(around: FansAround, active: np.ndarray) -> tuple[IntArray, IntArray]:
     """Return rows (fan, cluster within its node) of active fans, and the nodes of full rank."""
     chosen = np.flatnonzero(active)
     if not len(chosen):
@@ -69,7 +69,7 @@ def slide_rows(around: Around, active: np.ndarray) -> tuple[IntArray, IntArray]:
     ]
 
 
-def _one_sided(around: Around, chosen: IntArray) -> IntArray:
+def _one_sided(around: FansAround, chosen: IntArray) -> IntArray:
     """Return the fans ordered by node, without those that are another's other side.
 
     A periodic boundary and its image are one surface, seen from both sides: of its two opposite
@@ -91,7 +91,7 @@ def _one_sided(around: Around, chosen: IntArray) -> IntArray:
     return chosen[~drop]
 
 
-def _clusters(around: Around, local: IntArray, size: IntArray) -> IntArray:
+def _clusters(around: FansAround, local: IntArray, size: IntArray) -> IntArray:
     """Return labels (m,) that join fans of one node and role whose normals differ by a small angle.
 
     Also over others between them, so that the order of the fans does not matter. Fans in one

@@ -34,8 +34,7 @@ def converted(capsys, source, ending, *more):
     out.unlink(missing_ok=True)
     code = run(["convert", source, str(out), *more])
     found = capsys.readouterr()
-    told = [line for line in found.err.splitlines() if "compiling loops" not in line]
-    return code, found.out, "\n".join(told), out.read_bytes() if out.exists() else None
+    return code, found.out, found.err, out.read_bytes() if out.exists() else None
 
 
 def check_alike(capsys, source, ending, *more):

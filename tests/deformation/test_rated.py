@@ -36,8 +36,7 @@ def both(capsys, *words):
         code = run([*words, *more])
         picture = Path("a.png")
         said = capsys.readouterr()
-        told = [line for line in said.err.splitlines() if "compiling loops" not in line]
-        found.append((code, said.out, told, picture.read_bytes() if picture.exists() else b""))
+        found.append((code, said.out, said.err, picture.read_bytes() if picture.exists() else b""))
         picture.unlink(missing_ok=True)
     assert not list(Path("scratch").iterdir())
     return found

@@ -14,7 +14,7 @@ from slideviz.rbf.evaluate import Basis, no_tick
 from slideviz.rbf.methods import correct, correction_of
 from slideviz.rbf.problem import GreedySettings, Problem
 from slideviz.rbf.selection import TIE, favour
-from slideviz.rbf.slide_rows import Around, _clusters
+from slideviz.rbf.slide_rows import FansAround, _clusters
 from slideviz.samples.table import sample
 from tests import builders
 from tests.test_laws import METHODS
@@ -157,7 +157,7 @@ def test_fans_are_joined_over_others_between_them_in_any_order():
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     roles = np.array(["sliding"] * 4, object)
     merge, one = np.cos(np.radians(10.0)), np.zeros(4, np.int64)
-    around = Around(one, one, roles, normals, merge, merge)
+    around = FansAround(one, one, roles, normals, merge, merge)
     for order in permutations(range(4)):
         labels = _clusters(around, np.array(order), np.array([4]))
         assert sorted(np.bincount(labels)) == [1, 3]
