@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from slideviz.design.frozen.solve import REMEDY
 from slideviz.design.frozen.step import FrozenStep
 from slideviz.errors import ConditionWarning, Note, ToleranceWarning
 from slideviz.mesh.model import FloatArray
@@ -14,11 +15,6 @@ from slideviz.rbf.refine import TRUSTED
 
 BADLY_CONDITIONED = 1e14
 """From this condition number on, what a single node moves alone has few correct digits."""
-
-REMEDY = (
-    "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "
-    "wendland-c0, or a smaller INFLUENCE_FACTOR"
-)
 
 
 def largest_condition(steps: Sequence[FrozenStep]) -> float:

@@ -99,7 +99,13 @@ class System:
             return self._field(self._whole().solve(right - met))
 
     def refined(
-        self, right: FloatArray, largest: FloatArray, start: FloatArray, tick: Tick = no_tick
+        self,
+        right: FloatArray,
+        largest: FloatArray,
+        start: FloatArray,
+        tick: Tick = no_tick,
+        *,
+        settle: bool = False,
     ) -> Refined:
         """Return the weights that meet all rows, those that the guard left out too.
 
@@ -109,6 +115,10 @@ class System:
             The data, and weights to begin with.
         largest : (m,)
             The size of the data of each column, by which its field is judged.
+        settle
+            Whether the weights themselves are the result, as of an adjoint system, where no field
+            tells of the weights of nodes that nearly coincide. The doubt is then by how much the
+            last round changed them, as a part of the largest.
         """
         weights, low = start.copy(), np.zeros_like(start)
         residuals = self._residuals()
@@ -118,20 +128,29 @@ class System:
         for _ in range(ROUNDS):
             before = weights[:, open_]
             lacking = residuals(right[:, open_], before, low[:, open_], tick)
-            step, wrong = self._step(lacking, before, size[open_], tick)
+            step, wrong = self._step(lacking, before, size[open_], tick, settle=settle)
             weights[:, open_] = before + step
             low[:, open_] += before - weights[:, open_] + step
             now = wrong / size[open_]
+            if settle:
+                most = np.abs(weights[:, open_]).max(axis=0)
+                now = np.abs(step).max(axis=0) / np.where(most > 0.0, most, 1.0)
             going = (now > VERIFIED) & (now < SLOW * doubt[open_])
             doubt[open_] = now
             open_ = open_[going]
             if not len(open_):
                 break
-        rounding = ROUNDING * np.abs(weights).sum(axis=0)
+        rounding = 0.0 if settle else ROUNDING * np.abs(weights).sum(axis=0)
         return Refined(weights, doubt + rounding / size)
 
     def _step(
-        self, lacking: FloatArray, weights: FloatArray, size: FloatArray, tick: Tick
+        self,
+        lacking: FloatArray,
+        weights: FloatArray,
+        size: FloatArray,
+        tick: Tick,
+        *,
+        settle: bool,
     ) -> tuple[FloatArray, FloatArray]:
         """Return what is to be added to weights (n, m), and by how much their field is wrong, (m,).
 
@@ -141,7 +160,7 @@ class System:
         total, z = np.zeros_like(r), whole.solve(r)
         p, rz = z.copy(), (r * z).sum(axis=0)
         wrong = self._field(z)
-        on = np.flatnonzero((wrong > VERIFIED * size) & (rz > 0.0))
+        on = np.flatnonzero(((wrong > VERIFIED * size) | settle) & (rz > 0.0))
         for _ in range(STEPS):
             if not len(on):
                 break

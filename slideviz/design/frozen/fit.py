@@ -167,7 +167,8 @@ class FrozenFit:
             if isinstance(solve, LeastSquares):
                 found = solve.solution(met, data, value(found))
             else:
-                found = solution(met(value(found)) - data, value(found), solve)
+                adjoint = solve.adjoint if isinstance(solve, MeasuredSystem) else None
+                found = solution(met(value(found)) - data, value(found), solve, adjoint)
         own = take(found, np.arange(count))
         tail = None
         if extra:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -9,10 +10,15 @@ from functools import partial
 import numpy as np
 
 from slideviz.design.frozen.tape import Array, apply, value
-from slideviz.errors import DeformError
+from slideviz.errors import ConditionWarning, DeformError
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.refine import System
+from slideviz.rbf.refine import TRUSTED, System
 from slideviz.rbf.solve import Factor, enough_threads
+
+REMEDY = (
+    "use DATA_REDUCTION= YES with a larger tolerance, a less smooth RBF_KERNEL such as "
+    "wendland-c0, or a smaller INFLUENCE_FACTOR"
+)
 
 
 class MeasuredSystem:
@@ -28,8 +34,11 @@ class MeasuredSystem:
         self._blocks, self._systems, self._refined = blocks, systems, refined
         self.doubt: FloatArray = np.zeros(())
 
-    def __call__(self, right: FloatArray) -> FloatArray:
-        """Return the solutions (..., n, m) for right-hand sides, all at once."""
+    def __call__(self, right: FloatArray, *, settle: bool = False) -> FloatArray:
+        """Return the solutions (..., n, m) for right-hand sides, all at once.
+
+        ``settle``: as of ``System.refined``.
+        """
         n, m = right.shape[-2:]
         wide = np.ascontiguousarray(np.moveaxis(right.reshape(-1, n, m), 0, 1).reshape(n, -1))
         largest = np.repeat(np.abs(right).max(axis=(-1, -2), initial=0.0).ravel(), m)
@@ -38,7 +47,7 @@ class MeasuredSystem:
             with enough_threads(2.0 * len(block) * wide[block].size):
                 found = system.factor.solve(wide[block])
                 if self._refined:
-                    refined = system.refined(wide[block], largest, found)
+                    refined = system.refined(wide[block], largest, found, settle=settle)
                     found, wrong = refined.weights, refined.doubt
                 else:
                     parts = [slice(first, first + m) for first in range(0, wide.shape[1], m)]
@@ -48,6 +57,26 @@ class MeasuredSystem:
         self.doubt = doubt.reshape(*right.shape[:-2], m).max(axis=-1)
         shaped = np.moveaxis(out.reshape(n, -1, m), 1, 0)
         return np.ascontiguousarray(shaped).reshape(right.shape)
+
+    def adjoint(self, right: FloatArray) -> FloatArray:
+        """Return the solutions of the reverse pass, which are gradients themselves.
+
+        Warns
+        -----
+        ConditionWarning
+            They do not settle.
+        """
+        found = self(right, settle=True)
+        worst = float(self.doubt.max(initial=0.0))
+        if self._refined and worst > TRUSTED:
+            warnings.warn(
+                "the system of the gradient is too nearly singular to be solved: gradients with "
+                "respect to nodes that nearly coincide may be wrong by "
+                f"{100.0 * min(worst, 1.0):.2g} % of the largest; {REMEDY}",
+                ConditionWarning,
+                stacklevel=2,
+            )
+        return found
 
 
 @dataclass(frozen=True, eq=False)

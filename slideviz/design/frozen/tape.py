@@ -338,7 +338,9 @@ def join(*parts: Array) -> Array:
     return apply(np.concatenate(full, axis=-2), *links)
 
 
-def solution(residual: Array, found: FloatArray, solve: Linear) -> Array:
+def solution(
+    residual: Array, found: FloatArray, solve: Linear, adjoint: Linear | None = None
+) -> Array:
     """Return what makes a residual zero that is linear in it, with a symmetric matrix.
 
     Parameters
@@ -347,7 +349,8 @@ def solution(residual: Array, found: FloatArray, solve: Linear) -> Array:
         How it depends on all else, at the solution.
     found
         The solution.
-    solve : callable
-        The matrix's inverse.
+    solve, adjoint : callable
+        The matrix's inverse, and the same for the reverse pass, where that has another accuracy.
     """
-    return apply(found, (residual, lambda t: -solve(t), lambda g: -solve(g)))
+    back = adjoint or solve
+    return apply(found, (residual, lambda t: -solve(t), lambda g: -back(g)))
