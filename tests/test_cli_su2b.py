@@ -127,6 +127,8 @@ def test_convert_has_all_zones_or_one(tmp_path, monkeypatch, capsys):
     assert run(["convert", "two.su2", "second.su2b", "--zone", "2"]) == 0
     assert Path("second.su2b").read_bytes() == packed([THREE_D])
     assert "will not have its other zones" in capsys.readouterr().err
+    assert run(["convert", "two.su2", "second.su2", "--zone", "2"]) == 0
+    assert "second.su2 will have zone 2 alone" in capsys.readouterr().err
     assert run(["convert", "two.su2b", "second.vtu", "--zone", "2"]) == 0
     assert len(sv.read("second.vtu").points) == 9
     assert run(["convert", "two.su2b", "out.nothing"]) == 1

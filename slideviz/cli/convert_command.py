@@ -40,6 +40,9 @@ def convert(arguments: argparse.Namespace) -> int:
         return _convert_streamed(arguments)
     mesh = read(arguments.mesh, zone=arguments.zone)
     binary = arguments.output.suffix.lower() == ".su2b"
+    if arguments.zone and mesh.zones > 1 and arguments.output.suffix.lower() == mesh.origin.ending:
+        words = f"{arguments.output} will have zone {mesh.zone} alone, and of {mesh.name} nothing"
+        say("warning", f"{words} but that mesh: leave out --zone to keep FFD boxes and the rest")
     # Without --zone no zone is lost.
     tell_lost(arguments.output, mesh if arguments.zone else replace(mesh, zones=1))
     if not arguments.zone and mesh.origin.ending == ".su2" and binary:

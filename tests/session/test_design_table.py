@@ -118,6 +118,9 @@ def test_files(passage, tmp_path):
         first, second = csv.DictReader(found)
     assert (first["min"], first["STEPS"]) == ("", "2")
     assert (second["design"], second["min"], second["mean"]) == ("2", "0.25", "0.5")
+    # Of a table with results the designs are read.
+    again = read_table(passage.case, tmp_path / "out.csv")
+    assert (again.columns, again.rows) == (table.columns, table.rows)
 
 
 def test_only_what_has_no_result_is_run(passage, monkeypatch):

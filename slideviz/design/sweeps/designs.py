@@ -13,6 +13,7 @@ from typing import Any
 from slideviz.case.lines import listed, read_text
 from slideviz.case.model import Case
 from slideviz.design.sweeps.columns import NumberPlace, Value, applied, column_name, columns_of
+from slideviz.design.sweeps.row import NUMBERS
 from slideviz.errors import CaseError
 
 _SEPARATORS = (",", ";", "\t")
@@ -93,7 +94,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     """Return the designs of a file: a head with the names of the columns, then a row for each.
 
     Empty lines and lines that begin with ``#`` are passed over; commas, semicolons or tabs
-    separate.
+    separate. Of a table of results the designs are read.
     """
     text, _ = read_text(path, "table of designs")
     lines = _filled(text)
@@ -104,7 +105,8 @@ def _read_csv(case: Case, path: Path) -> Designs:
         )
     (first, head), *rest = lines
     separator = max(_SEPARATORS, key=head.count) if "," not in head else ","
-    names = [column_name(name) for name in _split(head, separator)]
+    own = _own_columns(_split(head, separator))
+    names = [column_name(name) for name in _split(head, separator)[own]]
     problems: list[tuple[int, str]] = []
     try:
         columns = columns_of(case, names)
@@ -113,7 +115,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
         columns = _known(case, names)
     designs: list[Design] = []
     for at, (line, content) in enumerate(rest, start=1):
-        cells = [cell.strip() for cell in _split(content, separator)]
+        cells = [cell.strip() for cell in _split(content, separator)[own]]
         try:
             if len(cells) != len(names):
                 raise CaseError(
@@ -127,6 +129,14 @@ def _read_csv(case: Case, path: Path) -> Designs:
     if problems:
         raise CaseError(listed(path, problems))
     return Designs(columns, tuple(designs))
+
+
+def _own_columns(head: Sequence[str]) -> slice:
+    """Return which columns are of designs; in a table of results others stand around them."""
+    at = len(head) - 1
+    while at > 0 and list(head[at : at + len(NUMBERS)]) != list(NUMBERS):
+        at -= 1
+    return slice(1, at) if at > 1 and head[0] == "design" else slice(None)
 
 
 def _known(case: Case, names: Iterable[str]) -> dict[str, NumberPlace | str]:
