@@ -1,16 +1,17 @@
 """Fields of numbers: what is shown, and what is kept."""
 
 import pytest
-from qtpy.QtCore import Qt
-from qtpy.QtGui import QColor, QFocusEvent, QPalette
+from qtpy.QtCore import QEvent, Qt
+from qtpy.QtGui import QColor, QFocusEvent, QKeyEvent, QPalette
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication, QToolTip
 
 from slideviz.gui.widgets import theme
 from slideviz.gui.widgets.choice import Choice
-from slideviz.gui.widgets.fields import NumberField, short_text
+from slideviz.gui.widgets.fields import NumberBox, NumberField, short_text
 from slideviz.gui.widgets.vector_field import VectorField
 
+NONE = Qt.KeyboardModifier.NoModifier
 THIRD = 0.005596983152812345
 
 
@@ -191,3 +192,20 @@ def test_a_narrow_choice_ends_with_an_ellipsis_and_its_list_shows_every_word(qtb
     choice.showPopup()
     assert choice.view().width() >= choice.fontMetrics().horizontalAdvance(choice.itemText(1))
     choice.hidePopup()
+
+
+def test_a_word_for_the_lowest_number_can_be_typed(qtbot):
+    box, told = NumberBox(), []
+    qtbot.addWidget(box)
+    box.setRange(0, 40)
+    box.setSpecialValueText("automatic")
+    box.setValue(5)
+    box.valueChanged.connect(told.append)
+    for key in (Qt.Key.Key_A, Qt.Key.Key_U, Qt.Key.Key_T, Qt.Key.Key_O):
+        override = QKeyEvent(QEvent.Type.ShortcutOverride, key, NONE, chr(key).lower())
+        assert box.event(override)
+        assert override.isAccepted(), "it is no shortcut of the window"
+        QTest.keyClick(box, key)
+    assert (box.text(), told) == ("automatic", [0])
+    QTest.keyClicks(box, "12")
+    assert told[-1] == 12

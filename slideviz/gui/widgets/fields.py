@@ -216,7 +216,8 @@ class NumberField(QLineEdit):
 class NumberBox(QSpinBox):
     """A field for a whole number with arrows; without digits it is marked as a `NumberField` is.
 
-    The wheel scrolls the panel instead of changing it. Of ``letters``, its words may have some.
+    The wheel scrolls the panel instead of changing it. Of ``letters``, its words may have some. The
+    first letter of the word that stands for the lowest value (``automatic``) chooses that.
     """
 
     marked = Signal()
@@ -230,10 +231,17 @@ class NumberBox(QSpinBox):
             change.connect(lambda *_: self._look())
 
     def event(self, event: QEvent) -> bool:
-        if is_stray(event, self.letters):
+        if is_stray(event, self.letters + self.specialValueText()):
             event.ignore()
             return False
         return super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.text() and self.specialValueText().startswith(event.text()):
+            self.setValue(self.minimum())
+            self.selectAll()
+        else:
+            super().keyPressEvent(event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
