@@ -49,7 +49,12 @@ def add_run(calls: argparse._SubParsersAction) -> None:
         metavar="FILE",
         help="all steps with their quality in one file for ParaView (.vtkhdf)",
     )
-    call.add_argument("--picture", type=Path, metavar="FILE", help="picture of the quality (PNG)")
+    call.add_argument(
+        "--picture",
+        type=Path,
+        metavar="FILE",
+        help="picture of the quality (PNG); keys VIEW_... are for the window",
+    )
     call.add_argument("--picture-size", type=size, metavar="WxH", help="pixels (1600x1000)")
     add_zoom(call)
     add_shared(call, "zone")
