@@ -253,9 +253,9 @@ class MainWindow(Services):
         if session.in_file:
             self.banner.tell("\n".join(remarks))
         notes = [] if session.in_file else [*remarks]
-        notes += [boxes_hint(session)] if boxes_hint(session) else []
+        notes.append(boxes_hint(session))
         name = (session.case.source or session.path).name
-        self.say(f"Opened {name}{''.join(f'. {text}' for text in notes)}")
+        self.say(f"Opened {name}{''.join(f'. {text}' for text in notes if text)}")
 
     # Jobs ------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from typing import Any
 from slideviz.case.model import Case, FromFile, Motion, named
 from slideviz.session.opening import guess_by_name, has_ffd, with_periodicity
 from slideviz.session.rows import replaced, without
-from slideviz.session.state import FramePlace, Session
+from slideviz.session.state import PanelPlace, Session
 from slideviz.session.undoable import undoable
 from slideviz.terms import Role
 
@@ -67,7 +67,7 @@ def set_case(session: Session, **values: Any) -> Session:
     return replace(session, case=session.case.change(**values))
 
 
-def set_invalid(session: Session, place: FramePlace, sentences: tuple[str, ...]) -> Session:
+def set_invalid(session: Session, place: PanelPlace, sentences: tuple[str, ...]) -> Session:
     """Return the session with the fields of a panel that are not valid."""
     others = tuple(each for each in session.invalid if each[0] != place)
     found = (*others, *((place, sentence) for sentence in sentences))

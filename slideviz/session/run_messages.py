@@ -11,7 +11,7 @@ from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Motion, Radial, Rotate, Scale, Translate, moves
 from slideviz.errors import Note
 from slideviz.mesh.model import Mesh
-from slideviz.session.state import FramePlace, Run, Session
+from slideviz.session.state import PanelPlace, Run, Session
 
 LARGE = 1e9
 """Bytes from which on a message says beforehand what a run takes."""
@@ -112,7 +112,7 @@ class Requirement:
     """
 
     text: str
-    place: FramePlace
+    place: PanelPlace
     marker: str = ""
     motion: int = 0
 

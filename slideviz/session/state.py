@@ -112,8 +112,8 @@ class ViewState:
 
 
 __all__ = [
-    "FramePlace",
     "Guess",
+    "PanelPlace",
     "Run",
     "Session",
     "StepFrame",
@@ -130,7 +130,7 @@ IN_FILE = (
 )
 """Why something cannot be done with a large mesh."""
 
-FramePlace = Literal["open", "boundaries", "motion", "method"]
+PanelPlace = Literal["open", "boundaries", "motion", "method"]
 """Where something is put right before a run: a panel, or the choice of a file."""
 
 
@@ -191,7 +191,7 @@ class Session:
     view: ViewState = field(default_factory=ViewState)
     intersection: str = ""
     folding: str = ""
-    invalid: tuple[tuple[FramePlace, str], ...] = ()
+    invalid: tuple[tuple[PanelPlace, str], ...] = ()
     removed: tuple[Run, ...] = ()
     newest: int = 0
 

@@ -66,9 +66,11 @@ class MeasuredSystem:
         ConditionWarning
             They do not settle.
         """
+        if not self._refined:  # what a field would lack says nothing of a gradient
+            return solved(self._blocks, [system.factor for system in self._systems], right)
         found = self(right, settle=True)
         worst = float(self.doubt.max(initial=0.0))
-        if self._refined and worst > TRUSTED:
+        if worst > TRUSTED:
             warnings.warn(
                 "the system of the gradient is too nearly singular to be solved: gradients with "
                 "respect to nodes that nearly coincide may be wrong by "

@@ -105,8 +105,9 @@ def _read_csv(case: Case, path: Path) -> Designs:
         )
     (first, head), *rest = lines
     separator = max(_SEPARATORS, key=head.count) if "," not in head else ","
-    own = _own_columns(_split(head, separator))
-    names = [column_name(name) for name in _split(head, separator)[own]]
+    words = _split(head, separator)
+    own = own_columns(words)
+    names = [column_name(name) for name in words[own]]
     problems: list[tuple[int, str]] = []
     try:
         columns = columns_of(case, names)
@@ -131,7 +132,7 @@ def _read_csv(case: Case, path: Path) -> Designs:
     return Designs(columns, tuple(designs))
 
 
-def _own_columns(head: Sequence[str]) -> slice:
+def own_columns(head: Sequence[str]) -> slice:
     """Return which columns are of designs; in a table of results others stand around them."""
     at = len(head) - 1
     while at > 0 and list(head[at : at + len(NUMBERS)]) != list(NUMBERS):

@@ -23,7 +23,7 @@ from slideviz.case.key import FILES, VIEW
 from slideviz.case.keys import KEYS
 from slideviz.case.model import Case, Ffd, FromFile, Prescribed
 from slideviz.design.sweeps.columns import Value
-from slideviz.design.sweeps.designs import Designs
+from slideviz.design.sweeps.designs import Designs, own_columns
 from slideviz.design.sweeps.lock import FolderLock
 from slideviz.design.sweeps.row import NUMBERS, DesignRow
 from slideviz.errors import CaseError
@@ -120,7 +120,7 @@ class SweepResults:
             raise CaseError(f"{self.path}: cannot be read: {reason_of(problem)}") from problem
         head, *lines = [*csv.reader(StringIO(whole.decode("utf-8", "replace")))] or [[]]
         if head != self._head:
-            names = ", ".join(head[1 : -len(NUMBERS) - len(_WORDS)])
+            names = ", ".join(head[own_columns(head)])
             raise CaseError(
                 f"{self.path}: has other columns ({names}) than the table of designs "
                 f"({', '.join(self._designs.columns)}); {_REMEDY}"

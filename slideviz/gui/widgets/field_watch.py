@@ -7,14 +7,14 @@ from qtpy.QtWidgets import QFormLayout, QLabel, QWidget
 
 from slideviz.gui.widgets.fields import NumberBox, NumberField
 from slideviz.session import changes
-from slideviz.session.state import FramePlace
+from slideviz.session.state import PanelPlace
 from slideviz.session.store import Store
 
 
 class FieldWatch(QObject):
     """The invalid fields of a panel, kept up to date in ``Session.invalid``."""
 
-    def __init__(self, panel: QWidget, store: Store, place: FramePlace) -> None:
+    def __init__(self, panel: QWidget, store: Store, place: PanelPlace) -> None:
         super().__init__(panel)
         self.panel, self.store, self.place = panel, store, place
         self._fields: list[NumberField | NumberBox] = [
