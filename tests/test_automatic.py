@@ -1,6 +1,7 @@
 """STEPS= auto: as few steps as are enough, folding steps halved, and what is told about folds."""
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import slideviz as sv
 from slideviz.case.model import Translate
 from slideviz.cli import run
-from slideviz.deformation.solver import COUNTS, folded_at
+from slideviz.deformation.solver import COUNTS, all_steps, folded_at
 from slideviz.mesh.quality import INVERTED
 from slideviz.samples.table import sample, write_sample
 
@@ -30,6 +31,7 @@ def test_it_stops_when_more_steps_gain_little(square, sliding):
     assert chosen.min == sv.quality(last.mesh, mesh).min
     later = [trial for trial in tried.values() if trial.planned > chosen.planned]
     if later:
+        assert len(later) == (1 if chosen.steps == chosen.planned else 2)
         assert later[0].min <= chosen.min * (1 + case.steps_gain)
     else:
         assert chosen.planned == COUNTS[-1]
@@ -65,6 +67,44 @@ def test_a_folding_step_is_halved(square):
     assert [step.index for step in steps] == list(range(1, len(steps) + 1))
     assert {step.total for step in steps} == {len(steps)}
     assert all(sv.quality(step.mesh, mesh).inverted == 0 for step in steps)
+
+
+class Recorded:
+    """A run of which is known what each number of steps gives: steps made, and minimum quality."""
+
+    def __init__(self, given):
+        self.case, self.given = sv.Case(steps=0), given
+
+    def steps(self, count, halve):
+        assert halve
+        steps, least = self.given[count]
+        return [Made(least)] * steps
+
+    def quality_of(self, steps):
+        return steps[-1]
+
+
+@dataclass(frozen=True)
+class Made:
+    min: float
+    mean: float = 0.5
+    inverted: int = 0
+    total: int = 0
+    tried: tuple = ()
+
+
+def test_one_worse_number_does_not_end_the_search_where_steps_were_halved():
+    better_later = {1: (4, 0.078), 5: (5, 0.072), 8: (8, 0.088), 13: (13, 0.095), 21: (21, 0.0951)}
+    found = list(all_steps(Recorded(better_later)))
+    assert len(found) == 13
+    assert [trial.planned for trial in found[-1].tried] == [1, 5, 8, 13, 21]
+    worse_twice = {1: (4, 0.078), 5: (5, 0.072), 8: (8, 0.073)}
+    assert len(list(all_steps(Recorded(worse_twice)))) == 4
+
+
+def test_one_worse_number_ends_the_search_where_none_was_halved():
+    found = list(all_steps(Recorded({1: (1, 0.078), 2: (2, 0.072)})))
+    assert len(found) == 1
 
 
 def test_a_hopeless_case_gives_the_least_folded(square):

@@ -101,7 +101,9 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
     """Yield the steps of the smallest number of them that is enough.
 
     Enough: no cell is inverted, and the next number does not raise the minimum quality by more
-    than the part ``steps_gain``. If none is free of inverted cells, the one with fewest.
+    than the part ``steps_gain``. Where folding steps were halved, two numbers must fail to raise
+    it: such steps are small just where it matters, and even ones catch up later. If none is free
+    of inverted cells, the one with fewest.
 
     Raises
     ------
@@ -124,7 +126,7 @@ def _automatic(stepping: Stepping) -> Iterator[Step]:
         found = stepping.quality_of(steps)
         trial = Trial(count, len(steps), found.min, found.mean, found.inverted)
         tried.append(trial)
-        if best is not None and best[0].inverted == 0:
+        if best is not None and best[0].inverted == 0 and best[0].steps == best[0].planned:
             gain = stepping.case.steps_gain * best[0].min
             if trial.inverted or trial.min - best[0].min <= gain:
                 break
