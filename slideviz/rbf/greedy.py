@@ -26,19 +26,18 @@ error is kept where that is clearly better.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
-from slideviz.rbf.constraint_rows import ConstraintRows, blocks
-from slideviz.rbf.evaluate import matrix
-from slideviz.rbf.exact import gathered, row_names, saddle_fit
-from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.constraint_rows import ConstraintRows
+from slideviz.rbf.exact import row_names
+from slideviz.rbf.kernels import PLAIN
+from slideviz.rbf.level import Candidates, Level
 from slideviz.rbf.problem import Cycle, Interpolant, Levels, Problem, Watch
-from slideviz.rbf.selection import GrowingFactor, LevelLimit, favour, newton, pool
-from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
+from slideviz.rbf.selection import LevelLimit, pool
+from slideviz.rbf.solve import enough_threads
 
 STALE = 0.3
 """A block ends when the pool's largest error is below this part of the largest of all."""
@@ -79,51 +78,31 @@ class GreedyFit:
         d = problem.values.shape[1]
         self.history, self.short = history, ""
         self.found = Interpolant(np.empty(0, np.int64), np.empty((0, d)))
-        kernel = KERNELS[problem.basis.kernel]
-        self._tailed, self._singular = kernel.polynomial, False
-        # Only positive definite functions have pivots. For the others the default one tells
-        # which nodes add most, and the weights come from the system with the polynomial.
-        self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
         self.dropped: IntArray = np.empty(0, np.int64)
         self.stages: tuple[Levels, ...] = ()
         self.doubt = self.refined = 0.0
         self._start = perf_counter() - (history[-1].seconds if history else 0.0)
-        self._level = history[-1].level if history else 1
-        self._rows = ConstraintRows(np.empty(0, np.int64), None, np.empty((0, d)))
-        self._candidate = self._block = np.empty(0, np.int64)
+        self._number = history[-1].level if history else 1
+        none = np.empty(0, np.int64)
+        rows = ConstraintRows(none, None, np.empty((0, d)))
+        self._among = Candidates(rows, none, none, none, np.empty(0))
+        self._level = Level(problem, self._among, self.found)
         self._known = problem.beginning()
         self._given, self._used = problem.stages[done:], list[int]()
         self._one_level = self._settings.level == "none"
-        self._new_level()
 
     def _new_level(self) -> None:
-        """Begin a level: an empty factor for what the levels before left."""
-        self._settled = self.found
-        self._now = Interpolant(np.empty(0, np.int64), self.found.weights[:0])
-        self._grown = self._empty()
-        self._chosen = np.empty(0, np.int64)
-        self._barred = np.zeros(len(self._rows.nodes), bool)
-
-    def _empty(self) -> list[GrowingFactor]:
-        """Return a factor without rows for each block."""
-        count = int(self._block.max(initial=0)) + 1
-        return [GrowingFactor(self._rows.right.shape[1]) for _ in range(count)]
+        """Begin a level, for what those before left."""
+        self._level = Level(self._problem, self._among, self.found)
 
     def add(self, rows: ConstraintRows) -> None:
         """Meet these constraints too, and select until all errors are below the tolerance."""
-        rows = rows.by_position(self._problem.coords)
-        first = not len(self._rows.nodes)
-        self._rows = rows if first else self._rows.followed_by(rows)
-        rows = self._rows
-        self._block = blocks(rows)
+        first = not len(self._among.rows.nodes)
+        self._among = self._among.with_rows(self._problem, rows.by_position(self._problem.coords))
         if first:
-            self._grown = self._empty()
-        new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
-        self._candidate = np.cumsum(new) - 1
-        self._first = np.flatnonzero(new)
-        self._favour = favour(self._problem.coords[rows.nodes[self._first]])
-        more = len(rows.nodes) - len(self._barred)
-        self._barred = np.concatenate([self._barred, np.zeros(more, bool)])
+            self._new_level()
+        else:
+            self._level.go_on_with(self._among)
         with self._watch.phase("select"):
             self._select()
         self.stages += (self.found.levels,)
@@ -131,37 +110,35 @@ class GreedyFit:
     def _select(self) -> None:
         """Run cycles until the error is below the tolerance, or nothing is left to choose."""
         settings = self._settings
-        target = self._targets()
-        residual = target - self._values(self._now)
-        errors = self._errors(residual)
+        target = self._level.targets()
+        residual, errors = self._misfit(target)
         goal = self._level_goal(errors)
-        again = np.flatnonzero(np.isin(self._rows.nodes, self._known) & ~self._barred)
+        known = np.isin(self._among.rows.nodes, self._known)
+        again = np.flatnonzero(known & ~self._level.barred)
         if len(again) and (errors.max(initial=0.0) > settings.tolerance or self._given):
             self._record(errors)
             self._take(again, target)
-            residual = target - self._values(self._now)
-            errors = self._errors(residual)
+            residual, errors = self._misfit(target)
         if self._take_given():
-            target = self._targets()
-            residual = target - self._values(self._now)
-            errors = self._errors(residual)
+            target = self._level.targets()
+            residual, errors = self._misfit(target)
             goal = self._level_goal(errors)
-        rule, given_up = LevelLimit(errors.max(initial=0.0), len(self._rows.nodes)), False
-        best = errors, self.found
+        rule = LevelLimit(errors.max(initial=0.0), len(self._among.rows.nodes))
+        given_up, best = False, (errors, self.found)
         while True:
             self._record(errors)
-            if errors.max(initial=0.0) <= settings.tolerance or self._full() or self._singular:
+            enough = errors.max(initial=0.0) <= settings.tolerance
+            if enough or self._full() or self._level.singular:
                 break
             if not given_up and self._level_done(errors, goal):
-                given_up = rule.ends(float(errors.max()), len(self._chosen))
+                given_up = rule.ends(float(errors.max()), len(self._level.chosen))
                 self._new_level()
-                self._level += 1
-                target, goal = self._targets(), self._level_goal(errors)
+                self._number += 1
+                target, goal = self._level.targets(), self._level_goal(errors)
                 residual = target
             if not self._grow(target, residual, errors):
                 break
-            residual = target - self._values(self._now)
-            errors = self._errors(residual)
+            residual, errors = self._misfit(target)
             if errors.max() < best[0].max():
                 best = errors, self.found
             self._watch.report("select", self._fraction(errors))
@@ -171,6 +148,11 @@ class GreedyFit:
             self.found = best[1]
             self._new_level()
             self._record(best[0])
+
+    def _misfit(self, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the level lacks of its target (r, m), and the error of each node, (c,)."""
+        residual = target - self._among.values(self._problem, self._level.now)
+        return residual, self._among.errors(residual)
 
     def _shortfall(self, errors: FloatArray) -> str:
         """Return why the selection ended above its tolerance, and a remedy; empty if it did not."""
@@ -195,9 +177,9 @@ class GreedyFit:
     def _level_done(self, errors: FloatArray, goal: float) -> bool:
         """Tell whether the level is complete (section 2.5.2, 5.3.2)."""
         if self._settings.level == "size":
-            count = len(np.unique(self._candidate[self._chosen]))
-            return count >= self._settings.level_size
-        return self._settings.level == "ratio" and len(self._chosen) > 0 and errors.max() < goal
+            return self._level.nodes >= self._settings.level_size
+        some = len(self._level.chosen) > 0
+        return self._settings.level == "ratio" and some and errors.max() < goal
 
     def _full(self) -> bool:
         limit = self._settings.max_nodes
@@ -212,7 +194,7 @@ class GreedyFit:
     def _record(self, errors: FloatArray) -> None:
         cycle = Cycle(
             len(self.history) + 1,
-            self._level,
+            self._number,
             float(errors.max(initial=0.0)),
             len(self.found.nodes),
             perf_counter() - self._start,
@@ -221,146 +203,61 @@ class GreedyFit:
 
     def _note_dropped(self, errors: FloatArray) -> None:
         """Remember the candidates that are barred although their error is too large."""
+        level, among = self._level, self._among
+        chosen = np.zeros(len(level.barred), bool)
+        chosen[level.chosen] = True
+        barred = (among.has_row(level.barred) & ~among.has_row(chosen)) | level.singular
         over = errors > self._settings.tolerance
-        barred = np.zeros(len(errors), bool)
-        barred[self._candidate[self._barred]] = True
-        barred[self._candidate[self._chosen]] = False
-        barred |= self._singular
-        self.dropped = np.unique(self._rows.nodes[self._first[over & barred]])
-
-    def _targets(self) -> FloatArray:
-        """Return what this level has to meet: the data less the levels before, (r, m)."""
-        if not len(self._settled.nodes):
-            return self._rows.right
-        return self._rows.right - self._values(self._settled)
-
-    def _own(self, target: FloatArray) -> Interpolant:
-        """Return the interpolant of this level."""
-        chosen, normals = self._chosen, self._rows.normals
-        rows = ConstraintRows(
-            self._rows.nodes[chosen], None if normals is None else normals[chosen], target[chosen]
-        )
-        if self._tailed:
-            found, self._singular = saddle_fit(self._problem, rows)
-        else:
-            weights = np.empty_like(rows.right)
-            for factor in self._grown:
-                weights[factor.turn] = factor.weights()
-            found = gathered(rows, weights)
-        return replace(found, levels=(row_names(self._rows)[chosen],))
-
-    def _values(self, sum_: Interpolant) -> FloatArray:
-        """Return an interpolant in each row, (r, m)."""
-        rows = self._rows
-        s = sum_.at(self._problem, rows.nodes[self._first])[self._candidate]
-        return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
-
-    def _errors(self, residual: FloatArray) -> FloatArray:
-        """Return the error of each candidate node: the length of its residual, (c,)."""
-        squares = np.einsum("rm,rm->r", residual, residual)
-        return np.sqrt(np.add.reduceat(squares, self._first)) if len(squares) else squares
+        self.dropped = np.unique(among.rows.nodes[among.first[over & barred]])
 
     def _grow(self, target: FloatArray, residual: FloatArray, errors: FloatArray) -> bool:
         """Pick nodes, extend the factor and the weights; tell whether any could be picked."""
-        open_ = np.zeros(len(errors), bool)
-        open_[self._candidate[~self._barred]] = True
-        favoured = errors * self._favour
-        count, among = self._pool(np.where(open_, favoured, -1.0), residual)
-        while len(among):
-            rows = np.flatnonzero(np.isin(self._candidate, among) & ~self._barred)
-            done = len(self._chosen) / len(self._grown)
-            flops = 4.0 * (done + count) * len(rows) * done
-            with enough_threads(flops):
-                picked = self._pick(rows, residual[rows], count, float(errors.max()), target)
-                if picked:
-                    self._now = self._own(target)
-            if picked:
-                self.found = self._settled.plus(self._now)
-                return True
+        level, among = self._level, self._among
+        open_ = among.has_row(~level.barred)
+        favoured, largest = errors * among.favour, float(errors.max())
+        floor = 0.0 if self._settings.pick != "block" else STALE * largest
+        floor = max(floor, self._settings.tolerance)
+        while True:
+            count, pooled = self._pool(np.where(open_, favoured, -1.0), residual)
+            if not len(pooled):
+                return False
+            rows = np.flatnonzero(np.isin(among.candidate, pooled) & ~level.barred)
+            done = level.depth
+            with enough_threads(4.0 * (done + count) * len(rows) * done):
+                if level.pick(rows, residual[rows], count=count, floor=floor, target=target):
+                    level.solve(target)
+                    self.found = level.found
+                    return True
             # All of the pool fell to the pivot guard: try the next ones.
-            open_[among] = False
-            count, among = self._pool(np.where(open_, favoured, -1.0), residual)
-        return False
+            open_[pooled] = False
 
     def _pool(self, errors: FloatArray, residual: FloatArray) -> tuple[int, IntArray]:
         """Return how many nodes to pick, and the candidates to pick them from."""
-        normals, d = self._rows.normals, self._problem.values.shape[1]
-        vectors = residual
+        among, d = self._among, self._problem.values.shape[1]
+        normals, vectors = among.rows.normals, residual
         if normals is not None:
             vectors = np.zeros((len(errors), d))
-            np.add.at(vectors, self._candidate, residual * normals)
-        per_node = max(1, len(self._candidate) // max(1, len(errors)))
+            np.add.at(vectors, among.candidate, residual * normals)
         return pool(
             errors,
             vectors,
             self._settings,
             chosen=len(self.found.nodes),
-            chosen_in_level=len(np.unique(self._candidate[self._chosen])),
-            per_node=per_node,
+            chosen_in_level=self._level.nodes,
+            per_node=max(1, len(among.candidate) // max(1, len(errors))),
         )
-
-    def _pick(
-        self,
-        rows: IntArray,
-        residual: FloatArray,
-        count: int,
-        largest: float,
-        target: FloatArray,
-    ) -> bool:
-        """Run the Newton greedy on the pool's rows and append what it picks to the factors."""
-        order = np.argsort(self._block[rows], kind="stable")
-        rows, residual = rows[order], residual[order]
-        parts = [rows[self._block[rows] == b] for b in range(len(self._grown))]
-        left, schur = [], []
-        for factor, part in zip(self._grown, parts, strict=True):
-            beside, rest = self._remaining(factor, part)
-            left.append(beside)
-            schur.append(rest)
-        floor = 0.0 if self._settings.pick != "block" else STALE * largest
-        floor = max(floor, self._settings.tolerance)
-        candidate = self._candidate[rows]
-        picked, bases = newton(
-            schur,
-            residual,
-            nodes=candidate,
-            factor=self._favour[candidate],
-            count=count,
-            floor=floor,
-        )
-        diagonal = np.concatenate([np.diag(s) for s in schur])
-        self._barred[rows[diagonal <= PIVOT_GUARD]] = True
-        turn, start = len(self._chosen) + np.arange(len(picked)), 0
-        for k, factor in enumerate(self._grown):
-            mine = (picked >= start) & (picked < start + len(parts[k]))
-            at = picked[mine] - start
-            factor.append(parts[k][at], turn[mine], beside=left[k][:, at].T, corner=bases[k][at])
-            factor.follow(target)
-            start += len(parts[k])
-        self._chosen = np.concatenate([self._chosen, rows[picked]])
-        self._barred[rows[picked]] = True
-        return len(picked) > 0
 
     def _take(self, rows: IntArray, target: FloatArray) -> None:
-        """Append rows chosen in the step before to the factors."""
-        with enough_threads(len(rows) ** 3 / 3.0):
-            for k, factor in enumerate(self._grown):
-                part = rows[self._block[rows] == k]
-                left, schur = self._remaining(factor, part)
-                made = factorise(schur)
-                turn = len(self._chosen) + np.arange(len(made.kept))
-                factor.append(part[made.kept], turn, beside=left[:, made.kept].T, corner=made.lower)
-                factor.follow(target)
-                self._chosen = np.concatenate([self._chosen, part[made.kept]])
-            self._barred[rows] = True
-            self._now = self._own(target)
-        self.found = self._settled.plus(self._now)
+        """Take rows chosen in the step before, or for other data, into the level."""
+        self._level.take(rows, target)
+        self.found = self._level.found
 
     def _take_given(self) -> bool:
         """Take the levels that were chosen for other data; tell whether there were any."""
         stage = len(self.stages)
         if self._one_level or stage >= len(self._given):
             return False
-        place = {tuple(name): k for k, name in enumerate(row_names(self._rows).tolist())}
+        place = {tuple(name): k for k, name in enumerate(row_names(self._among.rows).tolist())}
         taken = False
         for level, names in enumerate(self._given[stage]):
             used = self._used[level] if level < len(self._used) else 0
@@ -368,32 +265,17 @@ class GreedyFit:
             if not len(rows):
                 continue
             if level >= len(self._used):
-                if len(self._chosen):
+                if len(self._level.chosen):
                     self._new_level()
-                    self._level += 1
+                    self._number += 1
                 self._used.append(0)
             self._used[level] = len(names)
-            rows = rows[~self._barred[rows]]
+            rows = rows[~self._level.barred[rows]]
             if len(rows):
-                self._take(rows, self._targets())
+                self._take(rows, self._level.targets())
                 taken = True
         return taken
 
-    def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""
-
-        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
-            nodes, normals = self._rows.nodes[index], self._rows.normals
-            return self._problem.features[:, nodes], None if normals is None else normals[index]
-
-        schur = matrix(self._basis, place(rows))
-        if not len(factor.rows):
-            return np.empty((0, len(rows))), schur
-        left = solve_lower(factor.lower, matrix(self._basis, place(factor.rows), place(rows)))
-        return left, schur - left.T @ left
-
     def condition(self) -> float:
         """Return an estimate of the condition number of the last level's system."""
-        factors = [factor.lower for factor in self._grown]
-        with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
-            return condition(*factors)
+        return self._level.condition()

@@ -1,7 +1,7 @@
-"""Parts of the greedy selection: its pool of candidates, picking in the pool, Cholesky factors.
+"""Parts of the greedy selection: its pool of candidates, and picking in the pool.
 
 `pool` says which candidates a cycle looks at and how many of them it picks, `newton` picks them,
-`GrowingFactor` takes them into the system, and `LevelLimit` ends levels that lower no error.
+and `LevelLimit` ends levels that lower no error.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from slideviz.mesh.model import FloatArray, IntArray
 from slideviz.rbf.problem import GreedySettings
-from slideviz.rbf.solve import PIVOT_GUARD, solve_lower
+from slideviz.rbf.solve import PIVOT_GUARD
 
 POOL = 768
 """Largest number of rows in the pool of a block."""
@@ -32,51 +32,6 @@ FALL = 0.9
 
 LOSSES = 8
 """How often in a row an error may fail to fall."""
-
-
-class GrowingFactor:
-    """The Cholesky factor of one block of the system, L L^T = G, and ``half`` = L^-1 b.
-
-    Attributes
-    ----------
-    rows : (k,) int64
-        The chosen rows of the problem.
-    turn : (k,) int64
-        When each was chosen, counted over all blocks.
-    lower : (k, k) float64
-    half : (k, m) float64
-    """
-
-    def __init__(self, width: int) -> None:
-        self.rows = self.turn = np.empty(0, np.int64)
-        self.lower = self._store = np.empty((0, 0))
-        self.half = np.empty((0, width))
-
-    def append(
-        self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
-    ) -> None:
-        """Append rows to the factor: L21 is ``beside`` what it has, L22 the new ``corner``."""
-        n, more = len(self.rows), len(rows)
-        if n + more > len(self._store):
-            # Room for twice as much: copying the factor in every cycle would cost as much as
-            # computing it.
-            self._store = np.zeros((2 * (n + more), 2 * (n + more)))
-            self._store[:n, :n] = self.lower
-        self._store[n : n + more, :n] = beside
-        self._store[n : n + more, n : n + more] = corner
-        self.lower = self._store[: n + more, : n + more]
-        self.rows = np.concatenate([self.rows, rows])
-        self.turn = np.concatenate([self.turn, turn])
-
-    def follow(self, target: FloatArray) -> None:
-        """Bring ``half`` up to date with the rows appended; ``target`` (r, m) is b."""
-        n = len(self.half)
-        rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.half
-        self.half = np.concatenate([self.half, solve_lower(self.lower[n:, n:], rest)])
-
-    def weights(self) -> FloatArray:
-        """Return the weights (k, m) that solve G w = b."""
-        return solve_lower(self.lower, self.half, transposed=True)
 
 
 def newton(

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 import slideviz as sv
 from slideviz.case.model import Case, Reduction
-from slideviz.rbf import exact, greedy
+from slideviz.rbf import exact, level
 from slideviz.rbf.constraint_rows import ConstraintRows, blocks
 from slideviz.rbf.evaluate import Basis, matrix
-from slideviz.rbf.selection import GrowingFactor, newton
+from slideviz.rbf.level import GrowingFactor
+from slideviz.rbf.selection import newton
 from slideviz.rbf.solve import NOTHING, extend, factorise
 from slideviz.samples.table import write_sample
 
@@ -57,7 +58,7 @@ def counted(monkeypatch, together):
         seen.append(len(set(found)))
         return np.zeros_like(found) if together else found
 
-    monkeypatch.setattr(greedy, "blocks", instead)
+    monkeypatch.setattr(level, "blocks", instead)
     monkeypatch.setattr(exact, "blocks", instead)
     return seen
 

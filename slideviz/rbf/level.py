@@ -1,0 +1,271 @@
+"""A level of the greedy selection: the rows it has chosen, and the factor that grows with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slideviz.mesh.model import FloatArray, IntArray
+from slideviz.rbf.constraint_rows import ConstraintRows, blocks
+from slideviz.rbf.evaluate import matrix
+from slideviz.rbf.exact import gathered, row_names, saddle_fit
+from slideviz.rbf.kernels import KERNELS, PLAIN
+from slideviz.rbf.problem import Interpolant, Problem
+from slideviz.rbf.selection import favour, newton
+from slideviz.rbf.solve import PIVOT_GUARD, condition, enough_threads, factorise, solve_lower
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """The nodes that may be chosen: their constraint rows, those of one node side by side.
+
+    Attributes
+    ----------
+    rows : ConstraintRows
+        Sorted by position, so that the numbering of the mesh changes no choice.
+    block : (r,) int64
+        The block of the system of each row.
+    candidate : (r,) int64
+        The candidate of each row.
+    first : (c,) int64
+        The first row of each candidate.
+    favour : (c,) float64
+        Decides where errors are equal but for rounding.
+    """
+
+    rows: ConstraintRows
+    block: IntArray
+    candidate: IntArray
+    first: IntArray
+    favour: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, rows: ConstraintRows) -> Candidates:
+        """Return the candidates that rows sorted by position have."""
+        new = np.r_[True, rows.nodes[1:] != rows.nodes[:-1]] if len(rows.nodes) else []
+        first = np.flatnonzero(new)
+        ranked = favour(problem.coords[rows.nodes[first]])
+        return cls(rows, blocks(rows), np.cumsum(new, dtype=np.int64) - 1, first, ranked)
+
+    def with_rows(self, problem: Problem, more: ConstraintRows) -> Candidates:
+        """Return these and others behind them; what is chosen keeps its number."""
+        rows = self.rows.followed_by(more) if len(self.rows.nodes) else more
+        return self.of(problem, rows)
+
+    def values(self, problem: Problem, sum_: Interpolant) -> FloatArray:
+        """Return an interpolant in each row, (r, m)."""
+        rows = self.rows
+        s = sum_.at(problem, rows.nodes[self.first])[self.candidate]
+        return s if rows.normals is None else np.einsum("rd,rd->r", s, rows.normals)[:, None]
+
+    def errors(self, residual: FloatArray) -> FloatArray:
+        """Return the error of each candidate: the length of its residual (r, m), (c,)."""
+        squares = np.einsum("rm,rm->r", residual, residual)
+        return np.sqrt(np.add.reduceat(squares, self.first)) if len(squares) else squares
+
+    def has_row(self, which: np.ndarray) -> np.ndarray:
+        """Tell which candidates have one of some rows, given as a mask (r,), (c,) bool."""
+        found = np.zeros(len(self.first), bool)
+        found[self.candidate[which]] = True
+        return found
+
+
+class GrowingFactor:
+    """The Cholesky factor of one block of the system, L L^T = G, and ``half`` = L^-1 b.
+
+    Attributes
+    ----------
+    rows : (k,) int64
+        The chosen rows of the problem.
+    turn : (k,) int64
+        When each was chosen, counted over all blocks.
+    lower : (k, k) float64
+    half : (k, m) float64
+    """
+
+    def __init__(self, width: int) -> None:
+        self.rows = self.turn = np.empty(0, np.int64)
+        self.lower = self._store = np.empty((0, 0))
+        self.half = np.empty((0, width))
+
+    def append(
+        self, rows: IntArray, turn: IntArray, *, beside: FloatArray, corner: FloatArray
+    ) -> None:
+        """Append rows to the factor: L21 is ``beside`` what it has, L22 the new ``corner``."""
+        n, more = len(self.rows), len(rows)
+        if n + more > len(self._store):
+            # Room for twice as much: copying the factor in every cycle would cost as much as
+            # computing it.
+            self._store = np.zeros((2 * (n + more), 2 * (n + more)))
+            self._store[:n, :n] = self.lower
+        self._store[n : n + more, :n] = beside
+        self._store[n : n + more, n : n + more] = corner
+        self.lower = self._store[: n + more, : n + more]
+        self.rows = np.concatenate([self.rows, rows])
+        self.turn = np.concatenate([self.turn, turn])
+
+    def follow(self, target: FloatArray) -> None:
+        """Bring ``half`` up to date with the rows appended; ``target`` (r, m) is b."""
+        n = len(self.half)
+        rest = target[self.rows[n:]] - self.lower[n:, :n] @ self.half
+        self.half = np.concatenate([self.half, solve_lower(self.lower[n:, n:], rest)])
+
+    def weights(self) -> FloatArray:
+        """Return the weights (k, m) that solve G w = b."""
+        return solve_lower(self.lower, self.half, transposed=True)
+
+
+class Level:
+    """An interpolant of rows that are chosen one block after the other.
+
+    Attributes
+    ----------
+    settled, now : Interpolant
+        The levels before this one, and what this one adds to them.
+    chosen : (k,) int64
+        The chosen rows, in the order of their choice.
+    barred : (r,) bool
+        Rows that cannot be chosen any more: they are, or would make the system singular.
+    singular : bool
+        The system with a polynomial has no solution.
+    """
+
+    def __init__(self, problem: Problem, candidates: Candidates, settled: Interpolant) -> None:
+        """Begin without rows, with an empty factor for what the levels before left."""
+        self._problem, self._among, self.settled = problem, candidates, settled
+        # Only positive definite functions have pivots. For the others the default one tells
+        # which nodes add most, and the weights come from the system with the polynomial.
+        self._tailed, self.singular = KERNELS[problem.basis.kernel].polynomial, False
+        self._basis = replace(problem.basis, kernel=PLAIN) if self._tailed else problem.basis
+        self.now = Interpolant(np.empty(0, np.int64), settled.weights[:0])
+        self.chosen: IntArray = np.empty(0, np.int64)
+        self.barred = np.zeros(len(candidates.rows.nodes), bool)
+        count = int(candidates.block.max(initial=0)) + 1
+        self._grown = [GrowingFactor(candidates.rows.right.shape[1]) for _ in range(count)]
+
+    @property
+    def found(self) -> Interpolant:
+        """The sum of all levels so far."""
+        return self.settled.plus(self.now)
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes this level has chosen."""
+        return len(np.unique(self._among.candidate[self.chosen]))
+
+    @property
+    def depth(self) -> float:
+        """How many rows each block has, on average."""
+        return len(self.chosen) / len(self._grown)
+
+    def go_on_with(self, candidates: Candidates) -> None:
+        """Choose among more candidates from here on: these, and those there were before."""
+        more = np.zeros(len(candidates.rows.nodes) - len(self.barred), bool)
+        self._among, self.barred = candidates, np.concatenate([self.barred, more])
+
+    def targets(self) -> FloatArray:
+        """Return what this level has to meet: the data less the levels before, (r, m)."""
+        right = self._among.rows.right
+        if not len(self.settled.nodes):
+            return right
+        return right - self._among.values(self._problem, self.settled)
+
+    def solve(self, target: FloatArray) -> None:
+        """Make ``now`` meet the target (r, m) in the chosen rows."""
+        all_, chosen = self._among.rows, self.chosen
+        normals = None if all_.normals is None else all_.normals[chosen]
+        rows = ConstraintRows(all_.nodes[chosen], normals, target[chosen])
+        if self._tailed:
+            found, self.singular = saddle_fit(self._problem, rows)
+        else:
+            weights = np.empty_like(rows.right)
+            for factor in self._grown:
+                weights[factor.turn] = factor.weights()
+            found = gathered(rows, weights)
+        self.now = replace(found, levels=(row_names(all_)[chosen],))
+
+    def pick(
+        self,
+        rows: IntArray,
+        residual: FloatArray,
+        *,
+        count: int,
+        floor: float,
+        target: FloatArray,
+    ) -> bool:
+        """Run the Newton greedy on a pool's rows and append what it picks to the factors.
+
+        Parameters
+        ----------
+        rows, residual : (p,), (p, m)
+            The pool, and what it still lacks.
+        count, floor
+            How many nodes to pick at most, and the error below which none is.
+        target : (r, m)
+            What the level has to meet.
+        """
+        among = self._among
+        order = np.argsort(among.block[rows], kind="stable")
+        rows, residual = rows[order], residual[order]
+        parts = [rows[among.block[rows] == b] for b in range(len(self._grown))]
+        left, schur = [], []
+        for factor, part in zip(self._grown, parts, strict=True):
+            beside, rest = self._remaining(factor, part)
+            left.append(beside)
+            schur.append(rest)
+        candidate = among.candidate[rows]
+        picked, bases = newton(
+            schur,
+            residual,
+            nodes=candidate,
+            factor=among.favour[candidate],
+            count=count,
+            floor=floor,
+        )
+        diagonal = np.concatenate([np.diag(s) for s in schur])
+        self.barred[rows[diagonal <= PIVOT_GUARD]] = True
+        turn, start = len(self.chosen) + np.arange(len(picked)), 0
+        for k, factor in enumerate(self._grown):
+            mine = (picked >= start) & (picked < start + len(parts[k]))
+            at = picked[mine] - start
+            factor.append(parts[k][at], turn[mine], beside=left[k][:, at].T, corner=bases[k][at])
+            factor.follow(target)
+            start += len(parts[k])
+        self.chosen = np.concatenate([self.chosen, rows[picked]])
+        self.barred[rows[picked]] = True
+        return len(picked) > 0
+
+    def take(self, rows: IntArray, target: FloatArray) -> None:
+        """Append rows that were chosen before, as by the step before, and meet the target."""
+        with enough_threads(len(rows) ** 3 / 3.0):
+            for k, factor in enumerate(self._grown):
+                part = rows[self._among.block[rows] == k]
+                left, schur = self._remaining(factor, part)
+                made = factorise(schur)
+                turn = len(self.chosen) + np.arange(len(made.kept))
+                factor.append(part[made.kept], turn, beside=left[:, made.kept].T, corner=made.lower)
+                factor.follow(target)
+                self.chosen = np.concatenate([self.chosen, part[made.kept]])
+            self.barred[rows] = True
+            self.solve(target)
+
+    def _remaining(self, factor: GrowingFactor, rows: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return L^-1 G of rows of a block, (k, p), and their Schur complement, (p, p)."""
+        nodes, normals = self._among.rows.nodes, self._among.rows.normals
+
+        def place(index: IntArray) -> tuple[FloatArray, FloatArray | None]:
+            features = self._problem.features[:, nodes[index]]
+            return features, None if normals is None else normals[index]
+
+        schur = matrix(self._basis, place(rows))
+        if not len(factor.rows):
+            return np.empty((0, len(rows))), schur
+        left = solve_lower(factor.lower, matrix(self._basis, place(factor.rows), place(rows)))
+        return left, schur - left.T @ left
+
+    def condition(self) -> float:
+        """Return an estimate of the condition number of the system."""
+        factors = [factor.lower for factor in self._grown]
+        with enough_threads(20.0 * max(len(lower) for lower in factors) ** 2):
+            return condition(*factors)
